@@ -150,8 +150,8 @@ MUTANTS = (
     Mutant(
         "(28): twice the slope",
         _POINT,
-        "np.interp(times, fine, left), np.interp(times, fine, slope)",
-        "np.interp(times, fine, left), 2 * np.interp(times, fine, slope)",
+        "np.interp(times, fine, remaining_range), np.interp(times, fine, slope)",
+        "np.interp(times, fine, remaining_range), 2 * np.interp(times, fine, slope)",
         (_POINTS_OF_29,),
     ),
     Mutant(
@@ -164,8 +164,8 @@ MUTANTS = (
     Mutant(
         "simulate: the clock without coverage factor",
         _POINT,
-        "[[one.declared * term for term in one.clock]",
-        "[[one.declared / factor * term for term in one.clock]",
+        "[source.declared * term for term in source.clock]",
+        "[source.declared / factor * term for term in source.clock]",
         (f"{_IMAGES}test_the_clock_of_a_simulated_image_has_the_coverage_factor",),
     ),
     Mutant(
@@ -255,15 +255,15 @@ MUTANTS = (
     Mutant(
         "verify: refocused against twice the budget",
         _PHASES,
-        "is_met = left <= budget * (1 + TOLERANCE)",
-        "is_met = left <= 2 * budget * (1 + TOLERANCE)",
+        "is_met = remaining_phase <= budget * (1 + TOLERANCE_FRACTION)",
+        "is_met = remaining_phase <= 2 * budget * (1 + TOLERANCE_FRACTION)",
         (f"{_BORDERS}TestRefocused",),
     ),
     Mutant(
         "verify: ratio of the cubic phase inverted",
         _PHASES,
-        "verdict = compare(measured / requirement - 1, TOLERANCE)",
-        "verdict = compare(requirement / measured - 1, TOLERANCE)",
+        "verdict = compare(measured / requirement - 1, TOLERANCE_FRACTION)",
+        "verdict = compare(requirement / measured - 1, TOLERANCE_FRACTION)",
         (f"{_BORDERS}TestCubic",),
     ),
     Mutant(
@@ -280,8 +280,20 @@ MUTANTS = (
         "TOLERANCE_DB = 2.0",
         (f"{_BORDERS}TestVibration::test_noise_that_the_rule_of_small_phases_underrates_is_optimistic",),
     ),
-    Mutant("verify: confirmed within 5.5 %", _PHASES, "TOLERANCE = 0.05 ", "TOLERANCE = 0.055 ", (_FIVE_PERCENT,)),
-    Mutant("verify: confirmed within 4.5 %", _PHASES, "TOLERANCE = 0.05 ", "TOLERANCE = 0.045 ", (_FIVE_PERCENT,)),
+    Mutant(
+        "verify: confirmed within 5.5 %",
+        _PHASES,
+        "TOLERANCE_FRACTION = 0.05 ",
+        "TOLERANCE_FRACTION = 0.055 ",
+        (_FIVE_PERCENT,),
+    ),
+    Mutant(
+        "verify: confirmed within 4.5 %",
+        _PHASES,
+        "TOLERANCE_FRACTION = 0.05 ",
+        "TOLERANCE_FRACTION = 0.045 ",
+        (_FIVE_PERCENT,),
+    ),
     Mutant(
         "verify: the phase inside a limit ignored",
         _PHASES,
@@ -313,15 +325,15 @@ MUTANTS = (
     Mutant(
         "simulate: sensors flown without the coverage factor",
         "bisar_budget/simulator/realisations.py",
-        "Course(times, factor * drawn[0])",
-        "Course(times, drawn[0])",
+        "Course(times, factor * series[0])",
+        "Course(times, series[0])",
         (f"{_SEAMS}test_the_coverage_factor_is_in_the_time_series_of_sensors_and_clocks",),
     ),
     Mutant(
         "simulate: clocks flown without the coverage factor",
         "bisar_budget/simulator/realisations.py",
-        "drawn = factor * phase_courses",
-        "drawn = phase_courses",
+        "series = factor * phase_courses",
+        "series = phase_courses",
         (f"{_SEAMS}test_the_coverage_factor_is_in_the_time_series_of_sensors_and_clocks",),
     ),
     Mutant(
@@ -334,8 +346,8 @@ MUTANTS = (
     Mutant(
         "verify: what autofocus leaves is met within 20 %",
         _PHASES,
-        "is_met = left <= budget * (1 + TOLERANCE)",
-        "is_met = left <= budget * (1 + 4 * TOLERANCE)",
+        "is_met = remaining_phase <= budget * (1 + TOLERANCE_FRACTION)",
+        "is_met = remaining_phase <= budget * (1 + 4 * TOLERANCE_FRACTION)",
         (f"{_BORDERS}TestRefocused",),
     ),
     Mutant(
@@ -424,8 +436,8 @@ MUTANTS = (
     Mutant(
         "seam: level of a power as of an amplitude",
         _NOISE,
-        "return 10 * math.log10(max(lost, _TINY) / (self.energy * left))",
-        "return 20 * math.log10(max(lost, _TINY) / (self.energy * left))",
+        "return 10 * math.log10(max(lost, _MIN_ENERGY_FRACTION) / (self.energy * remaining_energy))",
+        "return 20 * math.log10(max(lost, _MIN_ENERGY_FRACTION) / (self.energy * remaining_energy))",
         ("tests/verify/test_noise_image.py",),
     ),
     Mutant(
@@ -452,8 +464,8 @@ MUTANTS = (
     Mutant(
         "tones of an oscillator: cycles as a frequency over the aperture",
         "bisar_budget/simulator/realisations.py",
-        "        and one.frequency * T >= SLOWEST_ECHO_CYCLES",
-        "        and one.frequency / T >= SLOWEST_ECHO_CYCLES",
+        "        and tone.frequency * T >= SLOWEST_ECHO_CYCLES",
+        "        and tone.frequency / T >= SLOWEST_ECHO_CYCLES",
         (
             "tests/simulate/test_realisations.py::test_a_tone_of_an_oscillator_is_flown_from_one_cycle_per_aperture_on",
         ),

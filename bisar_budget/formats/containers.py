@@ -1,8 +1,8 @@
 """Radar files: header, XML and the parameters of every pulse. The signal is never read.
 
-CPHD 1.1.0 (NGA.STND.0068-1) and CRSD 1.0 (NGA.STND.0080-2) begin with a header of text lines, which says
-at which byte each block begins. SICD (NGA.STND.0024) has its XML in a segment of a NITF file. XML is read without
-entities and references, and looked up so that a fault says where it stands.
+CPHD 1.1.0 (NGA.STND.0068-1) and CRSD 1.0 (NGA.STND.0080-2) begin with a header of text lines, which gives the byte at
+which each block begins. SICD (NGA.STND.0024) has its XML in a segment of a NITF file. XML is read without entities
+and references. Its elements know their paths, so that each fault names one.
 """
 
 import math
@@ -20,7 +20,7 @@ from bisar_budget.faults import printable, shown
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.earth import Floats
 
-_HIGHEST_POWER = 30  # of a polynomial; more is no polynomial that anybody fitted
+_MAX_POLYNOMIAL_ORDER = 30  # a higher order was not fitted to data
 _INCLUDE = "{http://www.w3.org/2001/XInclude}"
 
 
@@ -39,7 +39,7 @@ class MissingExtraError(Exception):
 
 
 def check_extra() -> None:
-    """Raise a `MissingExtraError` where the extra `formats` is not installed."""
+    """Raise a `MissingExtraError` if the extra `formats` is not installed."""
     try:
         for module in ("lxml.etree", "sarkit", "sarkit.cphd"):
             import_module(module)
@@ -48,10 +48,10 @@ def check_extra() -> None:
 
 
 class Element:
-    """An element of an XML document, which knows its file and its path there.
+    """An element of an XML document, which knows its file and its path in the document.
 
-    Paths are those of ElementPath without namespaces: `Channel/Parameters/FxC`. A step may have a condition on a
-    child, `Parameters[Identifier='1']`.
+    Paths are in the syntax of ElementPath without namespaces: `Channel/Parameters/FxC`. A step may have a condition
+    on a child, `Parameters[Identifier='1']`.
     """
 
     def __init__(self, file: str, node: Any) -> None:
@@ -59,25 +59,25 @@ class Element:
 
     @property
     def tag(self) -> str:
-        """Name without namespace."""
+        """Name of the element without its namespace."""
         return str(self.node.tag).rpartition("}")[2]
 
     @property
     def namespace(self) -> str:
-        """Namespace of its name."""
+        """Namespace of the element's name."""
         return str(self.node.tag).rpartition("}")[0].lstrip("{")
 
     @property
     def path(self) -> str:
-        """Where it stands: `/CPHD/Channel/Parameters[2]`."""
+        """Path of the element from the root: `/CPHD/Channel/Parameters[2]`."""
         steps = []
         node = self.node
         while node is not None:
             name = str(node.tag).rpartition("}")[2]
-            above = node.getparent()
-            alike = [one for one in above if one.tag == node.tag] if above is not None else [node]
-            steps.append(name if len(alike) == 1 else f"{name}[{alike.index(node) + 1}]")
-            node = above
+            parent = node.getparent()
+            siblings = [child for child in parent if child.tag == node.tag] if parent is not None else [node]
+            steps.append(name if len(siblings) == 1 else f"{name}[{siblings.index(node) + 1}]")
+            node = parent
         return "/" + "/".join(reversed(steps))
 
     def fault(self, problem: str, below: str = "") -> FormatError:
@@ -89,20 +89,22 @@ class Element:
         return [Element(self.file, node) for node in self.node.findall(_any_namespace(path))]
 
     def maybe(self, path: str) -> "Element | None":
-        """First element at a path; of an empty one itself."""
+        """First element at a path, or None; the element itself for an empty path."""
         node = self.node.find(_any_namespace(path)) if path else self.node
         return None if node is None else Element(self.file, node)
 
     def one(self, path: str) -> "Element":
-        """First element at a path, which has to be there."""
-        found = self.maybe(path)
-        if found is None:
+        """First element at a path; a fault if it is missing."""
+        element = self.maybe(path)
+        if element is None:
             raise self.fault("is missing", path)
-        return found
+        return element
 
     def with_child(self, path: str, child: str, text: str) -> "Element | None":
-        """First element at a path that has a child of this text."""
-        return next((one for one in self.all(path) if one.maybe(child) and one.text(child) == text), None)
+        """First element at a path that has a child with a text, or None."""
+        return next(
+            (element for element in self.all(path) if element.maybe(child) and element.text(child) == text), None
+        )
 
     def text(self, path: str = "") -> str:
         """Text at a path."""
@@ -120,7 +122,7 @@ class Element:
         return value
 
     def whole(self, path: str = "") -> int:
-        """Whole number from zero on at a path."""
+        """Integer of at least 0 at a path."""
         text = self.text(path)
         if not (text.isascii() and text.isdigit() and len(text) < 19):
             raise self.fault(f"must be a whole number from 0 on (got {shown(text)!r})", path)
@@ -132,32 +134,32 @@ class Element:
         return (node.number("X"), node.number("Y"), node.number("Z"))
 
     def polynomial(self, path: str = "", variables: int = 1) -> Floats:
-        """Coefficients of a polynomial of some variables, (order1 + 1, …)."""
+        """Coefficients of a polynomial of one or more variables, (order1 + 1, …)."""
         node = self.one(path)
         numbers = range(1, variables + 1)
-        found = np.zeros([node._attribute(f"order{number}", _HIGHEST_POWER) + 1 for number in numbers])
+        coefficients = np.zeros([node._attribute(f"order{number}", _MAX_POLYNOMIAL_ORDER) + 1 for number in numbers])
         for coefficient in node.all("Coef"):
-            powers = tuple(coefficient._attribute(f"exponent{number}", _HIGHEST_POWER) for number in numbers)
-            if any(power >= size for power, size in zip(powers, found.shape, strict=True)):
+            powers = tuple(coefficient._attribute(f"exponent{number}", _MAX_POLYNOMIAL_ORDER) for number in numbers)
+            if any(power >= size for power, size in zip(powers, coefficients.shape, strict=True)):
                 raise coefficient.fault("is of a higher power than the polynomial's order")
-            found[powers] = coefficient.number()
-        return found
+            coefficients[powers] = coefficient.number()
+        return coefficients
 
     def path_polynomial(self, path: str) -> Floats:
-        """Coefficients of a place over time, (order + 1, 3)."""
+        """Coefficients of a position over time, (order + 1, 3)."""
         axes = [self.one(path).polynomial(axis) for axis in "XYZ"]
         most = max(axis.size for axis in axes)
         return np.stack([np.pad(axis, (0, most - axis.size)) for axis in axes], axis=1)
 
     def matrix(self, path: str, size: int) -> Floats:
-        """Symmetric matrix of `Entry` elements; what is not given is zero, of a pair one may be given."""
-        found = np.full((size, size), np.nan)
+        """Symmetric matrix of `Entry` elements. A missing pair is zero; one entry of a pair is enough."""
+        entries = np.full((size, size), np.nan)
         for entry in self.one(path).all("Entry"):
             row, column = (entry._attribute(name, size) - 1 for name in ("index1", "index2"))
             if min(row, column) < 0:
                 raise entry.fault("counts its indices from 1")
-            found[row, column] = entry.number()
-        filled = np.where(np.isnan(found), found.T, found)
+            entries[row, column] = entry.number()
+        filled = np.where(np.isnan(entries), entries.T, entries)
         symmetric: Floats = np.nan_to_num(filled / 2 + filled.T / 2)
         return symmetric
 
@@ -175,24 +177,29 @@ def _any_namespace(path: str) -> str:
 def parse(file: str, data: bytes, start: int = 0) -> Element:
     """Read an XML document, which begins at a byte of a file, without document type, entities or references.
 
-    A `FormatError` says that it is no XML, or has what a description of a collection has no use for.
+    Raises
+    ------
+    FormatError
+        The data are not XML, or have a document type, entities or references.
     """
     try:
         from lxml import etree
     except ImportError:
         raise MissingExtraError from None
-    for word in (b"<!DOCTYPE", b"<!ENTITY"):  # before a parser sees what they could do to it
-        at = data.find(word)
-        if at >= 0:
-            raise FormatError(file, f"byte {start + at}: XML with {word.decode()} is refused: entities are not read")
+    for word in (b"<!DOCTYPE", b"<!ENTITY"):  # before a parser sees them
+        position = data.find(word)
+        if position >= 0:
+            raise FormatError(
+                file, f"byte {start + position}: XML with {word.decode()} is refused: entities are not read"
+            )
     refused = dict.fromkeys(("resolve_entities", "load_dtd", "huge_tree"), False)
     parser = etree.XMLParser(no_network=True, remove_comments=True, remove_pis=True, **refused)
     try:
         root = etree.fromstring(data.strip(b" \r\n\t\0"), parser)
     except (etree.XMLSyntaxError, ValueError) as error:
         line, column = getattr(error, "position", (0, 0))
-        where = f"byte {start}: no readable XML begins here, line {line}, column {column} of it"
-        raise FormatError(file, f"{where}: {shown(str(error))}") from None
+        problem = f"byte {start}: no readable XML begins here, line {line}, column {column} of it"
+        raise FormatError(file, f"{problem}: {shown(str(error))}") from None
     if root.getroottree().docinfo.doctype:  # in an encoding that hid it
         raise FormatError(file, f"byte {start}: XML with a document type is refused: entities are not read")
     for node in root.iter(f"{_INCLUDE}*"):
@@ -200,19 +207,19 @@ def parse(file: str, data: bytes, start: int = 0) -> Element:
     return Element(file, root)
 
 
-# ---------------------------------------------------------------------- the file around the XML
+# ---------------------------------------------------------------------- containers of the XML
 _END_OF_HEADER = b"\f\n"
-_MOST_HEADER = 1 << 16  # bytes; the standard's keys take less than a thousand
-_MOST_XML = 1 << 27
-_MOST_VECTORS = 1 << 30  # bytes of parameters
+_MAX_HEADER_BYTES = 1 << 16  # the standard's keys take less than a thousand
+_MAX_XML_BYTES = 1 << 27
+_MAX_VECTOR_BYTES = 1 << 30  # of the parameters of all vectors
 _ROOTS = {"CPHD": "CPHD", "CRSDsar": "CRSD", "CRSDtx": "CRSD", "CRSDrcv": "CRSD", "SICD": "SICD"}
 
 
 @dataclass(frozen=True)
 class Container:
-    """Parts of a file that are read: its format, its XML with the byte at which that begins, and each block's length.
+    """Parts of a file that are read: its format, its XML, and the position of each block.
 
-    `blocks` are (byte, length) by name; empty where the file is XML alone.
+    `blocks` are (first byte, length) by name; empty if the file is only XML.
     """
 
     file: str
@@ -223,25 +230,26 @@ class Container:
 
     @property
     def has_vectors(self) -> bool:
-        """Whether there are parameters of pulses beside the XML."""
+        """Whether the file has parameters of pulses in addition to the XML."""
         return "PVP" in self.blocks
 
-    def vectors(self, block: str, at: int, count: int, dtype: np.dtype[Any]) -> NDArray[Any]:
-        """Parameters of `count` vectors of a block, from a byte of it on; the rest of the file is not touched."""
+    def vectors(self, block: str, offset: int, count: int, dtype: np.dtype[Any]) -> NDArray[Any]:
+        """Parameters of `count` vectors of a block, from an offset in bytes. Only these bytes are read."""
         start, length = self.blocks[block]
-        wanted = count * dtype.itemsize
-        if at + wanted > length or wanted > _MOST_VECTORS:
+        needed = count * dtype.itemsize
+        if offset + needed > length or needed > _MAX_VECTOR_BYTES:
             raise FormatError(
-                self.file, f"byte {start}: the {block} block has {length} bytes, {count} vectors need {at + wanted}"
+                self.file,
+                f"byte {start}: the {block} block has {length} bytes, {count} vectors need {offset + needed}",
             )
         with open(self.file, "rb") as stream:
-            data = _read(stream, self.file, start + at, wanted)
-        found: NDArray[Any] = np.frombuffer(data, dtype.newbyteorder(">")).astype(dtype)
-        return found
+            data = _read(stream, self.file, start + offset, needed)
+        vectors: NDArray[Any] = np.frombuffer(data, dtype.newbyteorder(">")).astype(dtype)
+        return vectors
 
 
 def open_container(file: str) -> Container:
-    """Read header and XML of a file; a `FormatError` says that it cannot be read, is no such file, or is cut off."""
+    """Read header and XML of a file; a `FormatError` if it is unreadable, of another format, or cut off."""
     try:
         if not stat.S_ISREG(os.stat(file).st_mode):  # a pipe would wait for ever
             raise FormatError(file, "is no regular file")
@@ -261,7 +269,7 @@ def _opened(file: str, stream: BinaryIO) -> Container:
         return _nitf(file, stream)
     if begin.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<"):
         size = os.fstat(stream.fileno()).st_size
-        if size > _MOST_XML:
+        if size > _MAX_XML_BYTES:
             raise FormatError(file, f"XML of {size} bytes is no description of a collection")
         data = _read(stream, file, 0, size)
         return _of_xml(file, data, 0, {})
@@ -289,7 +297,7 @@ def _read(stream: BinaryIO, file: str, start: int, length: int) -> bytes:
 
 def _with_header(file: str, stream: BinaryIO) -> Container:
     stream.seek(0)
-    data = stream.read(_MOST_HEADER)
+    data = stream.read(_MAX_HEADER_BYTES)
     end = data.find(_END_OF_HEADER)
     if end < 0:
         raise FormatError(file, f"byte {len(data)}: is cut off here, or its header does not end")
@@ -302,7 +310,7 @@ def _with_header(file: str, stream: BinaryIO) -> Container:
     size = os.fstat(stream.fileno()).st_size
     blocks = {}
     for name in ("XML", "PVP", "PPP", "SUPPORT", "SIGNAL"):
-        numbers = [values.get(f"{name}_BLOCK_{what}") for what in ("BYTE_OFFSET", "SIZE")]
+        numbers = [values.get(f"{name}_BLOCK_{field}") for field in ("BYTE_OFFSET", "SIZE")]
         if numbers == [None, None]:
             continue
         if not all(text and text.isascii() and text.isdigit() and len(text) < 19 for text in numbers):
@@ -318,7 +326,7 @@ def _with_header(file: str, stream: BinaryIO) -> Container:
     if "XML" not in blocks:
         raise FormatError(file, "byte 0: the header names no XML block")
     start, length = blocks["XML"]
-    if length > _MOST_XML:
+    if length > _MAX_XML_BYTES:
         raise FormatError(file, f"byte {start}: XML of {length} bytes is no description of a collection")
     return _of_xml(file, _read(stream, file, start, length), start, blocks)
 
@@ -331,20 +339,20 @@ def _nitf(file: str, stream: BinaryIO) -> Container:
     size = os.fstat(stream.fileno()).st_size
     stream.seek(0)
     try:
-        read = jbpy.Jbp().load(stream)
+        nitf = jbpy.Jbp().load(stream)
         segments = [
-            (one["DESDATA"].get_offset(), one["DESDATA"].size)
-            for one in read["DataExtensionSegments"]
-            if one["subheader"]["DESID"].value.strip() == "XML_DATA_CONTENT"
+            (segment["DESDATA"].get_offset(), segment["DESDATA"].size)
+            for segment in nitf["DataExtensionSegments"]
+            if segment["subheader"]["DESID"].value.strip() == "XML_DATA_CONTENT"
         ]
-        whole = read["FileHeader"]["FL"].value
-    except Exception as error:  # whatever a parser of a broken file comes to
-        said = f"{type(error).__name__}: {shown(str(error))}"
-        raise FormatError(file, f"byte {stream.tell()}: is cut off, or no NITF ({said})") from None
-    if whole > size:
-        raise FormatError(file, f"byte {size}: is cut off here, its header says {whole} bytes")
+        stated_size = nitf["FileHeader"]["FL"].value
+    except Exception as error:  # a parser of a broken file may raise any error
+        reason = f"{type(error).__name__}: {shown(str(error))}"
+        raise FormatError(file, f"byte {stream.tell()}: is cut off, or no NITF ({reason})") from None
+    if stated_size > size:
+        raise FormatError(file, f"byte {size}: is cut off here, its header says {stated_size} bytes")
     for start, length in segments:
-        if start + length > size or length > _MOST_XML:
+        if start + length > size or length > _MAX_XML_BYTES:
             raise FormatError(file, f"byte {start}: its XML of {length} bytes goes beyond the file, or is none")
         data = _read(stream, file, start, length)
         if b"SICD" in data[:4096]:

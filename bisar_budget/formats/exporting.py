@@ -1,9 +1,9 @@
-"""A simulated phase history as CPHD 1.1.0 (NGA.STND.0068-1): true ranges in the signal, measured places beside it.
+"""A simulated phase history as CPHD 1.1.0 (NGA.STND.0068-1): true ranges in the signal, measured positions with it.
 
 The domain is frequency, and SGN is −1: a point whose echo comes ΔTOA after that of the reference point gives
-exp(−j2π fx ΔTOA), the standard's signal model. The reference point (SRP) is the scene centre. Declared errors are in
-the difference between the signal and the places, as in data that a sensor records: who forms an image by the places
-finds it displaced and defocused.
+exp(−j2π fx ΔTOA), the standard's signal model. The reference point (SRP) is the scene centre. Declared errors are the
+difference between the signal and the positions, as in recorded data: an image formed with the positions is displaced
+and defocused.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ from bisar_budget import __version__
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable
-from bisar_budget.formats.collected import ADDED, KINDS, correlated
+from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
 from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
@@ -35,19 +35,19 @@ from bisar_budget.simulator.realisations import has_unset_clocks
 from bisar_budget.simulator.targets import Targets
 
 NAMESPACE = "http://api.nsgreg.nga.mil/schema/cphd/1.1.0"
-NOWHERE = Geodetic(0.0, 0.0, 0.0)  # of a scene whose mission does not say where it is
+DEFAULT_SCENE = Geodetic(0.0, 0.0, 0.0)  # of a scene without coordinates in its mission
 UNDATED = "2000-01-01T12:00:00Z"
-_MARGIN_CELLS = 24  # of the image area beyond the targets, each way
-_FINE = 2049  # slow times at which the extent of the signal is foreseen
-_OVERSAMPLED = 1.5  # frequencies over what the saved swath takes; cphdcheck asks for 1.2
-_LEAST_SAMPLES = 64
-_BYTES_PER_SAMPLE = 16 * 5 + 8 * 3  # of the phase history as it is formed, and as it is written
-_MOST_SCATTERERS = 1 << 20
-_CLUTTER_STREAM = 2  # of the file's seed
+_AREA_MARGIN_CELLS = 24  # of the image area beyond the targets, on each side
+_EXTENT_SAMPLES = 2049  # slow times at which the extent of the signal is computed
+_SWATH_OVERSAMPLING_FACTOR = 1.5  # frequencies over the frequencies for the saved swath; cphdcheck requires 1.2
+_MIN_EXPORT_SAMPLES = 64
+_BYTES_PER_EXPORTED_SAMPLE = 16 * 5 + 8 * 3  # of the phase history as it is formed, and as it is written
+_MAX_SCATTERERS_COUNT = 1 << 20
+_EXPORT_CLUTTER_STREAM_INDEX = 2  # beside the file's seed
 _CHANNEL = "1"
 
-# Words of 8 bytes of a vector, the standard's per vector parameters
-_VECTOR = (
+# Per vector parameters of the standard, each with its number of words of 8 bytes.
+_VECTOR_WORDS = (
     ("TxTime", 1), ("TxPos", 3), ("TxVel", 3), ("RcvTime", 1), ("RcvPos", 3), ("RcvVel", 3), ("SRPPos", 3),
     ("aFDOP", 1), ("aFRR1", 1), ("aFRR2", 1), ("FX1", 1), ("FX2", 1), ("TOA1", 1), ("TOA2", 1), ("TDTropoSRP", 1),
     ("SC0", 1), ("SCSS", 1), ("SIGNAL", 1),
@@ -56,9 +56,9 @@ _VECTOR = (
 
 @dataclass(frozen=True)
 class Exported:
-    """A CPHD file, byte for byte, and what a person wants to know of it.
+    """Content of a CPHD file, and the numbers that describe it.
 
-    `half` is half the side of its image area [m]; `remarks` say what the mission leaves open.
+    `half` is half the side of its image area [m]; `remarks` name details that the mission does not state.
     """
 
     data: bytes
@@ -71,7 +71,7 @@ class Exported:
 
 @dataclass(frozen=True)
 class _Plan:
-    """How much is recorded: pulses, frequencies, swath of delay to each side [s], half the side of the area [m].
+    """Size of the record: pulses, samples (frequencies), delay swath to each side [s], half side of the area [m].
 
     `cell` is the resolution in range and across. [m]
     """
@@ -84,15 +84,15 @@ class _Plan:
 
 
 def export_phase_history(mission: Mission, targets: Targets) -> Exported:
-    """Record targets with the declared errors of a mission, and write what was recorded as CPHD.
+    """Record targets with the declared errors of a mission, and return the phase history as CPHD.
 
     Clutter is one random scatterer for each resolution cell of the image area.
 
     Raises
     ------
     SimulationError
-        Too few pulses for the scene, or more than `simulation.memory_limit` holds. Nothing is formed before that is
-        known.
+        Too few pulses for the scene, or more memory than `simulation.memory_limit`. Both are checked before data are
+        formed.
     MissingExtraError
         The extra `formats` is not installed.
     """
@@ -100,7 +100,7 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     settings = mission.simulation or Simulation()
     collection, errors = PointCollection(mission, mission.geometry), declared_errors(mission)
     plan = _plan(mission, targets, collection, errors)
-    needed = plan.pulses * plan.samples * _BYTES_PER_SAMPLE
+    needed = plan.pulses * plan.samples * _BYTES_PER_EXPORTED_SAMPLE
     if needed > settings.memory_limit:
         raise SimulationError(
             f"a phase history of {plan.pulses} pulses and {plan.samples} frequencies needs about {needed / 1e6:.4g} "
@@ -118,20 +118,20 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     remarks = []
     axes = mission.scene.axes
     if axes is None:
-        axes = axes_at(NOWHERE)
+        axes = axes_at(DEFAULT_SCENE)
         remarks.append("the mission does not say where its scene is (scene.latitude): it is put at 0 deg N, 0 deg E")
-    middle = mission.collection.center_time
-    if middle is None:
+    center_time = mission.collection.center_time
+    if center_time is None:
         remarks.append(f"the mission has no collection.center_time: the collection is put at {UNDATED}")
-        middle = parse_instant(UNDATED)
-        assert middle is not None
+        center_time = parse_instant(UNDATED)
+        assert center_time is not None
     if has_instruments(mission) and has_unset_clocks(mission):
         remarks.append(
             "the mission does not say how its oscillators are set (timing_error.constant and linear, or "
             "synchronization): they are flown without mean and slope"
         )
     vectors, offset = _vectors(mission, slow_time, flown, collection.flight(errors.smooth(), slow_time), axes, plan)
-    tree = _document(mission, targets, plan, axes, vectors, middle.after(-offset), offset, remarks)
+    tree = _document(mission, targets, plan, axes, vectors, center_time.after(-offset), offset, remarks)
     data = _file(tree, vectors, history.samples.astype(np.complex64))
     return Exported(data, plan.pulses, plan.samples, plan.half, len(amplitudes), tuple(remarks))
 
@@ -143,46 +143,46 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
         effect = collection.effect(errors.still())
     except ValueError as fault:
         raise SimulationError(f"the declared errors leave no image of a point: {fault}") from None
-    moved = max(abs(part) for part in effect.displacement)
-    reach = max(max(abs(one.east), abs(one.north)) for one in targets.points)
+    shift = max(abs(component) for component in effect.displacement)
+    reach = max(max(abs(target.east), abs(target.north)) for target in targets.points)
     cell = Case(Analysis(mission)).resolution[:2]
-    half = float(math.ceil(reach + moved + _MARGIN_CELLS * max(cell)))
-    fine: Floats = np.linspace(-T / 2, T / 2, _FINE)
-    flown = collection.flight(errors.smooth(), fine)
+    half = float(math.ceil(reach + shift + _AREA_MARGIN_CELLS * max(cell)))
+    times: Floats = np.linspace(-T / 2, T / 2, _EXTENT_SAMPLES)
+    flown = collection.flight(errors.smooth(), times)
     measured = sum(np.linalg.norm(path.measured, axis=1) for path in flown.paths)
     actual = sum(np.linalg.norm(path.actual, axis=1) for path in flown.paths)
     error = actual - measured + SPEED_OF_LIGHT * flown.seen
     delays, turns = [], []
     for corner in ((half, half), (half, -half), (-half, half), (-half, -half)):
-        away = sum(np.linalg.norm(path.measured - (*corner, 0.0), axis=1) for path in flown.paths) - measured
-        delays.append(float(np.abs(away).max()))
-        turns.append(float(np.abs(np.gradient(away, fine)).max()))
+        excess_range = sum(np.linalg.norm(path.measured - (*corner, 0.0), axis=1) for path in flown.paths) - measured
+        delays.append(float(np.abs(excess_range).max()))
+        turns.append(float(np.abs(np.gradient(excess_range, times)).max()))
     delay = (max(delays) + float(np.abs(error).max())) / SPEED_OF_LIGHT
-    turn = (max(turns) + float(np.abs(np.gradient(error, fine)).max())) / radar.wavelength
+    turn = (max(turns) + float(np.abs(np.gradient(error, times)).max())) / radar.wavelength
     pulses = pulses_for(mission, math.ceil(2 * turn * T))
     if mission.collection.pulses is None:
         pulses += 1  # so that one is at the middle
-    samples = max(_LEAST_SAMPLES, math.ceil(2 * _OVERSAMPLED * delay * radar.bandwidth)) + 1
+    samples = max(_MIN_EXPORT_SAMPLES, math.ceil(2 * _SWATH_OVERSAMPLING_FACTOR * delay * radar.bandwidth)) + 1
     return _Plan(pulses, samples, delay, half, cell)
 
 
 def _scene(mission: Mission, targets: Targets, plan: _Plan) -> tuple[Floats, NDArray[np.complex128]]:
-    """Places (n, 3) [m] and amplitudes (n,) of targets and clutter."""
-    places = [(one.east, one.north, 0.0) for one in targets.points]
-    amplitudes = [10 ** (one.level_db / 20) for one in targets.points]
+    """Positions (n, 3) [m] and amplitudes (n,) of targets and clutter."""
+    positions = [(target.east, target.north, 0.0) for target in targets.points]
+    amplitudes = [10 ** (target.level_db / 20) for target in targets.points]
     if targets.clutter_db is None:
-        return np.array(places), np.array(amplitudes, dtype=complex)
+        return np.array(positions), np.array(amplitudes, dtype=complex)
     half = plan.half
     count = math.ceil((2 * half) ** 2 / math.prod(plan.cell))
-    if count > _MOST_SCATTERERS:
+    if count > _MAX_SCATTERERS_COUNT:
         raise SimulationError(
-            f"clutter of {count} scatterers, at most {_MOST_SCATTERERS} are simulated: put the targets nearer to "
-            "each other"
+            f"clutter of {count} scatterers, at most {_MAX_SCATTERERS_COUNT} are simulated: put the targets nearer "
+            "to each other"
         )
-    rng = np.random.default_rng([(mission.simulation or Simulation()).seed, _CLUTTER_STREAM])
+    rng = np.random.default_rng([(mission.simulation or Simulation()).seed, _EXPORT_CLUTTER_STREAM_INDEX])
     ground = np.pad(rng.uniform(-half, half, (count, 2)), ((0, 0), (0, 1)))
     random = (rng.normal(size=count) + 1j * rng.normal(size=count)) * 10 ** (targets.clutter_db / 20) / math.sqrt(2)
-    return np.concatenate((places, ground)), np.concatenate((amplitudes, random))
+    return np.concatenate((positions, ground)), np.concatenate((amplitudes, random))
 
 
 def _vectors(
@@ -190,12 +190,12 @@ def _vectors(
 ) -> tuple[NDArray[Any], float]:
     """Parameters of each vector, and the time of the file at the middle of the aperture. [s]
 
-    A pulse is at the scene centre at its slow time. It left the transmitter R_t/c before, and is received R_r/c
-    later, by the measured places; so the reference time of section 6.5.1 (5) is that slow time again. A platform's
-    own time therefore runs by 1 ∓ Ṙ/c of slow time, which is what its velocity is divided by.
+    A pulse is at the scene centre at its slow time. It left the transmitter R_t/c earlier and is received R_r/c
+    later, by the measured positions; so the reference time of section 6.5.1 (5) is that slow time. A platform's own
+    time runs by 1 ∓ Ṙ/c of slow time, so its velocity is divided by this factor.
     """
     dtype = np.dtype(
-        [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR]
+        [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR_WORDS]
     )
     vectors: NDArray[Any] = np.zeros(slow_time.size, dtype)
     ranges = []
@@ -205,24 +205,24 @@ def _vectors(
         ("Rcv", flown.receiver, smooth.receiver, mission.geometry.receiver, 1.0),
     )
     turn: Floats = np.array(axes.axes)
-    for side, path, slow, state, sign in sides:
-        place = path.measured
+    for side, path, smooth_path, state, sign in sides:
+        position = path.measured
         velocity = np.stack(np.broadcast_arrays(*state.at(slow_time)[1]), axis=1)
-        velocity = velocity + np.gradient(slow.measured - slow.actual, slow_time, axis=0, edge_order=2)
-        length = np.linalg.norm(place, axis=1)
-        closing = np.sum(place * velocity, axis=1) / length
-        own = velocity / (1 + sign * closing / SPEED_OF_LIGHT)[:, None]
-        vectors[f"{side}Pos"] = place @ turn + np.array(axes.origin)
-        vectors[f"{side}Vel"] = own @ turn
+        velocity = velocity + np.gradient(smooth_path.measured - smooth_path.actual, slow_time, axis=0, edge_order=2)
+        length = np.linalg.norm(position, axis=1)
+        closing = np.sum(position * velocity, axis=1) / length
+        own_velocity = velocity / (1 + sign * closing / SPEED_OF_LIGHT)[:, None]
+        vectors[f"{side}Pos"] = position @ turn + np.array(axes.origin)
+        vectors[f"{side}Vel"] = own_velocity @ turn
         vectors[f"{side}Time"] = slow_time + sign * length / SPEED_OF_LIGHT
         ranges.append(length)
-        doppler += np.sum(place * own, axis=1) / length
-    # Whole milliseconds, so that the start of the collection is one that a file states exactly.
+        doppler += np.sum(position * own_velocity, axis=1) / length
+    # Whole milliseconds, so that a file states the start of the collection exactly.
     offset = math.ceil((mission.collection.aperture_time / 2 + float(ranges[0].max()) / SPEED_OF_LIGHT) * 1e3) / 1e3
     vectors["TxTime"] += offset
     vectors["RcvTime"] += offset
     vectors["SRPPos"] = axes.origin
-    vectors["aFDOP"] = -doppler / SPEED_OF_LIGHT  # −2/c of the mean range rate of both legs
+    vectors["aFDOP"] = -doppler / SPEED_OF_LIGHT  # −2/c times the mean range rate of both legs
     radar = mission.radar
     vectors["FX1"] = vectors["SC0"] = radar.center_frequency - radar.bandwidth / 2
     vectors["FX2"] = radar.center_frequency + radar.bandwidth / 2
@@ -246,7 +246,7 @@ def _document(
     offset: float,
     remarks: list[str],
 ) -> Any:
-    """XML of the file, an lxml tree, with the reference geometry that sarkit computes from the vectors."""
+    """XML of the file as an lxml tree, with the reference geometry that sarkit computes from the vectors."""
     etree: Any = import_module("lxml.etree")
     skcphd: Any = import_module("sarkit.cphd")
     low, high = float(vectors["FX1"][0]), float(vectors["FX2"][0])
@@ -307,25 +307,25 @@ def _document(
     root = etree.Element(f"{{{NAMESPACE}}}CPHD", nsmap={None: NAMESPACE})
     _grow(etree, root, leaves)
     tree = root.getroottree()
-    with np.errstate(all="ignore"):  # a fixed platform has no direction of motion, which the standard has rules for
+    with np.errstate(all="ignore"):  # the standard has rules for a fixed platform, without a direction of motion
         geometry = skcphd.compute_reference_geometry(tree, vectors)
     root.find("{*}Dwell").addnext(geometry)
     return tree
 
 
 def _grow(etree: Any, root: Any, leaves: _Leaves) -> None:
-    """Put elements below the root; a step of a path may have an attribute, a polynomial is its constant."""
-    grown = {"": root}
+    """Add elements below the root. A step of a path may have an attribute; a polynomial has only its constant."""
+    elements = {"": root}
     for path, value in leaves.items():
-        here = ""
+        element_path = ""
         for step in path.split("/"):
-            above, here = here, f"{here}/{step}"
-            if here not in grown:
+            parent, element_path = element_path, f"{element_path}/{step}"
+            if element_path not in elements:
                 tag, _, attribute = step.partition("@")
-                grown[here] = etree.SubElement(grown[above], f"{{{NAMESPACE}}}{tag}")
+                elements[element_path] = etree.SubElement(elements[parent], f"{{{NAMESPACE}}}{tag}")
                 if attribute:
-                    grown[here].set(*attribute.split("=", 1))
-        node = grown[here]
+                    elements[element_path].set(*attribute.split("=", 1))
+        node = elements[element_path]
         if path.endswith("Poly"):
             node.set("order1", "0")
             node.set("order2", "0")
@@ -335,25 +335,25 @@ def _grow(etree: Any, root: Any, leaves: _Leaves) -> None:
 
 
 def _xyz(path: str, vector: Vector) -> _Leaves:
-    return {f"{path}/{axis}": float(part) for axis, part in zip("XYZ", vector, strict=True)}
+    return {f"{path}/{axis}": float(component) for axis, component in zip("XYZ", vector, strict=True)}
 
 
-def _degrees(path: str, place: Geodetic) -> _Leaves:
-    return {f"{path}/Lat": math.degrees(place.latitude), f"{path}/Lon": math.degrees(place.longitude)}
+def _degrees(path: str, point: Geodetic) -> _Leaves:
+    return {f"{path}/Lat": math.degrees(point.latitude), f"{path}/Lon": math.degrees(point.longitude)}
 
 
 def _scene_coordinates(plan: _Plan, axes: SceneAxes) -> _Leaves:
     """Plane of the scene: x east, y north; its corners clockwise as seen from above."""
     half = plan.half
     corners = [(-half, -half), (-half, half), (half, half), (half, -half)]
-    place = geodetic(axes.origin)
+    reference_point = geodetic(axes.origin)
     pixels = math.ceil(2 * half / (min(plan.cell) / 2))
     step = 2 * half / pixels
     leaves: _Leaves = {
         "EarthModel": "WGS_84",
         **_xyz("IARP/ECF", axes.origin),
-        **_degrees("IARP/LLH", place),
-        "IARP/LLH/HAE": place.height,
+        **_degrees("IARP/LLH", reference_point),
+        "IARP/LLH/HAE": reference_point.height,
         **_xyz("ReferenceSurface/Planar/uIAX", axes.axes[0]),
         **_xyz("ReferenceSurface/Planar/uIAY", axes.axes[1]),
         **{f"ImageArea/X1Y1/{axis}": -half for axis in "XY"},
@@ -372,10 +372,10 @@ def _scene_coordinates(plan: _Plan, axes: SceneAxes) -> _Leaves:
 def _layout(vectors: NDArray[Any]) -> _Leaves:
     fields: Any = vectors.dtype.fields
     leaves: _Leaves = {}
-    for name, size in _VECTOR:
+    for name, size in _VECTOR_WORDS:
         form = "X=F8;Y=F8;Z=F8;" if size == 3 else "I8" if name == "SIGNAL" else "F8"
-        said = {"Offset": int(fields[name][1]) // 8, "Size": size, "Format": form}
-        leaves |= {f"PVP/{name}/{key}": value for key, value in said.items()}
+        attributes = {"Offset": int(fields[name][1]) // 8, "Size": size, "Format": form}
+        leaves |= {f"PVP/{name}/{key}": value for key, value in attributes.items()}
     return leaves
 
 
@@ -386,7 +386,9 @@ def _product(mission: Mission, targets: Targets, remarks: list[str]) -> _Leaves:
         "mission SHA-256": hashlib.sha256(mission.data).hexdigest(),
         "signal": "exact ranges of the paths as flown",
         "vectors": "places as measured: as flown, plus the declared errors",
-        "points": "; ".join(f"{one.east:.9g}, {one.north:.9g}, {one.level_db:.6g}" for one in targets.points),
+        "points": "; ".join(
+            f"{target.east:.9g}, {target.north:.9g}, {target.level_db:.6g}" for target in targets.points
+        ),
         "points are": "east [m], north [m], level [dB]",
     }
     if targets.clutter_db is not None:
@@ -400,86 +402,87 @@ def _product(mission: Mission, targets: Targets, remarks: list[str]) -> _Leaves:
 def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
     """`ErrorParameters` of both platforms: one sigma as declared, without the coverage factor.
 
-    Errors that both platforms share are in the sigmas of each. What has no place there stands in `AddedParameters`.
+    The sigmas of each platform include errors that both share. Errors without an element are in `AddedParameters`.
     """
     added: dict[str, str] = {}
     leaves: _Leaves = {}
     timing = mission.timing_error  # of the receiver's clock, counted against the transmitter's
     clock = {"DelayBias": timing.constant, "ClockFreqSF": timing.linear}
-    stated = {key: abs(value) for key, value in clock.items() if value is not None}
-    for whose, side in (("transmitter", "TxPlatform"), ("receiver", "RcvPlatform")):
-        leaves |= _pos_vel_err(f"{side}/PosVelErr", *_covariance(mission, whose, axes, added))
-        sensor = {**(stated if whose == "receiver" else {}), "CollectionStartTime": 0.0}  # the schema asks for it
+    clock_sigmas = {key: abs(value) for key, value in clock.items() if value is not None}
+    for owner, side in (("transmitter", "TxPlatform"), ("receiver", "RcvPlatform")):
+        leaves |= _pos_vel_err(f"{side}/PosVelErr", *_covariance(mission, owner, axes, added))
+        # The schema requires CollectionStartTime.
+        sensor = {**(clock_sigmas if owner == "receiver" else {}), "CollectionStartTime": 0.0}
         leaves |= {f"{side}/RadarSensor/{key}": value for key, value in sensor.items()}
-    nothing = all(
-        added.get(f"{whose}.{kind}") for whose in ("transmitter", "receiver") for kind in ("position", "velocity")
+    has_no_sigmas = all(
+        added.get(f"{owner}.{kind}") for owner in ("transmitter", "receiver") for kind in ("position", "velocity")
     )
-    if nothing and not stated and len(added) == 4:
+    if has_no_sigmas and not clock_sigmas and len(added) == 4:
         return {}
     leaves |= {f"AddedParameters/Parameter@name={ADDED} {key}": value for key, value in added.items()}
     return {f"ErrorParameters/Bistatic/{path}": value for path, value in leaves.items()}
 
 
-def _covariance(mission: Mission, whose: str, axes: SceneAxes, added: dict[str, str]) -> tuple[Floats, str]:
-    """Covariance (6, 6) of one platform in a frame of the standard, and that frame. [m², m²/s, m²/s²]"""
-    error = getattr(mission.platforms, whose).motion_error
-    state: PlatformState = getattr(mission.geometry, whose)
+def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, str]) -> tuple[Floats, str]:
+    """Covariance (6, 6) of one platform in a frame of the standard, and the name of the frame. [m², m²/s, m²/s²]"""
+    error = getattr(mission.platforms, owner).motion_error
+    state: PlatformState = getattr(mission.geometry, owner)
     common = mission.common_motion_error
     is_radial = error.frame == "ric" and common is None
     source: Axes = state.frame(error.frame)
-    found = np.zeros((6, 6))
+    covariance = np.zeros((6, 6))
     if error.covariance is not None:
         sigmas = np.array(error.covariance.sigmas)
-        found = np.outer(sigmas, sigmas) * np.array(error.covariance.correlation)
+        covariance = np.outer(sigmas, sigmas) * np.array(error.covariance.correlation)
     for index, kind in enumerate(("position", "velocity")):
         block = slice(3 * index, 3 * index + 3)
-        own = getattr(error, kind)
-        if own is not None:
-            found[block, block] = np.diag(np.square(own))
+        sigmas_of_kind = getattr(error, kind)
+        if sigmas_of_kind is not None:
+            covariance[block, block] = np.diag(np.square(sigmas_of_kind))
         elif error.covariance is None and (common is None or getattr(common, kind) is None):
-            added[f"{whose}.{kind}"] = "not declared"
+            added[f"{owner}.{kind}"] = "not declared"
     if error.acceleration is not None:
         turn = np.eye(3) if is_radial or error.frame == "scene" else np.array(source).T
-        added[f"{whose}.acceleration"] = " ".join(f"{x:.12g}" for x in turn @ error.acceleration) + " m/s^2"
+        added[f"{owner}.acceleration"] = " ".join(f"{x:.12g}" for x in turn @ error.acceleration) + " m/s^2"
     if error.time_tag is not None:
-        added[f"{whose}.time_tag"] = f"{error.time_tag:.12g} s"
+        added[f"{owner}.time_tag"] = f"{error.time_tag:.12g} s"
     if error.lever_arm is not None and error.lever_arm.uncertainty is not None:
         sizes = " ".join(f"{x:.12g}" for x in error.lever_arm.uncertainty)
-        added[f"{whose}.lever_arm.uncertainty"] = f"{sizes} m"
+        added[f"{owner}.lever_arm.uncertainty"] = f"{sizes} m"
     if common is not None and common.time_tag is not None:
         added["common.time_tag"] = f"{common.time_tag:.12g} s"
     if error.distribution != "normal":
-        added[f"{whose}.distribution"] = error.distribution
+        added[f"{owner}.distribution"] = error.distribution
     if is_radial:
-        return found, "RIC_ECI"
-    # Columns are the frame's axes in the scene's; the scene's axes in Earth-fixed ones are rows.
-    both = np.kron(np.eye(2), np.array(source).T)
-    found = both @ found @ both.T
+        return covariance, "RIC_ECI"
+    # Columns are the axes of the error's frame in the scene's axes. Rows are the scene's axes in Earth-fixed axes.
+    turn_of_both = np.kron(np.eye(2), np.array(source).T)
+    covariance = turn_of_both @ covariance @ turn_of_both.T
     if common is not None:
         turn = np.array(state.frame(common.frame)).T
         for index, kind in enumerate(("position", "velocity")):
             if getattr(common, kind) is not None:
                 block = slice(3 * index, 3 * index + 3)
-                found[block, block] += turn @ np.diag(np.square(getattr(common, kind))) @ turn.T
-        added[f"{whose}.common"] = "the sigmas hold an error that both platforms share"
-    both = np.kron(np.eye(2), np.array(axes.axes).T)
-    return both @ found @ both.T, "ECF"
+                covariance[block, block] += turn @ np.diag(np.square(getattr(common, kind))) @ turn.T
+        added[f"{owner}.common"] = "the sigmas hold an error that both platforms share"
+    turn_of_both = np.kron(np.eye(2), np.array(axes.axes).T)
+    return turn_of_both @ covariance @ turn_of_both.T, "ECF"
 
 
 def _pos_vel_err(path: str, covariance: Floats, frame: str) -> _Leaves:
     sigmas, correlation = correlated(covariance)
     leaves: _Leaves = {f"{path}/Frame": frame}
-    leaves |= {f"{path}/{kind}": float(sigma) for kind, sigma in zip(KINDS, sigmas, strict=True)}
+    leaves |= {f"{path}/{kind}": float(sigma) for kind, sigma in zip(SIGMA_NAMES, sigmas, strict=True)}
     for row in range(6):
         for column in range(row + 1, 6):
-            leaves[f"{path}/CorrCoefs/{KINDS[row]}{KINDS[column]}"] = float(correlation[row, column])
+            leaves[f"{path}/CorrCoefs/{SIGMA_NAMES[row]}{SIGMA_NAMES[column]}"] = float(correlation[row, column])
     return leaves
 
 
 def _file(tree: Any, vectors: NDArray[Any], signal: NDArray[Any]) -> bytes:
     """A CPHD file by sarkit's writer."""
     skcphd: Any = import_module("sarkit.cphd")
-    with tempfile.TemporaryFile() as stream:  # the writer needs a file of the system
+    with tempfile.TemporaryFile() as stream:  # the writer needs a real file
         with skcphd.Writer(stream, skcphd.Metadata(xmltree=tree)) as writer:
             writer.write_pvp(_CHANNEL, vectors)
             writer.write_signal(_CHANNEL, signal)

@@ -1,4 +1,4 @@
-"""A collection out of a file: CPHD and CRSD by the parameters of their pulses, SICD by its polynomials."""
+"""Import the collection of a file: CPHD and CRSD by the parameters of their pulses, SICD by its polynomials."""
 
 import hashlib
 import math
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable, shown
 from bisar_budget.formats.collected import (
-    LONGEST,
+    MAX_APERTURE_S,
     FileErrors,
     Imported,
     NoPathError,
@@ -31,26 +31,26 @@ from bisar_budget.paths.earth import Floats, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.flight import Fitted
 from bisar_budget.paths.instant import parse_instant
 
-_SAMPLES = 201  # moments at which a polynomial of the file is taken; enough for one of any order there
-_SETTLING = 5  # rounds of a light time; each leaves v/c of what the one before left
-_FARTHEST_M = 4.1e8  # from the Earth's centre: what is farther is no place
-_COVERED = 0.02  # of the aperture, that pulses may lack at its ends
+_POLYNOMIAL_SAMPLES = 201  # times at which a polynomial of the file is sampled; enough for the orders in files
+_LIGHT_TIME_STEPS = 5  # each round reduces the error by v/c
+_MAX_RADIUS_M = 4.1e8  # from the Earth's centre; a position farther away is invalid
+_MAX_GAP_FRACTION = 0.02  # of the aperture that may be without pulses at its ends
 
 
 @dataclass(frozen=True, eq=False)
 class _Pulses:
-    """Vectors of a channel: times of transmission and of reception [s], places then, Earth-fixed [m]."""
+    """Vectors of a channel: times of transmission and reception [s], and Earth-fixed positions at these times [m]."""
 
     sent: Floats
     transmitter: Floats
     received: Floats
     receiver: Floats
     reference: int  # index of the reference vector among them
-    unused: int = 0  # further vectors, which lack a pulse, a time or a place
+    unused: int = 0  # number of other vectors, which lack a pulse, a time or a position
 
     @property
     def unused_words(self) -> str:
-        """Words on vectors that are not used, empty where there are none."""
+        """Remark on vectors that are not used; empty if all are used."""
         if not self.unused:
             return ""
         count = self.sent.size + self.unused
@@ -58,22 +58,28 @@ class _Pulses:
 
 
 class _Aperture(NamedTuple):
-    """Middle and length of the dwell on the scene point, counted from the file's start. [s]"""
+    """Middle of the dwell on the scene point, from the file's start, and length of the dwell. [s]"""
 
     middle: float
     length: float
 
 
 def import_collection(file: str, channel: str | None = None) -> Imported:
-    """Read the collection of a CPHD, CRSD or SICD file, or of XML of one; its signal is not read.
+    """Read the collection of a CPHD, CRSD or SICD file, or of the XML of such a file. The signal is not read.
 
-    `channel` is the identifier of a channel of CPHD or CRSD, the reference channel if none. A `FormatError` says that
-    the file cannot be used, a `MissingExtraError` that the extra `formats` is not installed.
+    `channel` is the identifier of a channel of CPHD or CRSD; None is the reference channel.
+
+    Raises
+    ------
+    FormatError
+        The file cannot be used.
+    MissingExtraError
+        The extra `formats` is not installed.
     """
     check_extra()
     container = open_container(file)
-    read: Callable[[Container, str | None], Imported] = _READERS[container.format.split()[0]]
-    with np.errstate(all="ignore"):  # what is no number in the end is refused
+    read: Callable[[Container, str | None], Imported] = _FORMAT_READERS[container.format.split()[0]]
+    with np.errstate(all="ignore"):  # results that are not finite are refused later
         return read(container, channel)
 
 
@@ -119,7 +125,7 @@ def _cphd(container: Container, channel: str | None) -> Imported:
 
 
 def _dtype(xml: Element, block: str) -> np.dtype[Any]:
-    """Form of the parameters of a vector, or of a pulse that was sent, as the XML describes it."""
+    """NumPy type of the parameters of a vector, or of a transmitted pulse, as the XML describes them."""
     module: Any = import_module("sarkit.cphd" if xml.tag == "CPHD" else "sarkit.crsd")
     reads = module.get_ppp_dtype if block == "PPP" else module.get_pvp_dtype
     try:
@@ -130,7 +136,7 @@ def _dtype(xml: Element, block: str) -> np.dtype[Any]:
 
 
 def _fields(xml: Element, vectors: NDArray[Any], block: str, *names: str) -> list[Floats]:
-    found = []
+    columns = []
     for name in names:
         if name not in (vectors.dtype.names or ()):
             raise xml.fault("is missing", f"{block}/{name}")
@@ -139,8 +145,8 @@ def _fields(xml: Element, vectors: NDArray[Any], block: str, *names: str) -> lis
             values = values["Int"] + values["Frac"]
         if values.dtype.kind not in "iuf" or values.shape[1:] != ((3,) if name.endswith(("Pos", "Vel")) else ()):
             raise xml.fault("has another form than the standard's", f"{block}/{name}")
-        found.append(np.asarray(values, dtype=float))
-    return found
+        columns.append(np.asarray(values, dtype=float))
+    return columns
 
 
 def _pulses_of_cphd(container: Container, vectors: NDArray[Any], parameters: Element) -> tuple[_Pulses, Vector]:
@@ -150,12 +156,12 @@ def _pulses_of_cphd(container: Container, vectors: NDArray[Any], parameters: Ele
     if reference >= len(vectors):
         raise parameters.fault(f"is beyond the {len(vectors)} vectors", "RefVectorIndex")
     usable = np.isfinite(sent) & np.isfinite(received)
-    for places in (transmitter, receiver, points):
-        usable &= (np.abs(places) < _FARTHEST_M).all(axis=1)
+    for positions in (transmitter, receiver, points):
+        usable &= (np.abs(positions) < _MAX_RADIUS_M).all(axis=1)
     if not usable[reference]:
         raise parameters.fault("is a vector without times or places", "RefVectorIndex")
     x, y, z = (float(value) for value in points[reference])
-    kept = _Pulses(
+    pulses = _Pulses(
         sent[usable],
         transmitter[usable],
         received[usable],
@@ -163,47 +169,49 @@ def _pulses_of_cphd(container: Container, vectors: NDArray[Any], parameters: Ele
         int(usable[:reference].sum()),
         int((~usable).sum()),
     )
-    return kept, (x, y, z)
+    return pulses, (x, y, z)
 
 
 def _scene_time(pulses: _Pulses, axes: SceneAxes) -> Floats:
-    """When each pulse is at the scene point: reference time of CPHD 1.1.0, section 6.5.1 (5). [s]"""
-    out = np.linalg.norm(pulses.transmitter - axes.origin, axis=1)
-    back = np.linalg.norm(pulses.receiver - axes.origin, axis=1)
-    scene_time: Floats = pulses.sent + out / (out + back) * (pulses.received - pulses.sent)
+    """Times at which pulses are at the scene point: reference time of CPHD 1.1.0, section 6.5.1 (5). [s]"""
+    transmit_range = np.linalg.norm(pulses.transmitter - axes.origin, axis=1)
+    receive_range = np.linalg.norm(pulses.receiver - axes.origin, axis=1)
+    scene_time: Floats = pulses.sent + transmit_range / (transmit_range + receive_range) * (
+        pulses.received - pulses.sent
+    )
     return scene_time
 
 
-def _dwell(xml: Element, dwell: Element | None, used: Element, point: Vector) -> _Aperture:
+def _dwell(xml: Element, dwell: Element | None, identifiers: Element, point: Vector) -> _Aperture:
     """Centre of dwell and dwell time at the scene point, section 6.5.1 (6) of CPHD 1.1.0."""
     if dwell is None:
         raise xml.fault("is missing: nothing says how long the scene point is seen", "Dwell")
-    found = []
+    times = []
     x, y = _image_coordinates(xml.one("SceneCoordinates"), point)
     for name, key in (("CODTime", "CODId"), ("DwellTime", "DwellId")):
-        polynomial = dwell.with_child(name, "Identifier", used.text(key))
+        polynomial = dwell.with_child(name, "Identifier", identifiers.text(key))
         if polynomial is None:
-            raise used.fault(f"names no {name} of {dwell.path}", key)
+            raise identifiers.fault(f"names no {name} of {dwell.path}", key)
         coefficients = polynomial.polynomial(f"{name}Poly", 2)
-        found.append(float(np.polynomial.polynomial.polyval2d(x, y, coefficients)))
-    if not found[1] > 0:
-        raise used.fault(f"gives a dwell time of {found[1]:g} s at the scene point")
-    return _Aperture(*found)
+        times.append(float(np.polynomial.polynomial.polyval2d(x, y, coefficients)))
+    if not times[1] > 0:
+        raise identifiers.fault(f"gives a dwell time of {times[1]:g} s at the scene point")
+    return _Aperture(*times)
 
 
 def _image_coordinates(scene: Element, point: Vector) -> tuple[float, float]:
     """IAX and IAY of a point: image area coordinates of CPHD, on a plane or on a surface of constant height. [m]"""
     planar = scene.maybe("ReferenceSurface/Planar")
     if planar is not None:
-        away = np.subtract(point, scene.vector("IARP/ECF"))
-        return float(away @ planar.vector("uIAX")), float(away @ planar.vector("uIAY"))
+        offset = np.subtract(point, scene.vector("IARP/ECF"))
+        return float(offset @ planar.vector("uIAX")), float(offset @ planar.vector("uIAY"))
     level = scene.one("ReferenceSurface/HAE")
-    place = geodetic(point)
+    geodetic_point = geodetic(point)
     origin = [math.radians(scene.number(f"IARP/LLH/{name}")) for name in ("Lat", "Lon")]
     axes = np.array([[level.number(f"{axis}/{name}") for name in ("Lat", "Lon")] for axis in ("uIAXLL", "uIAYLL")])
-    turned = math.remainder(place.longitude - origin[1], 2 * math.pi)
+    longitude_offset = math.remainder(geodetic_point.longitude - origin[1], 2 * math.pi)
     try:
-        x, y = np.linalg.solve(axes.T, [place.latitude - origin[0], turned])
+        x, y = np.linalg.solve(axes.T, [geodetic_point.latitude - origin[0], longitude_offset])
     except np.linalg.LinAlgError:
         raise level.fault("has axes along one line") from None
     return float(x), float(y)
@@ -211,10 +219,10 @@ def _image_coordinates(scene: Element, point: Vector) -> tuple[float, float]:
 
 def _off_reference_point(xml: Element, point: Vector) -> list[str]:
     origin = xml.maybe("SceneCoordinates/IARP/ECF")
-    away = 0.0 if origin is None else math.dist(origin.vector(), point)
-    if away < 1e-3:
+    distance = 0.0 if origin is None else math.dist(origin.vector(), point)
+    if distance < 1e-3:
         return []
-    return [f"The scene point is {away:.6g} m from the image area's reference point (IARP)."]
+    return [f"The scene point is {distance:.6g} m from the image area's reference point (IARP)."]
 
 
 def _stated(xml: Element, axes: SceneAxes, is_monostatic: bool) -> Seen:
@@ -225,7 +233,7 @@ def _stated(xml: Element, axes: SceneAxes, is_monostatic: bool) -> Seen:
     )
     tracks = []
     for path in paths:
-        position, velocity = (geometry.vector(f"{path}{what}") for what in ("Pos", "Vel"))
+        position, velocity = (geometry.vector(f"{path}{quantity}") for quantity in ("Pos", "Vel"))
         state = PlatformState(position=axes.place(position), velocity=axes.turned(velocity))
         tracks.append(Fitted(state, order=1, farthest=0.0, rms=0.0))
     return Seen(tracks[0], tracks[1], axes)
@@ -233,7 +241,7 @@ def _stated(xml: Element, axes: SceneAxes, is_monostatic: bool) -> Seen:
 
 # ---------------------------------------------------------------------- CRSD
 def _crsd(container: Container, channel: str | None) -> Imported:
-    """CRSD 1.0 of a SAR collection (NGA.STND.0080-2): pulses that were sent, and what each receive window heard."""
+    """CRSD 1.0 of a SAR collection (NGA.STND.0080-2): transmitted pulses and receive windows."""
     xml = container.xml
     if xml.tag != "CRSDsar":
         raise FormatError(container.file, f"/{xml.tag} is one way of a collection; accepted: CRSDsar, which has both")
@@ -247,15 +255,17 @@ def _crsd(container: Container, channel: str | None) -> Imported:
     aperture = _dwell(xml, xml.maybe("DwellPolynomials"), sar.one("DwellTimes/Polynomials"), point)
     if "PVP" not in container.blocks or "PPP" not in container.blocks:
         raise FormatError(container.file, "byte 0: has no parameters of pulses (PPP) and of receive windows (PVP)")
-    heard = xml.with_child("Data/Receive/Channel", "ChId", channel)
-    sent = xml.with_child("Data/Transmit/TxSequence", "TxId", sar.text("TxId"))
-    if heard is None or sent is None:
+    receive_channel = xml.with_child("Data/Receive/Channel", "ChId", channel)
+    transmit_sequence = xml.with_child("Data/Transmit/TxSequence", "TxId", sar.text("TxId"))
+    if receive_channel is None or transmit_sequence is None:
         raise xml.fault("lacks the channel or its transmit sequence", "Data")
     vectors = container.vectors(
-        "PVP", heard.whole("PVPArrayByteOffset"), heard.whole("NumVectors"), _dtype(xml, "PVP")
+        "PVP", receive_channel.whole("PVPArrayByteOffset"), receive_channel.whole("NumVectors"), _dtype(xml, "PVP")
     )
-    sends = container.vectors("PPP", sent.whole("PPPArrayByteOffset"), sent.whole("NumPulses"), _dtype(xml, "PPP"))
-    pulses = _pulses_of_crsd(container, vectors, sends, point, parameters)
+    transmit_vectors = container.vectors(
+        "PPP", transmit_sequence.whole("PPPArrayByteOffset"), transmit_sequence.whole("NumPulses"), _dtype(xml, "PPP")
+    )
+    pulses = _pulses_of_crsd(container, vectors, transmit_vectors, point, parameters)
     center, bandwidth = sequence.number("FxC"), sequence.number("FxBW")
     seen = _flown(container, pulses, point, aperture, center)
     errors = of_matrices(xml.maybe("ErrorParameters/SARImage"), seen, ("PosVelError", "TimeFreqCov"), (2, 3))
@@ -269,36 +279,38 @@ def _crsd(container: Container, channel: str | None) -> Imported:
 
 
 def _pulses_of_crsd(
-    container: Container, vectors: NDArray[Any], sends: NDArray[Any], point: Vector, parameters: Element
+    container: Container, vectors: NDArray[Any], transmit_vectors: NDArray[Any], point: Vector, parameters: Element
 ) -> _Pulses:
-    """Pulses with the time at which the echo of the scene point comes back.
+    """Pulses with the time at which the echo of the scene point is received.
 
-    The receiver's place is stated for the start of its window. Its velocity carries it to the echo, less than a
-    millisecond later.
+    The file states the receiver's position at the start of its window. The velocity extrapolates it to the echo, less
+    than a millisecond later.
     """
     xml = container.xml
-    begun, places, velocities, index = _fields(xml, vectors, "PVP", "RcvStart", "RcvPos", "RcvVel", "TxPulseIndex")
-    sent, transmitter = _fields(xml, sends, "PPP", "TxTime", "TxPos")
-    known = np.isfinite(index) & (index >= 0) & (index < len(sends)) & np.isfinite(begun)
-    known &= (np.abs(places) < _FARTHEST_M).all(axis=1) & np.isfinite(velocities).all(axis=1)
-    known[known] = (np.isfinite(sent) & np.isfinite(transmitter).all(axis=1))[index[known].astype(int)]
+    window_start, positions, velocities, index = _fields(
+        xml, vectors, "PVP", "RcvStart", "RcvPos", "RcvVel", "TxPulseIndex"
+    )
+    sent, transmitter = _fields(xml, transmit_vectors, "PPP", "TxTime", "TxPos")
+    usable = np.isfinite(index) & (index >= 0) & (index < len(transmit_vectors)) & np.isfinite(window_start)
+    usable &= (np.abs(positions) < _MAX_RADIUS_M).all(axis=1) & np.isfinite(velocities).all(axis=1)
+    usable[usable] = (np.isfinite(sent) & np.isfinite(transmitter).all(axis=1))[index[usable].astype(int)]
     reference = parameters.whole("RefVectorIndex")
-    if reference >= len(vectors) or not known[reference]:
+    if reference >= len(vectors) or not usable[reference]:
         raise parameters.fault("is no vector with a pulse", "RefVectorIndex")
-    which = index[known].astype(int)
-    sent, transmitter, begun = sent[which], transmitter[which], begun[known]
-    places, velocities = places[known], velocities[known]
-    out = np.linalg.norm(transmitter - point, axis=1)
-    received, receiver = begun, places
-    for _ in range(_SETTLING):
-        received = sent + (out + np.linalg.norm(receiver - point, axis=1)) / SPEED_OF_LIGHT
-        receiver = places + velocities * (received - begun)[:, None]
-    return _Pulses(sent, transmitter, received, receiver, int(known[:reference].sum()), int((~known).sum()))
+    pulse_index = index[usable].astype(int)
+    sent, transmitter, window_start = sent[pulse_index], transmitter[pulse_index], window_start[usable]
+    positions, velocities = positions[usable], velocities[usable]
+    transmit_range = np.linalg.norm(transmitter - point, axis=1)
+    received, receiver = window_start, positions
+    for _ in range(_LIGHT_TIME_STEPS):
+        received = sent + (transmit_range + np.linalg.norm(receiver - point, axis=1)) / SPEED_OF_LIGHT
+        receiver = positions + velocities * (received - window_start)[:, None]
+    return _Pulses(sent, transmitter, received, receiver, int(usable[:reference].sum()), int((~usable).sum()))
 
 
 # ---------------------------------------------------------------------- SICD
 def _sicd(container: Container, channel: str | None) -> Imported:
-    """SICD (NGA.STND.0024-1): the platforms' polynomials, and the part of them that the image was formed from."""
+    """SICD (NGA.STND.0024-1): the platforms' polynomials over the aperture of the image."""
     xml = container.xml
     if channel is not None:
         raise FormatError(container.file, f"a SICD is one image and has no channel {shown(channel)!r}")
@@ -309,21 +321,21 @@ def _sicd(container: Container, channel: str | None) -> Imported:
     low, high = band.number("MinProc"), band.number("MaxProc")
     is_monostatic = xml.text("CollectionInfo/CollectType") == "MONOSTATIC"
     point = xml.vector("GeoData/SCP/ECF")
-    middle = xml.number("SCPCOA/SCPTime")
-    sent_from, heard_at = _polynomials_of_sicd(xml, is_monostatic)
+    scene_time = xml.number("SCPCOA/SCPTime")
+    transmitter_path, receiver_path = _polynomials_of_sicd(xml, is_monostatic)
 
     def pulses_at(times: Floats) -> _Pulses:
-        """Pulses that are at the scene point at some times."""
-        out, back = times, times
-        if not is_monostatic:  # the aperture reference point of one platform is that of the time in between
-            for _ in range(_SETTLING):
-                out = times - np.linalg.norm(_over(sent_from, out) - point, axis=1) / SPEED_OF_LIGHT
-                back = times + np.linalg.norm(_over(heard_at, back) - point, axis=1) / SPEED_OF_LIGHT
-        return _Pulses(out, _over(sent_from, out), back, _over(heard_at, back), times.size // 2)
+        """Pulses that are at the scene point at `times`."""
+        sent, received = times, times
+        if not is_monostatic:  # a monostatic aperture reference point is at the time in between
+            for _ in range(_LIGHT_TIME_STEPS):
+                sent = times - np.linalg.norm(_over(transmitter_path, sent) - point, axis=1) / SPEED_OF_LIGHT
+                received = times + np.linalg.norm(_over(receiver_path, received) - point, axis=1) / SPEED_OF_LIGHT
+        return _Pulses(sent, _over(transmitter_path, sent), received, _over(receiver_path, received), times.size // 2)
 
     name, collectors = _names(xml, "CollectionInfo")
-    aperture, remarks = _aperture_of_sicd(xml, point, middle, (low + high) / 2, pulses_at)
-    times: Floats = middle + np.linspace(-0.5, 0.5, _SAMPLES) * aperture.length
+    aperture, remarks = _aperture_of_sicd(xml, point, scene_time, (low + high) / 2, pulses_at)
+    times: Floats = scene_time + np.linspace(-0.5, 0.5, _POLYNOMIAL_SAMPLES) * aperture.length
     seen = _flown(container, pulses_at(times), point, aperture, (low + high) / 2)
     statistics = xml.maybe("ErrorStatistics")
     components = statistics.maybe("BistaticComponents") if statistics is not None else None
@@ -339,9 +351,9 @@ def _sicd(container: Container, channel: str | None) -> Imported:
 
 
 def _over(polynomial: Floats, times: Floats) -> Floats:
-    """Places (n, 3) of a path polynomial at times (n,)."""
-    places: Floats = np.asarray(np.polynomial.polynomial.polyval(times, polynomial).T, dtype=float)
-    return places
+    """Positions (n, 3) of a path polynomial at times (n,)."""
+    positions: Floats = np.asarray(np.polynomial.polynomial.polyval(times, polynomial).T, dtype=float)
+    return positions
 
 
 def _polynomials_of_sicd(xml: Element, is_monostatic: bool) -> tuple[Floats, Floats]:
@@ -352,15 +364,25 @@ def _polynomials_of_sicd(xml: Element, is_monostatic: bool) -> tuple[Floats, Flo
     channel = (
         xml.text("ImageFormation/RcvChanProc/ChanIndex") if xml.maybe("ImageFormation/RcvChanProc/ChanIndex") else "1"
     )
-    found = next(
-        (one for one in xml.all("RadarCollection/RcvChannels/ChanParameters") if one.node.get("index") == channel),
+    channel_parameters = next(
+        (
+            element
+            for element in xml.all("RadarCollection/RcvChannels/ChanParameters")
+            if element.node.get("index") == channel
+        ),
         None,
     )
-    wanted = found.text("RcvAPCIndex") if found is not None and found.maybe("RcvAPCIndex") is not None else "1"
-    receiver = next((one for one in position.all("RcvAPC/RcvAPCPoly") if one.node.get("index") == wanted), None)
+    phase_centre = (
+        channel_parameters.text("RcvAPCIndex")
+        if channel_parameters is not None and channel_parameters.maybe("RcvAPCIndex") is not None
+        else "1"
+    )
+    receiver = next(
+        (element for element in position.all("RcvAPC/RcvAPCPoly") if element.node.get("index") == phase_centre), None
+    )
     if receiver is None:
         raise position.fault(
-            f"has no phase centre {shown(wanted)} that the processed channel was received by", "RcvAPC"
+            f"has no phase centre {shown(phase_centre)} that the processed channel was received by", "RcvAPC"
         )
     holder = Element(xml.file, receiver.node.getparent())
     index = [node is receiver.node for node in holder.node.findall("{*}RcvAPCPoly")].index(True) + 1
@@ -370,10 +392,10 @@ def _polynomials_of_sicd(xml: Element, is_monostatic: bool) -> tuple[Floats, Flo
 def _aperture_of_sicd(
     xml: Element, point: Vector, middle: float, center: float, pulses_at: Callable[[Floats], _Pulses]
 ) -> tuple[_Aperture, list[str]]:
-    """Aperture of a pixel at the scene point: what the processed time gives, or less where the image's band says so.
+    """Aperture of a pixel at the scene point: the processed time, or less if the band of the image is smaller.
 
-    The wave vector of the image moves by |d(u_t + u_r)/dt · col| f/c a second; the band ImpRespBW of a column is what
-    it moved in the aperture. A stripmap is processed for longer than a point is seen.
+    The wave vector of the image moves by |d(u_t + u_r)/dt · col| f/c per second. The band ImpRespBW of a column is
+    its movement in the aperture. A stripmap is processed for longer than a point is seen.
     """
     formation = xml.one("ImageFormation")
     begin, end = formation.number("TStartProc"), formation.number("TEndProc")
@@ -381,19 +403,19 @@ def _aperture_of_sicd(
     if not processed > 0:
         raise formation.fault("ends before it begins", "TEndProc")
     step = min(0.01, processed / 10)
-    near = pulses_at(np.array([middle - step, middle + step]))
-    t, r = near.transmitter - point, near.receiver - point
+    neighbours = pulses_at(np.array([middle - step, middle + step]))
+    t, r = neighbours.transmitter - point, neighbours.receiver - point
     sights: Floats = t / np.linalg.norm(t, axis=1, keepdims=True) + r / np.linalg.norm(r, axis=1, keepdims=True)
     rate = (
         abs(float((sights[1] - sights[0]) @ xml.vector("Grid/Col/UVectECF"))) / (2 * step) * center / SPEED_OF_LIGHT
     )
-    seen = xml.number("Grid/Col/ImpRespBW") / rate if rate else math.inf
-    if seen < (1 - _COVERED) * processed:
-        return _Aperture(middle, seen), [
+    band_time = xml.number("Grid/Col/ImpRespBW") / rate if rate else math.inf
+    if band_time < (1 - _MAX_GAP_FRACTION) * processed:
+        return _Aperture(middle, band_time), [
             f"The aperture is what the band of an image column takes (Grid/Col/ImpRespBW); the file was processed "
             f"from {processed:.6g} s."
         ]
-    if abs((begin + end) / 2 - middle) > _COVERED * processed:
+    if abs((begin + end) / 2 - middle) > _MAX_GAP_FRACTION * processed:
         return _Aperture(middle, processed), [
             f"The aperture is as long as the time processed; its middle is {middle - (begin + end) / 2:+.6g} s from "
             "the middle of that, at the centre of aperture of the scene point (SCPCOA)."
@@ -401,39 +423,39 @@ def _aperture_of_sicd(
     return _Aperture(middle, processed), []
 
 
-# ---------------------------------------------------------------------- all of them
+# ---------------------------------------------------------------------- all formats
 def _chosen(xml: Element, channel: str | None, path: str, key: str) -> tuple[str, Element]:
     """Identifier and parameters of a channel."""
     name = xml.text("Channel/RefChId") if channel is None else channel
-    found = xml.with_child(path, key, name)
-    if found is None:
-        known = ", ".join(shown(one.text(key)) for one in xml.all(path))
-        raise xml.fault(f"has no channel {shown(name)!r}; it has {known}", path)
-    return name, found
+    parameters = xml.with_child(path, key, name)
+    if parameters is None:
+        identifiers = ", ".join(shown(element.text(key)) for element in xml.all(path))
+        raise xml.fault(f"has no channel {shown(name)!r}; it has {identifiers}", path)
+    return name, parameters
 
 
 def _flown(container: Container, pulses: _Pulses, point: Vector, aperture: _Aperture, center: float) -> Seen:
-    """Both platforms, by the places of the pulses in the aperture."""
+    """Paths of both platforms, fitted to the positions of the pulses in the aperture."""
     if not center > 0:
         raise FormatError(container.file, f"its centre frequency is {center:g} Hz")
     axes = axes_at(geodetic(point))
     times = _scene_time(pulses, axes) - aperture.middle
     try:
         transmitter, receiver = (
-            fitted(times, axes.places(places), aperture.length, SPEED_OF_LIGHT / center)
-            for places in (pulses.transmitter, pulses.receiver)
+            fitted(times, axes.places(positions), aperture.length, SPEED_OF_LIGHT / center)
+            for positions in (pulses.transmitter, pulses.receiver)
         )
     except NoPathError as error:
-        where = f"{container.xml.path}: " if container.has_vectors else ""
-        raise FormatError(container.file, f"{where}{error}") from None
+        prefix = f"{container.xml.path}: " if container.has_vectors else ""
+        raise FormatError(container.file, f"{prefix}{error}") from None
     return Seen(transmitter, receiver, axes)
 
 
 def _coverage(pulses: _Pulses, axes: SceneAxes, aperture: _Aperture) -> list[str]:
     times = _scene_time(pulses, axes) - aperture.middle
     inside = times[np.abs(times) <= aperture.length / 2]
-    lacking = [inside.min() + aperture.length / 2, aperture.length / 2 - inside.max()]
-    if max(lacking) <= _COVERED * aperture.length:
+    gaps = [inside.min() + aperture.length / 2, aperture.length / 2 - inside.max()]
+    if max(gaps) <= _MAX_GAP_FRACTION * aperture.length:
         return []
     return [
         f"Pulses cover the aperture from {inside.min():.6g} s to {inside.max():.6g} s of slow time; its ends are "
@@ -442,18 +464,20 @@ def _coverage(pulses: _Pulses, axes: SceneAxes, aperture: _Aperture) -> list[str
 
 
 def _names(xml: Element, path: str) -> tuple[str, list[str]]:
-    """Name of the collection, and who collected it."""
-    found = {key: xml.maybe(f"{path}/{key}") for key in ("CoreName", "CollectorName", "IlluminatorName")}
-    core, collector, illuminator = (one.text() if one is not None else "" for one in found.values())
-    by = f"Collected by {shown(collector)}" if collector else ""
-    lit = f"{'lit' if by else 'Lit'} by {shown(illuminator)}" if illuminator else ""
-    return core, [f"{', '.join(part for part in (by, lit) if part)}."] if by or lit else []
+    """Name of the collection, and a remark on its collector and illuminator."""
+    elements = {key: xml.maybe(f"{path}/{key}") for key in ("CoreName", "CollectorName", "IlluminatorName")}
+    core, collector, illuminator = (element.text() if element is not None else "" for element in elements.values())
+    collected = f"Collected by {shown(collector)}" if collector else ""
+    illuminated = f"{'illuminated' if collected else 'Lit'} by {shown(illuminator)}" if illuminator else ""
+    return core, [
+        f"{', '.join(phrase for phrase in (collected, illuminated) if phrase)}."
+    ] if collected or illuminated else []
 
 
 def _at_reference(pulses: _Pulses, seen: Seen, aperture: _Aperture) -> ReferenceGeometry | None:
-    at = float(_scene_time(pulses, seen.axes)[pulses.reference]) - aperture.middle
-    # Elsewhere the paths are not fitted.
-    return reference_of(seen, at) if abs(at) <= aperture.length / 2 * (1 + 1e-9) else None
+    slow_time = float(_scene_time(pulses, seen.axes)[pulses.reference]) - aperture.middle
+    # Outside the aperture the paths are not fitted.
+    return reference_of(seen, slow_time) if abs(slow_time) <= aperture.length / 2 * (1 + 1e-9) else None
 
 
 def _imported(
@@ -471,14 +495,14 @@ def _imported(
     remarks: list[str],
     unused: str = "",
 ) -> Imported:
-    if not (0 < aperture.length <= LONGEST and abs(aperture.middle) <= LONGEST):
-        given = f"an aperture of {aperture.length:g} s at {aperture.middle:g} s"
-        raise FormatError(container.file, f"{container.xml.path}: {given}")
+    if not (0 < aperture.length <= MAX_APERTURE_S and abs(aperture.middle) <= MAX_APERTURE_S):
+        problem = f"an aperture of {aperture.length:g} s at {aperture.middle:g} s"
+        raise FormatError(container.file, f"{container.xml.path}: {problem}")
     if not 0 < band[1] < 2 * band[0]:
-        given = f"a band of {band[1]:g} Hz about {band[0]:g} Hz, which is none"
-        raise FormatError(container.file, f"{container.xml.path}: {given}")
-    begun = parse_instant(start.text(), needs_zone=False)
-    if begun is None:
+        problem = f"a band of {band[1]:g} Hz about {band[0]:g} Hz, which is none"
+        raise FormatError(container.file, f"{container.xml.path}: {problem}")
+    start_instant = parse_instant(start.text(), needs_zone=False)
+    if start_instant is None:
         raise start.fault(f"is no instant of UTC (got {shown(start.text())!r})")
     return Imported(
         file=os.path.basename(container.file),
@@ -490,7 +514,7 @@ def _imported(
         center_frequency=band[0],
         bandwidth=band[1],
         aperture_time=aperture.length,
-        center_time=begun.after(aperture.middle).as_text(),
+        center_time=start_instant.after(aperture.middle).as_text(),
         transmitter=seen.transmitter,
         receiver=seen.receiver,
         is_monostatic=is_monostatic,
@@ -501,4 +525,8 @@ def _imported(
     )
 
 
-_READERS: dict[str, Callable[[Container, str | None], Imported]] = {"CPHD": _cphd, "CRSD": _crsd, "SICD": _sicd}
+_FORMAT_READERS: dict[str, Callable[[Container, str | None], Imported]] = {
+    "CPHD": _cphd,
+    "CRSD": _crsd,
+    "SICD": _sicd,
+}

@@ -22,25 +22,60 @@ from bisar_budget.simulator.phase_history import Complexes, Floats
 
 Indices = NDArray[np.int64]
 
-_MARGIN = 2  # times the side of an image that is rotated, so that nothing wraps around
-_ITERATIONS = 40
-_LINES = 96  # range lines used; more cost time and gain little
-_TARGETS = 96
-_PER_LINE = 6
-_SECONDARY = 0.1  # of a line's strongest power: a further target, not its sidelobe
-_FALSE_ALARM = 1e-3  # chance that clutter alone shows a target anywhere in the image
-_RANGE_OF_LEVELS = 1e-6  # a line's clutter, of the image's peak power, at least: rounding is no clutter
-_SUPPORT = 0.1  # of the strongest aperture sample: less is what leaks beside the band of a finite image
-_SMALLEST_GAP = 0.05  # of the sampling band; an oversampled image leaves at least that empty
-_SMEAR = 0.1  # of the mean response's peak
-_SHRINK = 0.7  # of the window, each time
-_NARROWEST = 12  # cells: half of the last window
-_BRIDGE = 8  # cells: nulls within a smeared response are narrower
-_COHERENT = 0.5  # rad rms: below it responses add up in phase over the whole aperture
-_SIGNIFICANT = 2.0  # standard deviations
-_BLOCK = 16  # range lines corrected at once, for the cache
-_DRIFT_SETTLED = 1e-3  # rad at the aperture edge
-_CORRELATED = 6.0  # standard deviations of the correlation of speckle, whose highest of many is about 4
+_MAX_AUTOFOCUS_ITERATIONS = 40
+_PADDING_FACTOR = 2  # side of a padded image over the side of the image: a rotated image does not wrap around
+_SUPPORT_FRACTION = 0.1  # of the strongest aperture sample; weaker samples are leakage of a finite image
+_MIN_GAP_FRACTION = 0.05  # of the sampling band; an oversampled image leaves at least this much of it empty
+_BLOCK_ROWS = 16  # range lines corrected at once, for the cache
+_DRIFT_TOLERANCE_RAD = 1e-3  # at the aperture edge
+_CORRELATION_SIGMA = 6.0  # least correlation of a drift; the highest of many of speckle is at about 4 sigma
+
+
+@dataclass(frozen=True)
+class PhaseGradientSettings:
+    """Tunings of phase gradient autofocus.
+
+    Attributes
+    ----------
+    max_lines : int
+        Range lines used. More lines cost time and gain little.
+    target_count, targets_per_line : int
+        Largest number of targets, in all and of one range line.
+    secondary_fraction : float
+        Least power of a further target, as a fraction of the strongest power of its line. Sidelobes are weaker.
+    false_alarm_probability : float
+        Probability that clutter alone shows a target anywhere in the image.
+    clutter_floor_ratio : float
+        Least clutter power of a line over the peak power of the image: rounding is no clutter.
+    smear_fraction : float
+        Level at which the mean response ends, as a fraction of its peak.
+    shrink_factor : float
+        Window of an iteration over the window of the iteration before.
+    narrowest_cells : int
+        Half width of the last window. [cells]
+    bridge_cells : int
+        Reach over a gap in the mean response. Nulls within a smeared response are narrower. [cells]
+    coherent_rad : float
+        RMS phase below which responses add up in phase over the whole aperture. [rad]
+    significant_sigma : float
+        Least size of a component of a step, in standard deviations from clutter alone.
+    """
+
+    max_lines: int = 96
+    target_count: int = 96
+    targets_per_line: int = 6
+    secondary_fraction: float = 0.1
+    false_alarm_probability: float = 1e-3
+    clutter_floor_ratio: float = 1e-6
+    smear_fraction: float = 0.1
+    shrink_factor: float = 0.7
+    narrowest_cells: int = 12
+    bridge_cells: int = 8
+    coherent_rad: float = 0.5
+    significant_sigma: float = 2.0
+
+
+_PGA = PhaseGradientSettings()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,10 +93,11 @@ class Focused:
 def phase_gradient_autofocus(image: Complexes) -> Focused:
     """Estimate one phase error common to all range lines, of any shape, and take it out.
 
-    Targets are picked where no clutter would reach, centred to a fraction of a sample, windowed, and taken to the
-    aperture. The gradient kernel gives their common phase while they are smeared; once they add up coherently the
-    principal eigenvector of their covariance does, by power iteration. The phase is kept to what the window can
-    hold, and a component of a step that clutter alone would give is left out: nothing is left when it is done.
+    Targets stronger than clutter are picked, centred to a fraction of a sample, windowed, and transformed to the
+    aperture. While they are smeared, the gradient kernel estimates their common phase. Once they add up coherently,
+    the principal eigenvector of their covariance estimates it, by power iteration. The phase has no component that
+    the window cannot hold. Components of a step that clutter alone would give are dropped; the iteration ends with a
+    step without components.
 
     Parameters
     ----------
@@ -72,7 +108,7 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
     Returns
     -------
     Focused
-        The image itself and no phase if no target stands out of the clutter, as in a homogeneous scene.
+        The image itself and no phase if no target exceeds the clutter, as in a homogeneous scene.
 
     Raises
     ------
@@ -81,11 +117,11 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
 
     Notes
     -----
-    A smeared target must still stand out: its power, divided by the cells it is smeared over, must exceed the mean
-    clutter power by ln(pixels / 10⁻³), 13 dB in a million pixels. The error left behind follows from the clutter:
-    about √(window / (2 · targets · ratio)) rad rms, window ±12 cells, ratio the target's to the clutter's power.
-    Targets in each other's windows disturb it, 0.1 to 0.3 rad if there are no more than a dozen in all. A taper that
-    falls below a tenth of its maximum (Taylor -45 dB) is left as it is beyond.
+    A smeared target must exceed the clutter: its power, divided by the cells it is smeared over, must exceed the
+    mean clutter power by ln(pixels / 10⁻³), 13 dB in a million pixels. The remaining error follows from the clutter:
+    about √(window / (2 · targets · ratio)) rad rms, for a window of ±12 cells and a ratio of target power to clutter
+    power. Targets in each other's windows add 0.1 to 0.3 rad if there are no more than a dozen in all. Where a taper
+    falls below a tenth of its maximum (Taylor -45 dB), the phase is not corrected.
     """
     image = _checked(image)
     rows, level = _range_lines(image)
@@ -103,8 +139,9 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
 def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
     """Estimate a quadratic, or quadratic and cubic, phase error from the drift between sub-aperture images.
 
-    The phase over a sub-aperture is in the main a slope and shifts its image; cross-correlation of the images'
-    powers along y′, summed over range lines, measures the shifts. Repeated until nothing drifts.
+    The phase over a sub-aperture is mainly a slope, which shifts its image. The cross-correlation of the images'
+    powers along y′, summed over range lines, measures the shifts. The estimate is repeated until the images no longer
+    drift.
 
     Parameters
     ----------
@@ -125,10 +162,10 @@ def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
 
     Notes
     -----
-    It sees what sub-apertures have in common: points, edges, texture. Speckle of disjoint sub-apertures is
-    independent, so a homogeneous scene gives nothing. Orders above the model stay in the image and bias it: with
-    two sub-apertures a cubic is not seen at all, a quartic is taken for a quadratic in part. The smear must stay
-    small against the image's width, since the correlation is circular.
+    Map drift sees features that sub-apertures share: points, edges, texture. Speckle of disjoint sub-apertures is
+    independent, so a homogeneous scene gives no estimate. Orders above the model stay in the image and bias the
+    estimate: with two sub-apertures a cubic is not seen at all, and a quartic is partly taken for a quadratic. The
+    smear must stay small against the image's width, since the correlation is circular.
     """
     if sub_apertures not in (2, 3):
         raise ValueError(f"map drift works with 2 or 3 sub-apertures (got {sub_apertures})")
@@ -139,28 +176,28 @@ def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
     spectrum = np.fft.fft(image, axis=1)
     band = aperture_band(spectrum)
     aperture = spectrum[:, band]
-    place = _place(band.size)
-    shapes = np.stack((place**2, place**3)[: sub_apertures - 1], axis=1)
-    parts = np.array_split(np.arange(band.size), sub_apertures)
+    aperture_place = _aperture_places(band.size)
+    shapes = np.stack((aperture_place**2, aperture_place**3)[: sub_apertures - 1], axis=1)
+    segments = np.array_split(np.arange(band.size), sub_apertures)
     pairs = [(a, b) for a in range(sub_apertures) for b in range(a + 1, sub_apertures)]
-    # Slope per sample of each shape over each sub-aperture, as a straight line fits it.
-    slopes = np.array([np.polyfit(part, shapes[part], 1)[0] for part in parts])
+    # Slope per sample of each shape over each sub-aperture, by a straight line fitted to it.
+    slopes = np.array([np.polyfit(segment, shapes[segment], 1)[0] for segment in segments])
     model = np.array([slopes[b] - slopes[a] for a, b in pairs])
-    size = np.zeros(shapes.shape[1])
-    for _ in range(_ITERATIONS):
-        drifts = _drifts(aperture * np.exp(-1j * shapes @ size), parts, pairs)
+    coefficients = np.zeros(shapes.shape[1])
+    for _ in range(_MAX_AUTOFOCUS_ITERATIONS):
+        drifts = _drifts(aperture * np.exp(-1j * shapes @ coefficients), segments, pairs)
         if drifts is None:
             break
         step = np.linalg.lstsq(model, drifts, rcond=None)[0]
-        size = size + step
-        if np.abs(step).max() < _DRIFT_SETTLED:
+        coefficients = coefficients + step
+        if np.abs(step).max() < _DRIFT_TOLERANCE_RAD:
             break
-    phase = shapes @ size
-    total[band] = phase - np.polyval(np.polyfit(place, phase, 1), place)
+    phase = shapes @ coefficients
+    total[band] = phase - np.polyval(np.polyfit(aperture_place, phase, 1), aperture_place)
     return Focused(image=_corrected(image, total), phase=total)
 
 
-# As the mission file names them; map drift with the sub-apertures that see a cubic phase too.
+# Algorithms by their names in the mission file. Map drift uses three sub-apertures, to see a cubic phase too.
 ALGORITHMS: dict[str, Callable[[Complexes], Focused]] = {
     "pga": phase_gradient_autofocus,
     "map_drift": partial(map_drift, sub_apertures=3),
@@ -178,7 +215,7 @@ def autofocus_in_scene_axes(
         Complex image on a square ground grid of equal spacing along x (first axis) and y, as `ground_grid` with
         azimuth 0 lays it, centred on its sample n // 2. At baseband: the phase of the range to each pixel must
         have been taken out, or it is a carrier beyond the sampling band. Sampled at least 1.42 times finer than
-        the band needs, which turns.
+        the band needs, because the band turns with the image.
     look_azimuth : float
         φ_b, (11): direction of x′. [rad]
     algorithm : callable
@@ -187,8 +224,8 @@ def autofocus_in_scene_axes(
     Returns
     -------
     Focused
-        `image` in (x, y), (n, n); `phase` along y′ over (m,) frequencies of the same sampling interval, m the
-        side of the largest square, turned, that lies in the image: the error is estimated there.
+        `image` in (x, y), (n, n); `phase` along y′ over (m,) frequencies of the same sampling interval. The largest
+        turned square that lies in the image has the side m; the error is estimated in this square.
 
     Raises
     ------
@@ -213,10 +250,10 @@ def aperture_band(spectrum: Complexes) -> Indices:
     """
     count = spectrum.shape[1]
     strength = np.sqrt(np.mean(np.abs(spectrum) ** 2, axis=0))
-    used = np.nonzero(strength > _SUPPORT * strength.max())[0]
+    used = np.nonzero(strength > _SUPPORT_FRACTION * strength.max())[0]
     gaps = np.diff(used, append=used[0] + count)
     widest = int(np.argmax(gaps))
-    if gaps[widest] - 1 < _SMALLEST_GAP * count:
+    if gaps[widest] - 1 < _MIN_GAP_FRACTION * count:
         band: Indices = (np.arange(count) - count // 2) % count
         return band
     first = used[(widest + 1) % used.size]
@@ -224,74 +261,76 @@ def aperture_band(spectrum: Complexes) -> Indices:
 
 
 def _checked(image: Complexes) -> Complexes:
-    given = np.asarray(image)
-    if given.ndim != 2 or given.shape[0] < 1 or given.shape[1] < 16:
-        raise ValueError(f"autofocus takes an image of at least 1 x 16 samples (got shape {given.shape})")
-    if not np.isfinite(np.sum(given)) and not np.isfinite(given).all():
+    samples = np.asarray(image)
+    if samples.ndim != 2 or samples.shape[0] < 1 or samples.shape[1] < 16:
+        raise ValueError(f"autofocus takes an image of at least 1 x 16 samples (got shape {samples.shape})")
+    if not np.isfinite(np.sum(samples)) and not np.isfinite(samples).all():
         raise ValueError(
-            f"autofocus takes finite samples ({np.count_nonzero(~np.isfinite(given))} are NaN or infinite)"
+            f"autofocus takes finite samples ({np.count_nonzero(~np.isfinite(samples))} are NaN or infinite)"
         )
-    return given.astype(complex, copy=False)
+    return samples.astype(complex, copy=False)
 
 
 def _corrected(image: Complexes, phase: Floats) -> Complexes:
     turn = np.exp(-1j * phase)
     focused = np.empty(image.shape, dtype=complex)
-    for start in range(0, image.shape[0], _BLOCK):
-        rows = slice(start, start + _BLOCK)
+    for start in range(0, image.shape[0], _BLOCK_ROWS):
+        rows = slice(start, start + _BLOCK_ROWS)
         focused[rows] = np.fft.ifft(np.fft.fft(image[rows], axis=1) * turn, axis=1)
     return focused
 
 
-def _place(count: int) -> Floats:
-    """Aperture samples from -1 to 1, at the centres of equal cells."""
+def _aperture_places(count: int) -> Floats:
+    """Places of the aperture samples, from -1 to 1, at the centres of equal cells."""
     return (2 * np.arange(count) - (count - 1)) / count
 
 
 def _threshold(pixels: int) -> float:
-    """Power over the mean that exponential clutter exceeds anywhere with the chance of a false alarm."""
-    return math.log(pixels / _FALSE_ALARM)
+    """Power over mean clutter power that exponential clutter exceeds anywhere with the false-alarm probability."""
+    return math.log(pixels / _PGA.false_alarm_probability)
 
 
 def _range_lines(image: Complexes) -> tuple[Indices, Floats]:
-    """Range lines with a target, best first, and their clutter power."""
+    """Indices of the range lines with a target, strongest first, and the clutter power of each."""
     power = image.real**2 + image.imag**2
     peak = power.max(axis=1)
     if not peak.max():
         return np.zeros(0, dtype=np.int64), peak[:0]
-    # A median does not see targets; of an exponential distribution it is ln 2 of the mean.
+    # A median does not see targets. The median of an exponential distribution is ln 2 times the mean.
     level = np.median(power[:, :: max(1, power.shape[1] // 256)], axis=1) / math.log(2)
-    level = np.maximum(level, _RANGE_OF_LEVELS * peak.max())
+    level = np.maximum(level, _PGA.clutter_floor_ratio * peak.max())
     ratio = peak / level
-    best = np.argsort(ratio)[::-1][:_LINES]
+    best = np.argsort(ratio)[::-1][: _PGA.max_lines]
     best = best[ratio[best] > _threshold(image.size)]
     return best, level[best]
 
 
-def _common_phase(aperture: Complexes, samples: int, threshold: float) -> Floats:
-    """Phase over the band common to range lines of unit clutter: the iteration of phase gradient autofocus."""
+def _common_phase(aperture: Complexes, line_samples: int, threshold: float) -> Floats:
+    """Phase over the band that is common to range lines of unit clutter, by iterated phase gradient autofocus."""
     count = aperture.shape[1]
-    per_cell = samples / count
-    narrowest = math.ceil(_NARROWEST * per_cell)
+    per_cell = line_samples / count
+    narrowest = math.ceil(_PGA.narrowest_cells * per_cell)
     phase: Floats = np.zeros(count)
     strength = np.mean(np.abs(aperture) ** 2, axis=0)
     strength /= strength.mean()
     basis: Floats = np.zeros((count, 0))
-    half = samples // 2 - 1
-    distance = np.minimum(np.arange(samples), samples - np.arange(samples))
-    for iteration in range(_ITERATIONS):
+    half_window = line_samples // 2 - 1
+    distance = np.minimum(np.arange(line_samples), line_samples - np.arange(line_samples))
+    for iteration in range(_MAX_AUTOFOCUS_ITERATIONS):
         turn = np.exp(-1j * phase)
-        lines = np.fft.ifft(aperture * turn, samples, axis=1)
+        lines = np.fft.ifft(aperture * turn, line_samples, axis=1)
         power = lines.real**2 + lines.imag**2
-        seen = max(narrowest, 2 * _smear(power, per_cell) + 4)
-        half = min(half, max(seen, int(_SHRINK * half)) if iteration else seen)
+        smear_window = max(narrowest, 2 * _smear(power, per_cell) + 4)
+        half_window = min(
+            half_window, max(smear_window, int(_PGA.shrink_factor * half_window)) if iteration else smear_window
+        )
         if not iteration:
-            basis = _basis(strength, math.ceil(half / per_cell) + 4)
-        row, column = _targets(power, half, threshold)
-        responses = np.fft.ifft(_centred(aperture[row] * turn, column, samples), samples, axis=1)
-        responses[:, distance > half] = 0
+            basis = _basis(strength, math.ceil(half_window / per_cell) + 4)
+        row, column = _targets(power, half_window, threshold)
+        responses = np.fft.ifft(_centred(aperture[row] * turn, column, line_samples), line_samples, axis=1)
+        responses[:, distance > half_window] = 0
         windowed = np.fft.fft(responses, axis=1)[:, :count]
-        step = _step(windowed, basis[:, : math.ceil(half / per_cell) + 4], strength, samples)
+        step = _step(windowed, basis[:, : math.ceil(half_window / per_cell) + 4], strength, line_samples)
         if not step.any():
             break
         phase += step
@@ -299,47 +338,47 @@ def _common_phase(aperture: Complexes, samples: int, threshold: float) -> Floats
 
 
 def _smear(power: Floats, per_cell: float) -> int:
-    """Reach of the mean response around each line's peak, both sides folded; in samples."""
+    """Reach of the mean response around each line's peak, both sides folded. [samples]"""
     samples = power.shape[1]
     column = power.argmax(axis=1)[:, None]
     distance = np.arange(samples // 2)
     row = np.arange(power.shape[0])[:, None]
     folded = np.maximum(power[row, (column + distance) % samples], power[row, column - distance]).mean(axis=0)
     floor = np.median(folded)
-    bright = folded - floor > _SMEAR * (folded[0] - floor)
+    bright = folded - floor > _PGA.smear_fraction * (folded[0] - floor)
     reach = 0
     while True:
-        # Nulls within a smeared response are bridged; farther on another target begins.
-        ahead = np.nonzero(bright[reach + 1 : reach + 1 + int(_BRIDGE * per_cell) + reach // 2])[0]
+        # Nulls within a smeared response are bridged. A wider gap separates targets.
+        ahead = np.nonzero(bright[reach + 1 : reach + 1 + int(_PGA.bridge_cells * per_cell) + reach // 2])[0]
         if not ahead.size:
             return reach
         reach += int(ahead[-1]) + 1
 
 
 def _targets(power: Floats, half: int, threshold: float) -> tuple[Indices, Indices]:
-    """Row and column of the strongest pixel of each line, and of further ones clear of its window."""
-    left = power.copy()
+    """Rows and columns of the strongest pixel of each line, and of further strong pixels outside its window."""
+    remaining = power.copy()
     row = np.arange(power.shape[0])
-    least = _SECONDARY * power.max(axis=1)
+    least_power = _PGA.secondary_fraction * power.max(axis=1)
     window = np.arange(-2 * half, 2 * half + 1)
-    found = []
-    for order in range(_PER_LINE):
-        column = left[row].argmax(axis=1)
+    picks = []
+    for order in range(_PGA.targets_per_line):
+        column = remaining[row].argmax(axis=1)
         if order:
-            stands_out = left[row, column] > np.maximum(threshold, least[row])
+            stands_out = remaining[row, column] > np.maximum(threshold, least_power[row])
             row, column = row[stands_out], column[stands_out]
-        found.append((row, column))
-        left[row[:, None], (column[:, None] + window) % power.shape[1]] = 0
-    rows, columns = (np.concatenate(part) for part in zip(*found, strict=True))
-    best = np.argsort(power[rows, columns])[::-1][:_TARGETS]
+        picks.append((row, column))
+        remaining[row[:, None], (column[:, None] + window) % power.shape[1]] = 0
+    rows, columns = (np.concatenate(indices) for indices in zip(*picks, strict=True))
+    best = np.argsort(power[rows, columns])[::-1][: _PGA.target_count]
     return rows[best], columns[best]
 
 
 def _centred(aperture: Complexes, column: Indices, samples: int) -> Complexes:
     """Take each response's peak to sample 0 by a phase ramp, exactly.
 
-    A window off the peak by a fraction of a sample bends the phase at the aperture's edges, the same way every
-    time, and the iteration would follow. Newton's method on the power finds the interpolated peak.
+    A window off the peak by a fraction of a sample bends the phase at the aperture's edges, in each iteration in the
+    same direction, and the iteration would follow. Newton's method on the power finds the interpolated peak.
     """
     count = aperture.shape[1]
     turn = 2 * math.pi / samples
@@ -357,7 +396,7 @@ def _centred(aperture: Complexes, column: Indices, samples: int) -> Complexes:
 
 
 def _phasors(angle: Floats, count: int) -> Complexes:
-    """exp(j · angle · n), n = 0 … count - 1, as products of coarse and fine steps: exponentials are dear."""
+    """exp(j · angle · n), n = 0 … count - 1, as products of coarse and fine steps, to form few exponentials."""
     fine = np.exp(1j * np.outer(angle, np.arange(32)))
     coarse = np.exp(1j * np.outer(angle, np.arange(0, count, 32)))
     phasors: Complexes = (coarse[:, :, None] * fine[:, None, :]).reshape(angle.size, -1)[:, :count]
@@ -368,11 +407,11 @@ def _basis(strength: Floats, order: int) -> Floats:
     """Smooth functions over the aperture by rising frequency, orthonormal under its power: a cubic, then cosines.
 
     The cubic takes up the ends' slopes, so that cosines of a smooth phase converge fast; the n-th turns n/2 times.
-    Samples beside the band, which leak into it in an image of finite extent, have no weight.
+    Samples outside the band, which leak into it in an image of finite extent, have no weight.
     """
-    place = _place(strength.size)
-    columns = [place**power for power in range(4)]
-    columns += [np.cos(math.pi / 2 * n * (place + 1)) for n in range(1, min(order, strength.size // 2) - 3)]
+    aperture_place = _aperture_places(strength.size)
+    columns = [aperture_place**power for power in range(4)]
+    columns += [np.cos(math.pi / 2 * n * (aperture_place + 1)) for n in range(1, min(order, strength.size // 2) - 3)]
     functions = np.stack(columns, axis=1)
     _, triangle = np.linalg.qr(np.sqrt(strength)[:, None] * functions)
     basis: Floats = np.linalg.solve(triangle.T, functions.T).T
@@ -380,7 +419,7 @@ def _basis(strength: Floats, order: int) -> Floats:
 
 
 def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -> Floats:
-    """One estimate of the common phase of windowed, centred responses over the aperture."""
+    """Estimate the common phase of windowed, centred responses over the aperture, (count,). [rad]"""
     count = responses.shape[1]
     # Gradient kernel: the maximum-likelihood phase difference of neighbours, integrated.
     difference = np.sum(responses[:, 1:] * responses[:, :-1].conj(), axis=0)
@@ -388,7 +427,7 @@ def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -
     coefficients = basis.T @ (strength * phase)
     coefficients[:2] = 0  # constant and linear
     phase = basis @ coefficients
-    if np.linalg.norm(coefficients) > _COHERENT * math.sqrt(count):
+    if np.linalg.norm(coefficients) > _PGA.coherent_rad * math.sqrt(count):
         return phase
     lag = max(1, count // 4)
     for _ in range(2):
@@ -404,28 +443,34 @@ def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -
     coefficients[:2] = 0
     # Standard deviation of a coefficient from clutter of unit power alone.
     deviation = samples / math.sqrt(2 * count * float(np.sum(np.abs(amplitude) ** 2)))
-    coefficients[np.abs(coefficients) < _SIGNIFICANT * deviation] = 0
+    coefficients[np.abs(coefficients) < _PGA.significant_sigma * deviation] = 0
     step: Floats = basis @ coefficients
     return step
 
 
-def _drifts(aperture: Complexes, parts: list[Indices], pairs: list[tuple[int, int]]) -> Floats | None:
-    """Difference of phase slope between sub-apertures, per aperture sample; None if they do not correlate."""
-    samples = 2 * aperture.shape[1]  # of powers, which have twice the band
-    powers = [np.fft.fft(np.abs(np.fft.ifft(aperture[:, part], samples, axis=1)) ** 2, axis=1) for part in parts]
+def _drifts(aperture: Complexes, segments: list[Indices], pairs: list[tuple[int, int]]) -> Floats | None:
+    """Differences of phase slope between pairs of sub-apertures, per aperture sample; None if uncorrelated."""
+    samples = 2 * aperture.shape[1]  # a power has twice the band
+    powers = [
+        np.fft.fft(np.abs(np.fft.ifft(aperture[:, segment], samples, axis=1)) ** 2, axis=1) for segment in segments
+    ]
     for power in powers:
         power[:, 0] = 0  # the mean correlates everywhere
         power /= np.linalg.norm(power)
-    # Speckle of disjoint sub-apertures is independent, from cell to cell and from line to line.
-    least = _CORRELATED / math.sqrt(aperture.shape[0] * parts[-1].size)
+    # Speckle of disjoint sub-apertures is independent between cells and between lines.
+    least_correlation = _CORRELATION_SIGMA / math.sqrt(aperture.shape[0] * segments[-1].size)
     drifts = []
     for a, b in pairs:
         correlation = np.fft.ifft(np.sum(powers[b] * powers[a].conj(), axis=0)).real * samples
-        top = int(np.argmax(correlation))
-        if correlation[top] <= least:
+        top_sample = int(np.argmax(correlation))
+        if correlation[top_sample] <= least_correlation:
             return None
-        before, at, after = correlation[top - 1], correlation[top], correlation[(top + 1) % samples]
-        shift = top + (before - after) / (2 * (before - 2 * at + after))
+        before, top_value, after = (
+            correlation[top_sample - 1],
+            correlation[top_sample],
+            correlation[(top_sample + 1) % samples],
+        )
+        shift = top_sample + (before - after) / (2 * (before - 2 * top_value + after))
         shift = (shift + samples / 2) % samples - samples / 2
         drifts.append(-2 * math.pi * shift / samples)
     return np.array(drifts)
@@ -459,7 +504,7 @@ def rotated(image: Complexes, look_azimuth: float) -> Complexes:
     if image.ndim != 2 or image.shape[0] != image.shape[1]:
         raise ValueError(f"rotation takes a square image (got shape {image.shape})")
     count = image.shape[0]
-    side = _MARGIN * count
+    side = _PADDING_FACTOR * count
     padded = np.zeros((side, side), dtype=complex)
     start = side // 2 - count // 2
     padded[start : start + count, start : start + count] = image
@@ -472,19 +517,19 @@ def scene_axes(image: Complexes, look_azimuth: float, count: int) -> Complexes:
     return _turned(image, -look_azimuth)[start : start + count, start : start + count]
 
 
-def _turned(image: Complexes, angle: float) -> Complexes:
-    """Image whose axes are turned by an angle: quarter turns exactly, the rest, at most 45°, by shears."""
-    if not math.isfinite(angle):
-        raise ValueError(f"the look azimuth must be a finite angle (got {angle} rad)")
-    quarters = round(angle / (math.pi / 2))
-    rest = angle - quarters * math.pi / 2
+def _turned(image: Complexes, angle_rad: float) -> Complexes:
+    """Image whose axes are turned by an angle: by exact quarter turns, then by shears over at most 45°."""
+    if not math.isfinite(angle_rad):
+        raise ValueError(f"the look azimuth must be a finite angle (got {angle_rad} rad)")
+    quarters = round(angle_rad / (math.pi / 2))
+    shear_angle = angle_rad - quarters * math.pi / 2
     for _ in range(quarters % 4):
         # new(x′, y′) = old(−y′, x′); an even side has no partner for its first sample, which is margin.
         image = np.roll(image.T[:, ::-1], 1, axis=1)
     # old(x, y) with x = x′cos − y′ sin, y = x′ sin + y′ cos, split into x-, y- and x-shears.
-    image = _sheared(image, -math.tan(rest / 2), axis=0)
-    image = _sheared(image, math.sin(rest), axis=1)
-    return _sheared(image, -math.tan(rest / 2), axis=0)
+    image = _sheared(image, -math.tan(shear_angle / 2), axis=0)
+    image = _sheared(image, math.sin(shear_angle), axis=1)
+    return _sheared(image, -math.tan(shear_angle / 2), axis=0)
 
 
 def _sheared(image: Complexes, shear: float, axis: int) -> Complexes:

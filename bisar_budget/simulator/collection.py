@@ -35,24 +35,27 @@ from bisar_budget.simulator.phase_history import (
     path,
 )
 
-_WIDEST = 1.5  # cells of the bandwidth that a spectrum may be wide: half of what three samples per cell can hold
 OVERSAMPLING = 2.5  # samples of an image per resolution cell
 CELLS = 48  # resolution cells of a cross-range cut; fewer blur the aperture by over 1 % of a phase under a taper
 RANGE_CELLS = 8  # of a chip
-_FREQUENCIES = 64  # at least; half of them for the response itself
 MAX_CELLS = 1024
-_BYTES_PER_PIXEL = 16 * 16  # two images, their grid, and what forming or refocusing one holds at once
-_BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
 CONTRIBUTIONS = 1 << 21  # of pulses to pixels, which the reading of an image holds at once
+
+_MAX_SPECTRUM_CELLS = (
+    1.5  # width of a spectrum over the bandwidth: half of the width that three samples per cell hold
+)
+_MIN_CHIP_FREQUENCIES = 64  # half of them for the response itself
+_BYTES_PER_PIXEL = 16 * 16  # two images, their grid, and the arrays that form or refocus one of them
+_BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
 _BYTES_PER_CONTRIBUTION = 8 + 2 * 16  # in single and in double precision
-_STRIDE = 4  # pixels from one step along a line to the next; between them a cubic is drawn
-_STRETCH = 4.0  # of a pixel, at most: where Doppler hardly changes along a line
-_TIMES = 65  # at which paths show how far the line of sight turns
-_ONE_WAY = 0.99  # of all that Doppler runs through over the aperture, which its ends span unless it turns back
-_SLANT = 60.0  # of the way from line to line, at most: where equal Doppler runs along equal range
-_CORRECTIONS = 3  # of each pixel's range sum
-_BLOCK = 1 << 14  # pixels corrected at once
-_PULSES_PER_CELL, _LARGE_CELLS = 4, 128  # a response repeats after as many cells as there are pulses
+_GRID_STRIDE_PIXELS = 4  # in a step along a line; a cubic interpolates between steps
+_MAX_STRETCH_FACTOR = 4.0  # length of a pixel over its spacing, where Doppler hardly changes along a line
+_PATH_SAMPLES = 65  # slow times of the paths that show how far the line of sight turns
+_ONE_WAY_FRACTION = 0.99  # of the range of Doppler that the ends of the aperture span unless Doppler turns back
+_MAX_SLANT_RATIO = 60.0  # length of the step from line to line over its shortest: equal Doppler along equal range
+_CORRECTION_STEPS = 3  # of Newton's method for each pixel's range sum
+_BLOCK_PIXELS_COUNT = 1 << 14  # corrected at once
+_PULSES_PER_CELL, _LARGE_PATCH_CELLS = 4, 128  # a response repeats after as many cells as there are pulses
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,9 +68,10 @@ class RangeLines:
     may bend around a platform.
 
     Where the line of sight turns so far that Doppler turns back, as on a full circle, no range sums of three moments
-    say where a point is: there pixels lie along straight lines, and sample the whole wave-number support.
+    locate a point: there pixels lie along straight lines, and sample the full wave-number support.
 
-    Both platforms are where they were measured at an odd number of times, evenly over the aperture, (times, 3). [m]
+    `transmitter` and `receiver` are the measured positions at an odd number of times, evenly over the aperture,
+    (times, 3). [m]
     """
 
     transmitter: Floats
@@ -84,7 +88,7 @@ class RangeLines:
         return sums[..., 0, :], sums[..., 1, :], sums[..., 2, :]
 
     def _gradients(self, points: Floats, times: slice | NDArray[np.intp]) -> Floats:
-        """Gradients of the range sum at some of the times, at points (..., 2): (..., times, 2)."""
+        """Gradients of the range sum at a selection of the times, at points (..., 2): (..., times, 2)."""
         sums: Floats = np.zeros(1)
         for platform in (self.transmitter[times], self.receiver[times]):
             ground = points[..., None, :] - platform[:, :2]
@@ -95,32 +99,32 @@ class RangeLines:
     @property
     def turns_back(self) -> bool:
         """Whether Doppler turns back along the line of equal range through the scene centre."""
-        every = self._gradients(np.zeros(2), slice(None))
-        along = every @ _left(every[len(every) // 2])
-        return bool(abs(along[-1] - along[0]) < _ONE_WAY * np.ptp(along))
+        gradients = self._gradients(np.zeros(2), slice(None))
+        along = gradients @ _left(gradients[len(gradients) // 2])
+        return bool(abs(along[-1] - along[0]) < _ONE_WAY_FRACTION * np.ptp(along))
 
     @staticmethod
     def _column(by_range: Floats, by_doppler: Floats) -> Floats:
-        """Way along equal Doppler on which the range sum grows by 1, at points (..., 2)."""
+        """Step along equal Doppler over which the range sum grows by 1, at points (..., 2)."""
         slant = _left(by_doppler)
         square, slope = _dot(by_range, by_range), _dot(by_range, slant)
-        # Across the lines of equal range instead where that would lead too far.
-        keeps = _dot(slant, slant) * square <= _SLANT**2 * slope**2
-        way: Floats = np.where(keeps, slant / np.where(keeps, slope, 1.0), by_range / square)
-        return way
+        # Where that step is too long, a step across the lines of equal range instead.
+        is_short = _dot(slant, slant) * square <= _MAX_SLANT_RATIO**2 * slope**2
+        step: Floats = np.where(is_short, slant / np.where(is_short, slope, 1.0), by_range / square)
+        return step
 
     def range_sum(self, points: Floats) -> Floats:
-        """At the midpoint, of ground points (..., 2 or 3), (...). [m]"""
+        """Range sum of ground points (..., 2 or 3) at the midpoint, (...). [m]"""
         return self._range_sum(points, [len(self.transmitter) // 2])
 
     def carrier(self, points: Floats) -> Floats:
-        """Range sum whose phase is taken out of images: at the midpoint, or where Doppler turns back its mean. [m]"""
+        """Range sum whose phase images leave out: at the midpoint, or the mean where Doppler turns back. [m]"""
         return self._range_sum(
             points, range(len(self.transmitter)) if self.turns_back else [len(self.transmitter) // 2]
         )
 
     def _range_sum(self, points: Floats, times: Sequence[int]) -> Floats:
-        """Mean over some of the times, of ground points (..., 2 or 3), (...). [m]"""
+        """Mean range sum of ground points (..., 2 or 3) over a selection of the times, (...). [m]"""
         total: Floats = np.zeros(points.shape[:-1])
         for x, y, z in (platform[time] for time in times for platform in (self.transmitter, self.receiver)):
             total += np.sqrt((points[..., 0] - x) ** 2 + (points[..., 1] - y) ** 2 + z**2)
@@ -140,13 +144,13 @@ class RangeLines:
     def cells(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
         """Resolution at a ground point: peak to first null across the lines of equal range, and along them. [m]
 
-        Where Doppler turns back they are the cells that sample the wave-number support.
+        Where Doppler turns back, these cells sample the wave-number support.
         """
-        place = np.asarray(centre, dtype=float)
+        ground_point = np.asarray(centre, dtype=float)
         if self.turns_back:
-            across, along = cells_of_support(self._gradients(place, slice(None)), self.axes(centre), radar)
+            across, along = cells_of_support(self._gradients(ground_point, slice(None)), self.axes(centre), radar)
             return float(across), float(along)
-        by_range, by_doppler = self.gradients(place)
+        by_range, by_doppler = self.gradients(ground_point)
         steepness, area = float(np.hypot(*by_range)), abs(float(by_doppler @ _left(by_range)))
         if not area:
             raise ValueError("range or Doppler does not change over the ground there: no image plane")
@@ -154,10 +158,10 @@ class RangeLines:
         return SPEED_OF_LIGHT / (radar.bandwidth * steepness), wavelength / (area / steepness)
 
     def sampled(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
-        """Cells for pixels to sample: those of `cells`, or finer ones across the lines. [m]
+        """Cells for pixels to sample: `cells`, or finer cells across the lines. [m]
 
-        Over a long aperture near a platform wavefronts bend: beside a point, along its column, it is out of focus
-        within less than a cell, and the spectrum there is wider than that of the bandwidth.
+        Over a long aperture near a platform, wavefronts bend: along its column a point is out of focus within less
+        than a cell, and the spectrum there is wider than the bandwidth.
         """
         across, along = self.cells(centre, radar)
         if self.turns_back:
@@ -165,16 +169,18 @@ class RangeLines:
         first, middle, last = self._sums(np.asarray(centre, dtype=float))
         column = self._column(middle, last - first) * float(np.hypot(*middle))  # by a metre across the lines
         wider = abs(float(((first + last) / 2 - middle) @ column)) * radar.center_frequency / SPEED_OF_LIGHT
-        return min(across, _WIDEST / (1 / across + wider)), along
+        return min(across, _MAX_SPECTRUM_CELLS / (1 / across + wider)), along
 
-    def offsets(self, places: Floats, centre: GroundVector, radar: Band) -> Floats:
+    def offsets(self, ground_points: Floats, centre: GroundVector, radar: Band) -> Floats:
         """Resolution cells from a ground point along x′ and y′, by range sum and by its change over the aperture.
 
-        Places (n, 2) give (n, 2).
+        Ground points (n, 2) give (n, 2).
         """
         if self.turns_back:
-            return np.asarray((places - np.asarray(centre)) @ self.axes(centre) / np.array(self.cells(centre, radar)))
-        points = np.concatenate(([centre], places))
+            return np.asarray(
+                (ground_points - np.asarray(centre)) @ self.axes(centre) / np.array(self.cells(centre, radar))
+            )
+        points = np.concatenate(([centre], ground_points))
         nearer, last, first = (self._range_sum(points, [time]) for time in (len(self.transmitter) // 2, -1, 0))
         turned = (1 if self.turns_left(centre) else -1) * (last - first)
         cells = (nearer[0] - nearer) * radar.bandwidth, (turned - turned[0]) * radar.center_frequency
@@ -183,11 +189,11 @@ class RangeLines:
     def baseband(self, points: Floats, wavelength_m: float) -> Complexes:
         """Phase that takes the `carrier` out of an image of points (..., 3).
 
-        What stays is the aperture's own spectrum. A backprojected image carries the phase of the range to each
-        pixel, which close to a platform is a chirp across the patch and hides the aperture from autofocus.
+        The image keeps the spectrum of the aperture. A backprojected image has the phase of the range to each pixel,
+        which close to a platform is a chirp across the patch and hides the aperture from autofocus.
         """
-        left = self.carrier(points) - self.carrier(np.zeros(2))
-        phase: Complexes = np.exp(-2j * math.pi / wavelength_m * left)
+        carrier_range = self.carrier(points) - self.carrier(np.zeros(2))
+        phase: Complexes = np.exp(-2j * math.pi / wavelength_m * carrier_range)
         return phase
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
@@ -217,30 +223,30 @@ class RangeLines:
         doppler_step = -spacing[1] * float(by_doppler @ _left(by_range)) / float(np.hypot(*by_range))
 
         def across(points: Floats) -> Floats:
-            """To the next line, along equal Doppler."""
+            """Step to the next line, along equal Doppler."""
             return range_step * self._column(*self.gradients(points))
 
         def along(points: Floats) -> Floats:
-            """To the next pixel of a line, by an equal step of Doppler; as long as may be where there is none."""
+            """Step to the next pixel of a line, by an equal change of Doppler, with a limited length."""
             g, d = self.gradients(points)
             tangent = -_left(g) / np.sqrt(_dot(g, g))
-            slope, longest = _dot(d, tangent), _STRETCH * spacing[1]
-            keeps = slope * longest / doppler_step > 1
-            return np.where(keeps, doppler_step / np.where(keeps, slope, 1.0), longest) * tangent
+            slope, longest = _dot(d, tangent), _MAX_STRETCH_FACTOR * spacing[1]
+            is_long_enough = slope * longest / doppler_step > 1
+            return np.where(is_long_enough, doppler_step / np.where(is_long_enough, slope, 1.0), longest) * tangent
 
         start = _followed(across, middle, nx)
         followed = np.moveaxis(_followed(along, start, ny), 0, 1)
-        wanted = self.range_sum(middle) + range_step * (np.arange(nx) - nx // 2)
+        range_sums = self.range_sum(middle) + range_step * (np.arange(nx) - nx // 2)
         grid = np.zeros((nx, ny, 3))
-        lines = max(1, _BLOCK // ny)
+        lines = max(1, _BLOCK_PIXELS_COUNT // ny)
         for top in range(0, nx, lines):
-            part = slice(top, top + lines)
-            points = followed[part]
-            for _ in range(_CORRECTIONS):
+            rows = slice(top, top + lines)
+            points = followed[rows]
+            for _ in range(_CORRECTION_STEPS):
                 g = self.gradients(points)[0]
-                off = (wanted[part, None] - self.range_sum(points)) / np.sum(g**2, axis=-1)
-                points = points + off[..., None] * g
-            grid[part, :, :2] = points
+                correction = (range_sums[rows, None] - self.range_sum(points)) / np.sum(g**2, axis=-1)
+                points = points + correction[..., None] * g
+            grid[rows, :, :2] = points
         return grid
 
 
@@ -262,13 +268,13 @@ class Chip(NamedTuple):
         return middle
 
     def within(self, cells: int) -> "Chip":
-        """The middle of the chip, so many resolution cells of y′ at most."""
+        """The middle of the chip, at most `cells` resolution cells along y′."""
         columns = 2 * round(cells * OVERSAMPLING / 2)
         start = self.image.shape[1] // 2 - columns // 2
         if start <= 0:
             return self
-        part = slice(start, start + columns)
-        return Chip(self.image[:, part], self.grid[:, part], self.spacing)
+        middle_columns = slice(start, start + columns)
+        return Chip(self.image[:, middle_columns], self.grid[:, middle_columns], self.spacing)
 
 
 class PointCollection:
@@ -284,7 +290,7 @@ class PointCollection:
         self.kernel = kernel_within(self.memory_limit)
         self.is_tapered = mission.simulation is not None and mission.simulation.window == "taylor"
         self._nodes = aperture_nodes(self.aperture_time)
-        self._kept: tuple[object, Floats, tuple[float, float]] | None = None
+        self._last_grid: tuple[object, Floats, tuple[float, float]] | None = None
 
     @property
     def range_cell(self) -> float:
@@ -292,17 +298,17 @@ class PointCollection:
         return SPEED_OF_LIGHT / self.radar.bandwidth
 
     def window(self, count: int) -> Floats:
-        """Weights over the aperture, or the band, at the centres of equal cells."""
+        """Weights over the aperture, or over the band, at the centres of `count` equal cells."""
         return taylor_window(count) if self.is_tapered else np.ones(count)
 
     def flight(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> Flight:
-        """Both platforms flown with errors; where the direct path is the clock, measured paths are in its error.
+        """Fly both platforms with errors. If the direct path is the clock, path errors are part of the clock error.
 
         Wideband vibration needs a generator.
         """
-        ways = direct_path_ways(self.geometry, slow_time) if self.has_direct_path else (None, None)
-        transmitter = path(self.geometry.transmitter, slow_time, errors.transmitter, rng, ways[0])
-        receiver = path(self.geometry.receiver, slow_time, errors.receiver, rng, ways[1])
+        metre_motions = direct_path_ways(self.geometry, slow_time) if self.has_direct_path else (None, None)
+        transmitter = path(self.geometry.transmitter, slow_time, errors.transmitter, rng, metre_motions[0])
+        receiver = path(self.geometry.receiver, slow_time, errors.receiver, rng, metre_motions[1])
         clock: Floats = np.asarray(np.polynomial.polynomial.polyval(slow_time, errors.clock), dtype=float)
         if errors.clock_course is not None:
             clock = clock + errors.clock_course.at(slow_time)
@@ -324,7 +330,7 @@ class PointCollection:
         frequencies: int,
         **noise: Any,
     ) -> PhaseHistory:
-        """Phase history of scatterers (n, 3) at so many frequencies over the band, under the window."""
+        """Phase history of scatterers (n, 3) at `frequencies` frequencies over the band, under the window."""
         frequency = self.radar.center_frequency + cell_centres(self.radar.bandwidth, frequencies)
         history = flight.record(scatterers, amplitudes, slow_time, frequency, **noise)
         if self.is_tapered:
@@ -340,13 +346,13 @@ class PointCollection:
             No ground point has the recorded range history.
         """
         flight = self.flight(errors.slow(), self._nodes)
-        transmitter, receiver = (one.seen_from(seen_from) for one in flight.paths)
+        transmitter, receiver = (path.seen_from(seen_from) for path in flight.paths)
         return exact_effect(self._nodes, transmitter, receiver, flight.seen, self.radar, self.aperture_time)
 
     def range_lines(self, errors: Errors) -> RangeLines:
-        """Lines of equal range by the measured paths, vibration left out: what a processor lays its grid by."""
-        times = np.linspace(-1.0, 1.0, _TIMES) * self.aperture_time / 2
-        return RangeLines(*(one.measured for one in self.flight(errors.smooth(), times).paths))
+        """Lines of equal range by the measured paths without vibration, along which a processor lays its grid."""
+        times = np.linspace(-1.0, 1.0, _PATH_SAMPLES) * self.aperture_time / 2
+        return RangeLines(*(path.measured for path in self.flight(errors.smooth(), times).paths))
 
     def chip(
         self,
@@ -371,8 +377,8 @@ class PointCollection:
         cells, range_cells : int
             Extent in resolution cells along y′ and x′; no range cells give the single line through the centre.
         is_reference : bool
-            The platforms flew as they were measured, by a perfect clock: what the image of the same processor
-            would be without error.
+            The platforms flew as they were measured, with a perfect clock. This is the image of the same processor
+            without error.
 
         Raises
         ------
@@ -395,46 +401,48 @@ class PointCollection:
         return Chip(image, grid, spacing)
 
     def pair(
-        self, errors: Errors, place: GroundVector, cells: int = CELLS, range_cells: int = RANGE_CELLS
+        self, errors: Errors, ground_point: GroundVector, cells: int = CELLS, range_cells: int = RANGE_CELLS
     ) -> tuple[Chip, Chip]:
-        """Image of errors around the place they move the point to, and of no error there: see `chip`."""
+        """Image with errors around the ground point to which they move the point, and the reference image there."""
         return (
-            self.chip(place, errors, cells=cells, range_cells=range_cells),
-            self.chip(place, errors, scatterer=place, cells=cells, range_cells=range_cells, is_reference=True),
+            self.chip(ground_point, errors, cells=cells, range_cells=range_cells),
+            self.chip(
+                ground_point, errors, scatterer=ground_point, cells=cells, range_cells=range_cells, is_reference=True
+            ),
         )
 
     def _grid(
         self, centre: GroundVector, errors: Errors, cells: int, range_cells: int
     ) -> tuple[Floats, tuple[float, float]]:
-        """Pixels of a chip and their spacing; the last one is kept, since images come in pairs."""
+        """Pixels of a chip and their spacing. The last grid is kept, since images come in pairs."""
         key = (centre, errors.smooth(), cells, range_cells)
-        if self._kept is None or self._kept[0] != key:
+        if self._last_grid is None or self._last_grid[0] != key:
             lines = self.range_lines(errors)
             cell = lines.sampled(centre, self.radar)
             finer = lines.cells(centre, self.radar)[0] / cell[0]
             self._require_room(cells, finer * range_cells)
             spacing = (cell[0] / OVERSAMPLING, cell[1] / OVERSAMPLING)
             shape = (max(1, 2 * round(finer * range_cells * OVERSAMPLING / 2)), 2 * round(cells * OVERSAMPLING / 2))
-            self._kept = (key, lines.grid(centre, spacing, shape), spacing)
-        return self._kept[1:]
+            self._last_grid = (key, lines.grid(centre, spacing, shape), spacing)
+        return self._last_grid[1:]
 
     def _frequencies(self, grid: Floats, flight: Flight, scatterer: GroundVector) -> int:
-        """How many keep a range profile from repeating within a patch: its range walk sets that."""
+        """Number of frequencies that keeps a range profile from repeating within a patch with its range walk."""
         farthest = 0.0
         point = np.array([*scatterer, 0.0])
         for pulse in (0, len(flight.clock) // 2, -1):
-            off = np.zeros(grid.shape[:-1])
-            if self.has_direct_path:  # takes out most of what a distant platform's error puts in
-                off -= SPEED_OF_LIGHT * flight.clock[pulse]
-            for one in flight.paths:
-                off += np.linalg.norm(grid - one.measured[pulse], axis=-1)
-                off -= np.linalg.norm(point - one.actual[pulse])
-            farthest = max(farthest, float(np.abs(off).max()))
+            range_difference = np.zeros(grid.shape[:-1])
+            if self.has_direct_path:  # cancels most of the error of a distant platform
+                range_difference -= SPEED_OF_LIGHT * flight.clock[pulse]
+            for flown in flight.paths:
+                range_difference += np.linalg.norm(grid - flown.measured[pulse], axis=-1)
+                range_difference -= np.linalg.norm(point - flown.actual[pulse])
+            farthest = max(farthest, float(np.abs(range_difference).max()))
         cells = 2 * farthest * self.radar.bandwidth / SPEED_OF_LIGHT
-        return max(_FREQUENCIES, 16 * math.ceil((cells + _FREQUENCIES / 2) / 16))
+        return max(_MIN_CHIP_FREQUENCIES, 16 * math.ceil((cells + _MIN_CHIP_FREQUENCIES / 2) / 16))
 
     def _require_room(self, cells: int, range_cells: float) -> None:
-        """Refuse a patch that aliases or is too large. More pulses than it takes would change nothing."""
+        """Refuse a patch that aliases or is too large. More pulses than it needs would not change its image."""
         if cells > MAX_CELLS:
             raise ValueError(f"a patch of {cells} resolution cells, at most {MAX_CELLS} are formed")
         if self.pulses is not None and self.pulses < 2 * cells:
@@ -443,10 +451,10 @@ class PointCollection:
                 f"and aliases below {2 * cells} pulses; omit the key to get what it takes"
             )
         pixels = max(1, round(range_cells * OVERSAMPLING)) * round(cells * OVERSAMPLING)
-        self._require_memory(pixels, pulses_for(cells), _FREQUENCIES)
+        self._require_memory(pixels, pulses_for(cells), _MIN_CHIP_FREQUENCIES)
 
     def _require_memory(self, pixels: int, pulses: int, frequencies: int) -> None:
-        """Refuse what is beyond the limit: forming an image and the one beside it, or reading both."""
+        """Refuse a pair of images if forming or reading it takes more memory than the limit."""
         forming = pulses * frequencies * _BYTES_PER_SAMPLE + bytes_held(self.kernel)
         reading = _BYTES_PER_CONTRIBUTION * min(pulses * pixels, 2 * CONTRIBUTIONS) + bytes_held("numpy")
         needed = pixels * _BYTES_PER_PIXEL + max(forming, reading)
@@ -458,31 +466,31 @@ class PointCollection:
 
 
 def pulses_for(cells: int) -> int:
-    """Pulses of an image; of a large patch half as many, its repeats being far enough away."""
-    return max(_PULSES_PER_CELL * min(cells, _LARGE_CELLS), _PULSES_PER_CELL // 2 * cells)
+    """Pulses of an image; half as many per cell for a large patch, whose repeats are far enough away."""
+    return max(_PULSES_PER_CELL * min(cells, _LARGE_PATCH_CELLS), _PULSES_PER_CELL // 2 * cells)
 
 
 def _followed(step: Callable[[Floats], Floats], start: Floats, count: int) -> Floats:
-    """Follow a field of steps both ways from points (..., 2), (count, ..., 2), the start at count // 2."""
+    """Follow a field of steps in both directions from points (..., 2): (count, ..., 2), the start at count // 2."""
     back = count // 2
-    way = np.array([-1.0, 1.0]).reshape(2, *[1] * start.ndim)
-    place = np.stack((start, start))
-    velocity = way * step(place)
-    pixels = [place[:1]]
-    within = (np.arange(1, _STRIDE + 1) / _STRIDE).reshape(-1, *[1] * place.ndim)
-    for _ in range(-(-back // _STRIDE)):
-        half = place + _STRIDE / 2 * velocity
-        ahead = place + _STRIDE * way * step(half)
-        slope = way * step(ahead)
-        pixels.append(_between(place, velocity, ahead, slope, within))
-        place, velocity = ahead, slope
-    out = np.concatenate(pixels[1:]) if back else np.empty((0, *place.shape))
-    return np.concatenate((out[:back, 0][::-1], pixels[0], out[: count - 1 - back, 1]))
+    direction = np.array([-1.0, 1.0]).reshape(2, *[1] * start.ndim)
+    points = np.stack((start, start))
+    velocity = direction * step(points)
+    pixels = [points[:1]]
+    fractions = (np.arange(1, _GRID_STRIDE_PIXELS + 1) / _GRID_STRIDE_PIXELS).reshape(-1, *[1] * points.ndim)
+    for _ in range(-(-back // _GRID_STRIDE_PIXELS)):
+        half = points + _GRID_STRIDE_PIXELS / 2 * velocity
+        ahead = points + _GRID_STRIDE_PIXELS * direction * step(half)
+        slope = direction * step(ahead)
+        pixels.append(_between(points, velocity, ahead, slope, fractions))
+        points, velocity = ahead, slope
+    outwards = np.concatenate(pixels[1:]) if back else np.empty((0, *points.shape))
+    return np.concatenate((outwards[:back, 0][::-1], pixels[0], outwards[: count - 1 - back, 1]))
 
 
 def _between(a: Floats, slope_a: Floats, b: Floats, slope_b: Floats, t: Floats) -> Floats:
     """Cubic through two points with their slopes per pixel."""
-    slope_a, slope_b = _STRIDE * slope_a, _STRIDE * slope_b
+    slope_a, slope_b = _GRID_STRIDE_PIXELS * slope_a, _GRID_STRIDE_PIXELS * slope_b
     s = 1 - t
     cubic: Floats = s * s * (1 + 2 * t) * a + t * t * (1 + 2 * s) * b + s * t * (s * slope_a - t * slope_b)
     return cubic
@@ -494,6 +502,6 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 
 def _left(vectors: Floats) -> Floats:
-    """Turned by a quarter, counter-clockwise."""
+    """Vectors turned by 90° counter-clockwise."""
     turned: Floats = vectors[..., ::-1] * np.array([-1.0, 1.0])
     return turned

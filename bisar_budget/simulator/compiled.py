@@ -1,10 +1,10 @@
 """Backprojection compiled by Numba, in parallel: needs the extra `fast`. Import it only where Numba may be missing.
 
-Profiles are refined to so many samples a range cell that a B-spline of two taps (linear) or four (cubic) reads
-them; its transform is known in closed form and divided out of the spectrum. On a lattice of pixels the range is
-exact at the middle of every 32 pixels of a line and expanded to fourth order along them; elsewhere it is exact
-at every pixel. Whole cycles and whole samples are split off in double precision or integers, so that single
-precision only ever holds fractions, wherever the scene and however short the wave.
+Profiles are refined until a B-spline of two taps (linear) or four (cubic) can read them. The transform of the spline
+is known in closed form, and the spectrum is divided by it. On a lattice of pixels the range is exact at the middle of
+every 32 pixels of a line and expanded to fourth order along them; elsewhere it is exact at every pixel. Whole cycles
+and whole samples are split off in double precision or integers, so that single precision holds only fractions, for
+any position of the scene and any wavelength.
 """
 
 import math
@@ -28,18 +28,18 @@ from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory
 
 Spline = Literal["linear", "cubic"]
 
-_LINE = 32  # pixels of one expansion; two or four vectors of a processor
-_RUN = 64  # pixels anywhere whose ranges are bounded together
-_ROWS = 16  # lines of one tile; what it needs of a pulse stays in a processor's first cache
-_OVERSAMPLING = 2  # of profiles from the FFT
-_TAPS = 8  # of the kernel that refines them: -140 dB at this oversampling
-_REFINEMENT = {"linear": 16, "cubic": 8}  # samples per sample from the FFT
-_ORDER = {"linear": 1, "cubic": 3}
-_MARGIN = 8  # samples beyond the last pixel on each side
-_BLOCK_BYTES = 24e6  # of profiles held at once; about what a processor's last cache holds
-_WORTH = 8  # samples refined for a pixel: in that time the kernel itself reads it
-_PHASE_LIMIT = 1e-6  # rad, of the first neglected order of the expansion
-_OFF_LATTICE = 1e-8  # wavelengths
+_SEGMENT_LENGTH = 32  # pixels in one expansion; two or four vectors of a processor
+_RUN_LENGTH = 64  # scattered pixels whose ranges are bounded together
+_TILE_ROWS = 16  # lines of one tile; the part of a pulse that a tile reads stays in a processor's first cache
+_FFT_OVERSAMPLING_FACTOR = 2  # of profiles from the FFT
+_KERNEL_SAMPLES = 8  # of the kernel that refines profiles: -140 dB at this oversampling
+_REFINEMENT_FACTORS = {"linear": 16, "cubic": 8}  # samples per sample from the FFT
+_SPLINE_ORDERS = {"linear": 1, "cubic": 3}
+_MARGIN_SAMPLES = 8  # samples beyond the last pixel on each side
+_BLOCK_BYTES = 24e6  # of profiles held at once, about the size of a processor's last cache
+_MAX_SAMPLES_PER_PIXEL = 8  # to refine more samples takes longer than to read the pixel with the kernel itself
+_MAX_NEGLECTED_RAD = 1e-6  # phase of the first neglected order of the expansion
+_LATTICE_TOLERANCE_FRACTION = 1e-8  # of a wavelength that a pixel may be off the lattice
 
 
 # Multiply-adds are rounded once; nothing is reordered, NaN and infinity stay what they are. Division by zero gives
@@ -48,7 +48,7 @@ _compiled = njit(cache=True, fastmath={"contract"}, error_model="numpy")
 _parallel = njit(cache=True, fastmath={"contract"}, error_model="numpy", parallel=True)
 _F = np.float32
 _I = np.int32
-_TURN = 2.0**32  # a whole cycle in 32 bits: integer arithmetic then drops whole cycles by itself
+_COUNTS_PER_CYCLE = 2.0**32  # a cycle in 32 bits, so that integer arithmetic drops whole cycles
 
 
 class Lattice(NamedTuple):
@@ -61,7 +61,7 @@ class Lattice(NamedTuple):
 
     def disc(self) -> tuple[Floats, float]:
         """Centre and radius of a disc that holds all pixels, lines filled up to whole segments. [m]"""
-        i, j = (self.shape[0] - 1) / 2, (-(-self.shape[1] // _LINE) * _LINE - 1) / 2
+        i, j = (self.shape[0] - 1) / 2, (-(-self.shape[1] // _SEGMENT_LENGTH) * _SEGMENT_LENGTH - 1) / 2
         centre = self.origin + i * self.across + j * self.along
         corners = (i * self.across + j * self.along, i * self.across - j * self.along)
         return centre, max(float(np.linalg.norm(corner)) for corner in corners)
@@ -75,12 +75,12 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
     points : (..., 3) ndarray
         [m]
     tolerance : float
-        How far a pixel may be off its place. [m]
+        Largest distance of a pixel from its place on the lattice. [m]
 
     Returns
     -------
     Lattice or None
-        Of points (n, 3) or (nx, ny, 3); None where they are something else.
+        Lattice of points (n, 3) or (nx, ny, 3); None if they are not evenly spaced.
     """
     if points.ndim not in (2, 3) or points.size == 0:
         return None
@@ -90,10 +90,10 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
     across = (grid[-1, 0] - origin) / max(1, lines - 1)
     along = (grid[0, -1] - origin) / max(1, count - 1)
     first = origin + np.arange(count)[:, None] * along
-    for top in range(0, lines, _ROWS):  # a few at a time: no second copy of the grid
-        part = grid[top : top + _ROWS]
-        line = np.arange(top, top + part.shape[0])[:, None, None]
-        if not np.abs(part - first - line * across).max() <= tolerance:
+    for top in range(0, lines, _TILE_ROWS):  # a few at a time: no second copy of the grid
+        rows = grid[top : top + _TILE_ROWS]
+        line = np.arange(top, top + rows.shape[0])[:, None, None]
+        if not np.abs(rows - first - line * across).max() <= tolerance:
             return None
     return Lattice(origin, across, along, (lines, count))
 
@@ -108,32 +108,34 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
     points : (..., 3) ndarray
         Pixels, anywhere; fastest on a lattice. [m]
     spline : "linear" or "cubic"
-        What reads the profiles.
+        Spline that reads the profiles.
 
     Returns
     -------
     (...) ndarray or None
-        Complex image. None where pixels are so few and so far apart in range that to refine what lies between them
-        takes longer than to read them one by one, or more memory than a block has.
+        Complex image. None if pixels are so few and so far apart in range that refining the profiles between them
+        takes longer than reading the pixels one by one, or more memory than a block has.
     """
     shape = points.shape[:-1]
     image = np.zeros(shape, dtype=complex)
     if not image.size or not history.samples.size:
         return image
-    lattice = lattice_of(points, _OFF_LATTICE * SPEED_OF_LIGHT / float(history.frequency.max()))
+    lattice = lattice_of(points, _LATTICE_TOLERANCE_FRACTION * SPEED_OF_LIGHT / float(history.frequency.max()))
     if lattice is not None and lattice.shape[0] > lattice.shape[1]:
         origin, across, along, (lines, count) = lattice  # long lines fill whole segments
         lattice = Lattice(origin, along, across, (count, lines))
         shape = shape[::-1]
     within = None
-    if lattice is not None and _neglected_phase(history, lattice) < _PHASE_LIMIT:
+    if lattice is not None and _neglected_phase(history, lattice) < _MAX_NEGLECTED_RAD:
         centre, radius = lattice.disc()
         middle = np.linalg.norm(history.transmitter - centre, axis=1)
         middle = middle + np.linalg.norm(history.receiver - centre, axis=1)
         # Neither leg's range changes faster than the pixel moves.
         within = _needed(history, middle - 2 * radius, middle + 2 * radius, image.size)
     if lattice is not None and within is not None:
-        padded = np.zeros((lattice.shape[0], -(-lattice.shape[1] // _LINE) * _LINE), dtype=complex)
+        padded = np.zeros(
+            (lattice.shape[0], -(-lattice.shape[1] // _SEGMENT_LENGTH) * _SEGMENT_LENGTH), dtype=complex
+        )
         for block in _profile_blocks(history, within, spline):
             _add_lattice(*block, lattice.origin, lattice.across, lattice.along, spline == "cubic", padded)
         image = padded[:, : lattice.shape[1]].reshape(shape)
@@ -157,7 +159,7 @@ def _neglected_phase(history: PhaseHistory, lattice: Lattice) -> float:
     In units of the distance, |r + x e| has the coefficients (P_{n-2} - P_n)/(2n - 1), P Legendre polynomials.
     """
     centre, radius = lattice.disc()
-    half = _LINE / 2 * float(np.linalg.norm(lattice.along))
+    half = _SEGMENT_LENGTH / 2 * float(np.linalg.norm(lattice.along))
     total = 0.0
     for positions in (history.transmitter, history.receiver):
         nearest = float(np.linalg.norm(positions - centre, axis=1).min()) - radius
@@ -168,10 +170,10 @@ def _neglected_phase(history: PhaseHistory, lattice: Lattice) -> float:
 
 
 class _Block(NamedTuple):
-    """Refined profiles of some pulses, two floats to an integer, and what it takes to read them."""
+    """Refined profiles of a block of pulses, two floats to an integer, and the numbers needed to read them."""
 
     profiles: np.ndarray[tuple[int, int], np.dtype[np.int64]]
-    first: Floats  # place of each profile's first sample, in samples
+    first: Floats  # position of each profile's first sample, in samples
     transmitter: Floats
     receiver: Floats
     reference: Floats
@@ -180,23 +182,28 @@ class _Block(NamedTuple):
 
 
 class _Needed(NamedTuple):
-    """Part of each profile that some pixels read: its first sample, (pulses,), and how many."""
+    """Part of each profile that pixels read: its first sample, (pulses,), and the number of samples."""
 
     first: np.ndarray[tuple[int], np.dtype[np.int64]]
     samples: int
 
 
 def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats, pixels: int) -> _Needed | None:
-    """Samples that pixels between two range sums, (pulses,) [m], can need; None if too many for so few pixels.
+    """Samples that pixels between two range sums, (pulses,) [m], can read; None if too many for the pixels.
 
-    A profile repeats: where more is needed than it has, repeats are laid out.
+    A profile repeats: if more samples are needed than it has, they are repeats.
     """
-    length = profile_length(history, _OVERSAMPLING)
+    length = profile_length(history, _FFT_OVERSAMPLING_FACTOR)
     per_metre = cells_per_metre(history, length)
-    count = float((farthest - nearest).max()) * per_metre + 2 * _MARGIN + 1
-    if count > max(length + 4 * _MARGIN, min(_WORTH * pixels, _BLOCK_BYTES / (8 * max(_REFINEMENT.values())))):
+    count = float((farthest - nearest).max()) * per_metre + 2 * _MARGIN_SAMPLES + 1
+    if count > max(
+        length + 4 * _MARGIN_SAMPLES,
+        min(_MAX_SAMPLES_PER_PIXEL * pixels, _BLOCK_BYTES / (8 * max(_REFINEMENT_FACTORS.values()))),
+    ):
         return None
-    return _Needed(np.floor((nearest - _reference(history)) * per_metre).astype(np.int64) - _MARGIN, int(count))
+    return _Needed(
+        np.floor((nearest - _reference(history)) * per_metre).astype(np.int64) - _MARGIN_SAMPLES, int(count)
+    )
 
 
 def _reference(history: PhaseHistory) -> Floats:
@@ -208,52 +215,58 @@ def _reference(history: PhaseHistory) -> Floats:
 
 
 def _kernel(offset: Floats) -> Floats:
-    """Exponential of a semicircle over ±_TAPS/2 cells, 1 at the centre.
+    """Exponential of a semicircle over ±_KERNEL_SAMPLES/2 cells, 1 at the centre.
 
     Source: Barnett, Magland & af Klinteberg, "A parallel non-uniform fast Fourier transform library based on an
     'exponential of semicircle' kernel", 2019; the shape parameter is theirs for the oversampling.
     """
-    shape = 0.976 * math.pi * _TAPS * (1 - 1 / (2 * _OVERSAMPLING))
-    return np.exp(shape * (np.sqrt(np.clip(1 - (2 * offset / _TAPS) ** 2, 0.0, None)) - 1))
+    shape = 0.976 * math.pi * _KERNEL_SAMPLES * (1 - 1 / (2 * _FFT_OVERSAMPLING_FACTOR))
+    return np.exp(shape * (np.sqrt(np.clip(1 - (2 * offset / _KERNEL_SAMPLES) ** 2, 0.0, None)) - 1))
 
 
 def _kernel_transform(angle: Floats) -> Floats:
     """Fourier transform of the kernel at an angular frequency per cell, by Gauss-Legendre quadrature."""
     nodes, weights = np.polynomial.legendre.leggauss(64)
-    offset = nodes * _TAPS / 2
-    transform: Floats = np.cos(np.outer(angle, offset)) @ (weights * _kernel(offset)) * _TAPS / 2
+    offset = nodes * _KERNEL_SAMPLES / 2
+    transform: Floats = np.cos(np.outer(angle, offset)) @ (weights * _kernel(offset)) * _KERNEL_SAMPLES / 2
     return transform
 
 
 def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> Iterator[_Block]:
-    """Take from each profile what is needed, and refine that.
+    """Refine the needed part of each profile, for blocks of as many pulses as fit in a cache.
 
-    As many pulses as fit in a cache. Patches follow resolution cells, which may be a hundred times longer than wide:
-    what a ball around one would need is not what its pixels need.
+    Patches follow resolution cells, which may be a hundred times longer than wide: the pixels of a patch need fewer
+    samples than a ball around the patch.
     """
-    length, factor, order = profile_length(history, _OVERSAMPLING), _REFINEMENT[spline], _ORDER[spline]
+    length, factor, order = (
+        profile_length(history, _FFT_OVERSAMPLING_FACTOR),
+        _REFINEMENT_FACTORS[spline],
+        _SPLINE_ORDERS[spline],
+    )
     coarse = cells_per_metre(history, length)
     harmonic = harmonics(history)
     transform = _kernel_transform(2 * math.pi * harmonic / length)
     transform = transform * np.sinc(harmonic / (length * factor)) ** (order + 1)
-    # Weights of the taps for each of the places between two samples.
-    offset = np.arange(factor) / factor - (np.arange(_TAPS)[:, None] - _TAPS // 2 + 1)
+    # Weights of the taps for each of the positions between two samples.
+    offset = np.arange(factor) / factor - (np.arange(_KERNEL_SAMPLES)[:, None] - _KERNEL_SAMPLES // 2 + 1)
     weights = _kernel(offset).astype(np.float32)
     reference = _reference(history)
     first, count = needed
     pulses = min(history.slow_time.size, max(1, int(_BLOCK_BYTES / (8 * count * factor + PROFILE_BYTES * length))))
-    room = np.empty((pulses, 2 * count * factor), dtype=np.float32)  # of every block: read before the next is made
+    buffer = np.empty(
+        (pulses, 2 * count * factor), dtype=np.float32
+    )  # shared by all blocks: a block is read before the next is made
     for start in range(0, history.slow_time.size, pulses):
-        part = slice(start, start + pulses)
-        profiles = range_profiles(history, length, transform, part)
-        refined = room[: profiles.shape[0]]
-        _refine(profiles, first[part], weights, refined)
+        pulse_block = slice(start, start + pulses)
+        profiles = range_profiles(history, length, transform, pulse_block)
+        refined = buffer[: profiles.shape[0]]
+        _refine(profiles, first[pulse_block], weights, refined)
         yield _Block(
             refined.view(np.int64),
-            first[part].astype(np.float64) * factor,
-            history.transmitter[part],
-            history.receiver[part],
-            reference[part],
+            first[pulse_block].astype(np.float64) * factor,
+            history.transmitter[pulse_block],
+            history.receiver[pulse_block],
+            reference[pulse_block],
             coarse * factor,
             carrier_frequency(history) / SPEED_OF_LIGHT,
         )
@@ -261,22 +274,22 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> I
 
 @_parallel
 def _refine(profiles, first, weights, refined):
-    """Samples between the samples, as real and imaginary parts; profiles repeat."""
+    """Interpolate between the samples of repeating profiles, into real and imaginary parts."""
     length, factor = profiles.shape[1], weights.shape[1]
     count = refined.shape[1] // (2 * factor)
     for pulse in prange(profiles.shape[0]):
-        real, imag = np.empty(count + _TAPS, np.float32), np.empty(count + _TAPS, np.float32)
-        for n in range(count + _TAPS):
-            sample = profiles[pulse, (first[pulse] + n - _TAPS // 2 + 1) % length]
+        real, imag = np.empty(count + _KERNEL_SAMPLES, np.float32), np.empty(count + _KERNEL_SAMPLES, np.float32)
+        for n in range(count + _KERNEL_SAMPLES):
+            sample = profiles[pulse, (first[pulse] + n - _KERNEL_SAMPLES // 2 + 1) % length]
             real[n], imag[n] = _F(sample.real), _F(sample.imag)
         for n in range(count):
-            for place in range(factor):
+            for position in range(factor):
                 re = im = _F(0)
-                for tap in range(_TAPS):
-                    re += real[n + tap] * weights[tap, place]
-                    im += imag[n + tap] * weights[tap, place]
-                refined[pulse, 2 * (n * factor + place)] = re
-                refined[pulse, 2 * (n * factor + place) + 1] = im
+                for tap in range(_KERNEL_SAMPLES):
+                    re += real[n + tap] * weights[tap, position]
+                    im += imag[n + tap] * weights[tap, position]
+                refined[pulse, 2 * (n * factor + position)] = re
+                refined[pulse, 2 * (n * factor + position) + 1] = im
 
 
 # Half a turn's sine over its angle and cosine, as polynomials of the squared angle in cycles, a bit beyond ±½.
@@ -320,7 +333,7 @@ def _expand(middle, platform, along, ranges):
 
 @_compiled
 def _split(ranges, per_metre, first, cycles, whole, fraction, turn, order):
-    """Take whole samples and whole cycles off, in double precision."""
+    """Split off whole samples and whole cycles, in double precision."""
     for i in range(ranges.shape[1]):
         cell, step = ranges[0, i] * per_metre - first, ranges[1, i] * per_metre
         whole[0, i], whole[1, i] = _I(np.floor(cell)), _I(np.rint(step))
@@ -328,55 +341,55 @@ def _split(ranges, per_metre, first, cycles, whole, fraction, turn, order):
     for n in range(3):
         for i in range(ranges.shape[1]):
             c = ranges[n, i] * cycles
-            turn[n, i] = _I(np.int64((c - np.rint(c)) * _TURN))
+            turn[n, i] = _I(np.int64((c - np.rint(c)) * _COUNTS_PER_CYCLE))
             order[n, i] = _F(ranges[n + 2, i] * cycles)
 
 
-# Each of the loops below takes a whole tile: calls, and the counting of references to arrays, would cost a third
-# of the time if made line by line.
+# Each of the loops below works on a full tile: line by line, calls and the counting of references to arrays would
+# cost a third of the time.
 
 
 @_compiled
 def _places(whole, fraction, turn, order, cells_per_cycle, index, between, cycles):
-    """Sample before each pixel, how far beyond it the pixel is, and the carrier's cycles there.
+    """Sample before each pixel, distance of the pixel from that sample, and cycles of the carrier at the pixel.
 
     Cycles are in integers up to second order, in fractions of a cycle beyond.
     """
     for i in range(between.shape[0]):
-        base, step, place, slope = whole[0, i], whole[1, i], fraction[0, i], fraction[1, i]
+        base, step, start, slope = whole[0, i], whole[1, i], fraction[0, i], fraction[1, i]
         c0, c1, c2 = turn[0, i], turn[1, i], turn[2, i]
         p2, p3, p4 = order[0, i], order[1, i], order[2, i]
-        for j in range(_LINE):
-            k = _I(j - _LINE // 2)
+        for j in range(_SEGMENT_LENGTH):
+            k = _I(j - _SEGMENT_LENGTH // 2)
             x = _F(k)
             bend = x * x * (p2 + x * (p3 + x * p4))
-            t = place + x * slope + cells_per_cycle * bend
+            t = start + x * slope + cells_per_cycle * bend
             floor = np.floor(t)
             between[i, j] = t - floor
             index[i, j] = _I(base + k * step + _I(floor))
             turned = _I(c0 + k * _I(c1 + k * c2))
-            cycles[i, j] = _F(turned) * _F(1 / _TURN) + x * x * x * (p3 + x * p4)
+            cycles[i, j] = _F(turned) * _F(1 / _COUNTS_PER_CYCLE) + x * x * x * (p3 + x * p4)
 
 
 @_compiled
 def _cubic(v):
-    """Weights of the cubic B-spline for the samples -1, 0, 1, 2 around a place v in 0 … 1."""
+    """Weights of the cubic B-spline for the samples -1, 0, 1, 2 around a position v in 0 … 1."""
     u = _F(1) - v
     w0, w3 = u * u * u * _F(1 / 6), v * v * v * _F(1 / 6)
     w1 = _F(2 / 3) - v * v * (_F(1) - _F(0.5) * v)
     return w0, w1, _F(1) - w0 - w1 - w3, w3
 
 
-# A loop of its own: next to arithmetic, loads from anywhere would keep that from being vectorised. Neighbours are
-# read before any is written, so that they are read at once.
+# A separate loop: scattered loads next to arithmetic would keep the arithmetic from being vectorised. Neighbours are
+# read before the first is written, so that they are read at once.
 
 
 @_compiled
 def _fetch(profile, index, cubic, fetched):
-    """Taps of each pixel, two or four."""
+    """Fetch the taps of each pixel, two or four."""
     for i in range(index.shape[0]):
         if cubic:
-            for j in range(_LINE):
+            for j in range(_SEGMENT_LENGTH):
                 n = np.uint64(np.uint32(index[i, j] - _I(1)))
                 s0, s1 = profile[n], profile[n + np.uint64(1)]
                 s2, s3 = profile[n + np.uint64(2)], profile[n + np.uint64(3)]
@@ -387,7 +400,7 @@ def _fetch(profile, index, cubic, fetched):
                     s3,
                 )
         else:
-            for j in range(_LINE):
+            for j in range(_SEGMENT_LENGTH):
                 n = np.uint64(np.uint32(index[i, j]))
                 s0, s1 = profile[n], profile[n + np.uint64(1)]
                 fetched[i, 2 * j], fetched[i, 2 * j + 1] = s0, s1
@@ -395,10 +408,10 @@ def _fetch(profile, index, cubic, fetched):
 
 @_compiled
 def _add_taps(taps, between, cycles, cubic, real, imag):
-    """B-spline times the carrier."""
+    """Add the value of the B-spline times the carrier."""
     for i in range(real.shape[0]):
         if cubic:
-            for j in range(_LINE):
+            for j in range(_SEGMENT_LENGTH):
                 cosine, sine = _phasor(cycles[i, j])
                 w0, w1, w2, w3 = _cubic(between[i, j])
                 t = 8 * j
@@ -407,7 +420,7 @@ def _add_taps(taps, between, cycles, cubic, real, imag):
                 real[i, j] += re * cosine - im * sine
                 imag[i, j] += re * sine + im * cosine
         else:
-            for j in range(_LINE):
+            for j in range(_SEGMENT_LENGTH):
                 cosine, sine = _phasor(cycles[i, j])
                 v = between[i, j]
                 re = taps[i, 4 * j] + v * (taps[i, 4 * j + 2] - taps[i, 4 * j])
@@ -420,24 +433,26 @@ def _add_taps(taps, between, cycles, cubic, real, imag):
 def _add_lattice(
     profiles, first, transmitter, receiver, reference, per_metre, cycles, origin, across, along, cubic, image
 ):
-    """Add some pulses to the pixels of a lattice, in tiles of segments of lines."""
-    segments = image.shape[1] // _LINE
-    groups = (image.shape[0] + _ROWS - 1) // _ROWS
+    """Add a block of pulses to the pixels of a lattice, in tiles of segments of lines."""
+    segments = image.shape[1] // _SEGMENT_LENGTH
+    groups = (image.shape[0] + _TILE_ROWS - 1) // _TILE_ROWS
     cells_per_cycle = _F(per_metre / cycles)
     for tile in prange(segments * groups):
-        top, left = tile // segments * _ROWS, tile % segments * _LINE
-        rows = min(_ROWS, image.shape[0] - top)
-        real, imag = np.zeros((rows, _LINE), np.float32), np.zeros((rows, _LINE), np.float32)
-        index, between = np.empty((rows, _LINE), np.int32), np.empty((rows, _LINE), np.float32)
-        carrier = np.empty((rows, _LINE), np.float32)
-        fetched = np.empty((rows, (4 if cubic else 2) * _LINE), np.int64)
+        top, left = tile // segments * _TILE_ROWS, tile % segments * _SEGMENT_LENGTH
+        rows = min(_TILE_ROWS, image.shape[0] - top)
+        real, imag = np.zeros((rows, _SEGMENT_LENGTH), np.float32), np.zeros((rows, _SEGMENT_LENGTH), np.float32)
+        index, between = np.empty((rows, _SEGMENT_LENGTH), np.int32), np.empty((rows, _SEGMENT_LENGTH), np.float32)
+        carrier = np.empty((rows, _SEGMENT_LENGTH), np.float32)
+        fetched = np.empty((rows, (4 if cubic else 2) * _SEGMENT_LENGTH), np.int64)
         taps = fetched.view(np.float32)
         whole, fraction = np.empty((2, rows), np.int32), np.empty((2, rows), np.float32)
         turn, order = np.empty((3, rows), np.int32), np.empty((3, rows), np.float32)
         middle, ranges = np.empty((3, rows)), np.empty((5, rows))
         for axis in range(3):
             for i in range(rows):
-                middle[axis, i] = origin[axis] + (top + i) * across[axis] + (left + _LINE // 2) * along[axis]
+                middle[axis, i] = (
+                    origin[axis] + (top + i) * across[axis] + (left + _SEGMENT_LENGTH // 2) * along[axis]
+                )
         for pulse in range(profiles.shape[0]):
             ranges[0] = -reference[pulse]
             ranges[1:] = 0.0
@@ -448,13 +463,13 @@ def _add_lattice(
             _fetch(profiles[pulse], index, cubic, fetched)
             _add_taps(taps, between, carrier, cubic, real, imag)
         for i in range(rows):
-            for j in range(_LINE):
+            for j in range(_SEGMENT_LENGTH):
                 image[top + i, left + j] += complex(real[i, j], imag[i, j])
 
 
 @_compiled
 def _sums(points, transmitter, receiver, reference, sums):
-    """Range sum of each pixel less a pulse's reference."""
+    """Range sum of each pixel minus the reference of a pulse."""
     tx, ty, tz = transmitter[0], transmitter[1], transmitter[2]
     rx, ry, rz = receiver[0], receiver[1], receiver[2]
     for i in range(sums.shape[0]):
@@ -464,31 +479,31 @@ def _sums(points, transmitter, receiver, reference, sums):
 
 
 def _boxes(lines: Floats) -> tuple[Floats, Floats]:
-    """Boxes around runs of points (nx, ny, 3), along the way from the first to the last of each run.
+    """Boxes around runs of points (nx, ny, 3), along the direction from the first to the last point of each run.
 
-    What a patch reads of a profile follows from them in a few steps where its pixels would take as long as its image.
+    The boxes give the part of a profile that a patch reads in a few steps; the pixels would take as long as an image.
 
     Returns
     -------
     centres : (3, m) ndarray
         [m]
     halves : (m, 3, 3) ndarray
-        Half axes, one a row. [m]
+        Half axes as rows. [m]
     """
-    starts = np.arange(0, lines.shape[1], _RUN)
-    ends = np.minimum(starts + _RUN, lines.shape[1]) - 1
+    starts = np.arange(0, lines.shape[1], _RUN_LENGTH)
+    ends = np.minimum(starts + _RUN_LENGTH, lines.shape[1]) - 1
     along = (lines[:, ends, :2] - lines[:, starts, :2]).reshape(-1, 2)
     length = np.hypot(*along.T)
     cosine, sine = np.where(length > 0, along.T / np.where(length > 0, length, 1.0), [[1.0], [0.0]])
-    zero, one = np.zeros_like(cosine), np.ones_like(cosine)
-    axes = np.stack((cosine, sine, zero, -sine, cosine, zero, zero, zero, one), axis=-1).reshape(-1, 3, 3)
+    zero, ones = np.zeros_like(cosine), np.ones_like(cosine)
+    axes = np.stack((cosine, sine, zero, -sine, cosine, zero, zero, zero, ones), axis=-1).reshape(-1, 3, 3)
     centres, halves = np.zeros((3, axes.shape[0])), np.empty_like(axes)
     of_run = np.repeat(np.arange(starts.size), ends + 1 - starts)
     by_line = axes.reshape(lines.shape[0], starts.size, 3, 3)
     for axis in range(3):
-        place = np.einsum("lni,lni->ln", by_line[:, of_run, axis], lines)
-        least = np.minimum.reduceat(place, starts, axis=1).reshape(-1)
-        most = np.maximum.reduceat(place, starts, axis=1).reshape(-1)
+        projections = np.einsum("lni,lni->ln", by_line[:, of_run, axis], lines)
+        least = np.minimum.reduceat(projections, starts, axis=1).reshape(-1)
+        most = np.maximum.reduceat(projections, starts, axis=1).reshape(-1)
         centres += (least + most) / 2 * axes[:, axis].T
         halves[:, axis] = ((most - least) / 2)[:, None] * axes[:, axis]
     return centres, halves
@@ -496,7 +511,7 @@ def _boxes(lines: Floats) -> tuple[Floats, Floats]:
 
 @_compiled
 def _leg(position, box, centres):
-    """From a platform to the middle of a box: distance and direction; no direction without a distance."""
+    """Distance and direction from a platform to the middle of a box; the direction is 0 at distance 0."""
     x, y, z = centres[0, box] - position[0], centres[1, box] - position[1], centres[2, box] - position[2]
     distance = math.sqrt(x * x + y * y + z * z)
     scale = 1.0 / distance if distance > 0.0 else 0.0
@@ -505,13 +520,13 @@ def _leg(position, box, centres):
 
 @_compiled
 def _bend(distance, size):
-    """How far a distance may be above its tangent, so far from where it is touched."""
+    """Largest excess of a distance over its tangent, within `size` of the point of contact."""
     return min(size, size * size / (2.0 * (distance - size))) if distance > size else 2.0 * size
 
 
 @_parallel
 def _reach(transmitter, receiver, centres, halves):
-    """Bounds of the range sum at each pulse over boxes: it is convex, so above its tangent, and bends by r²/2R."""
+    """Bounds of the range sum at each pulse over boxes: convex, so above its tangent, with a bend of r²/2R."""
     nearest, farthest = np.empty(transmitter.shape[0]), np.empty(transmitter.shape[0])
     for pulse in prange(transmitter.shape[0]):
         low, high = np.inf, -np.inf
@@ -532,36 +547,38 @@ def _reach(transmitter, receiver, centres, halves):
 
 @_compiled
 def _split_points(sums, per_metre, first, cycles, index, between, turn):
-    """Sample before each pixel, how far beyond it the pixel is, and what is left of its cycles."""
+    """Sample before each pixel, distance of the pixel from that sample, and fraction of its cycles."""
     for i in range(index.shape[0]):
-        for j in range(_LINE):
-            cell = sums[i * _LINE + j] * per_metre - first
+        for j in range(_SEGMENT_LENGTH):
+            cell = sums[i * _SEGMENT_LENGTH + j] * per_metre - first
             before = np.floor(cell)
             index[i, j], between[i, j] = _I(before), _F(cell - before)
-            cycle = sums[i * _LINE + j] * cycles
+            cycle = sums[i * _SEGMENT_LENGTH + j] * cycles
             turn[i, j] = _F(cycle - np.rint(cycle))
 
 
 @_parallel
 def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cycles, points, cubic, image):
-    """Add some pulses to pixels anywhere, (3, n), each at its own exact range."""
-    for tile in prange((image.shape[0] + _ROWS * _LINE - 1) // (_ROWS * _LINE)):
-        start = tile * _ROWS * _LINE
-        count = min(_ROWS * _LINE, image.shape[0] - start)
-        rows = (count + _LINE - 1) // _LINE
-        some = np.empty((3, rows * _LINE))
+    """Add a block of pulses to scattered pixels, (3, n), each at its exact range."""
+    for tile in prange((image.shape[0] + _TILE_ROWS * _SEGMENT_LENGTH - 1) // (_TILE_ROWS * _SEGMENT_LENGTH)):
+        start = tile * _TILE_ROWS * _SEGMENT_LENGTH
+        count = min(_TILE_ROWS * _SEGMENT_LENGTH, image.shape[0] - start)
+        rows = (count + _SEGMENT_LENGTH - 1) // _SEGMENT_LENGTH
+        tile_points = np.empty((3, rows * _SEGMENT_LENGTH))
         for axis in range(3):
-            some[axis, :count] = points[axis, start : start + count]
-            some[axis, count:] = points[axis, start + count - 1]
-        sums, index = np.empty(rows * _LINE), np.empty((rows, _LINE), np.int32)
-        between, turn = np.empty((rows, _LINE), np.float32), np.empty((rows, _LINE), np.float32)
-        fetched = np.empty((rows, (4 if cubic else 2) * _LINE), np.int64)
+            tile_points[axis, :count] = points[axis, start : start + count]
+            tile_points[axis, count:] = points[axis, start + count - 1]
+        sums, index = np.empty(rows * _SEGMENT_LENGTH), np.empty((rows, _SEGMENT_LENGTH), np.int32)
+        between, turn = np.empty((rows, _SEGMENT_LENGTH), np.float32), np.empty((rows, _SEGMENT_LENGTH), np.float32)
+        fetched = np.empty((rows, (4 if cubic else 2) * _SEGMENT_LENGTH), np.int64)
         taps = fetched.view(np.float32)
-        real, imag = np.zeros((rows, _LINE), np.float32), np.zeros((rows, _LINE), np.float32)
+        real, imag = np.zeros((rows, _SEGMENT_LENGTH), np.float32), np.zeros((rows, _SEGMENT_LENGTH), np.float32)
         for pulse in range(profiles.shape[0]):
-            _sums(some, transmitter[pulse], receiver[pulse], reference[pulse], sums)
+            _sums(tile_points, transmitter[pulse], receiver[pulse], reference[pulse], sums)
             _split_points(sums, per_metre, first[pulse], cycles, index, between, turn)
             _fetch(profiles[pulse], index, cubic, fetched)
             _add_taps(taps, between, turn, cubic, real, imag)
         for i in range(count):
-            image[start + i] += complex(real[i // _LINE, i % _LINE], imag[i // _LINE, i % _LINE])
+            image[start + i] += complex(
+                real[i // _SEGMENT_LENGTH, i % _SEGMENT_LENGTH], imag[i // _SEGMENT_LENGTH, i % _SEGMENT_LENGTH]
+            )

@@ -1,6 +1,6 @@
 """Image formation in the far field, plane waves for ranges: the filter (7), (12), and the polar format (13), (14).
 
-Both defocus and displace what lies away from the scene centre; that is the approximation (5), not the code.
+Both defocus and displace points away from the scene centre. That is the effect of the approximation (5).
 """
 
 import math
@@ -17,10 +17,10 @@ from bisar_budget.simulator.image_formation import direct_sum
 from bisar_budget.simulator.impulse_response import lagrange_weight
 from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory, look_sum
 
-_TOLERANCE = 1e-8  # asked of the non-uniform FFT
-_FINE, _BESIDE = 2, 10  # samples per cell of the grid of a non-uniform FFT, along each axis; cells beyond the box
-_LARGEST_GRID = 1 << 22  # of those samples, some 40 bytes each
-_STENCIL = 12  # samples per interpolation
+_NUFFT_ERROR_FRACTION = 1e-8  # of the non-uniform FFT
+_SAMPLES_PER_GRID_CELL, _GRID_MARGIN_CELLS = 2, 10  # of the grid of a non-uniform FFT, along each axis
+_MAX_GRID_SAMPLES = 1 << 22  # samples of some 40 bytes each
+_STENCIL_SAMPLES = 12  # per interpolation
 
 
 def far_field_filter(
@@ -35,9 +35,9 @@ def far_field_filter(
     points : (..., 3) ndarray
         Pixels, anywhere. [m]
     method : "auto", "direct" or "nufft"
-        Direct is the sum as printed. NUFFT is finufft's (extra `fast`), the same numbers to -120 dB and much
-        faster on images; auto takes it where it is installed, but for points so far apart that its grid would not
-        fit into memory.
+        Direct is the sum as printed. NUFFT is by finufft (extra `fast`), gives the same numbers to -120 dB and is
+        much faster on images. Auto uses it if it is installed, except for points so far apart that its grid would
+        not fit into memory.
 
     Returns
     -------
@@ -70,15 +70,16 @@ def far_field_filter(
 
 @cache
 def is_nonuniform() -> bool:
-    """Whether finufft is there, for a non-uniform FFT."""
+    """Whether finufft is installed, for a non-uniform FFT."""
     return find_spec("finufft") is not None
 
 
 def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: bool) -> Complexes | None:
-    """Sum of (7) by a non-uniform FFT; None where it is `bounded` and its grid would be beyond all measure.
+    """Sum of (7) by a non-uniform FFT; None if it is `bounded` and its grid would be too large.
 
-    The grid holds the box around the points times that around the wavenumbers, each along the look direction and
-    across it: along other axes the box of a patch, whose cells may be kilometres wide, would be millions of cells.
+    The size of the grid is the box around the points times the box around the wavenumbers, each along and across the
+    look direction. Along different axes, the box of a patch, whose cells may be kilometres wide, would have millions
+    of cells.
     """
     import finufft
 
@@ -88,7 +89,7 @@ def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: 
     turn = np.array([[middle[0], -middle[1], 0.0], [middle[1], middle[0], 0.0], [0.0, 0.0, 1.0]])
     sight, points = sight @ turn, points @ turn
     height = points[0, 2]
-    if (points[:, 2] == height).all():  # one dimension less to spread over
+    if (points[:, 2] == height).all():  # a grid of two dimensions is enough
         samples = samples * np.exp(-1j * height * np.outer(sight[:, 2], wavenumber))
         axes, transform = 2, finufft.nufft2d3
     else:
@@ -96,9 +97,13 @@ def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: 
     sources = [np.outer(sight[:, axis], wavenumber).ravel() for axis in range(axes)]
     targets = [np.ascontiguousarray(points[:, axis]) for axis in range(axes)]
     cells = [float(np.ptp(k)) * float(np.ptp(x)) / (2 * math.pi) for k, x in zip(sources, targets, strict=True)]
-    if bounded and math.prod(_FINE * (one + _BESIDE) for one in cells) > _LARGEST_GRID:
+    if (
+        bounded
+        and math.prod(_SAMPLES_PER_GRID_CELL * (cell_count + _GRID_MARGIN_CELLS) for cell_count in cells)
+        > _MAX_GRID_SAMPLES
+    ):
         return None
-    image: Complexes = transform(*sources, samples.ravel(), *targets, isign=-1, eps=_TOLERANCE)
+    image: Complexes = transform(*sources, samples.ravel(), *targets, isign=-1, eps=_NUFFT_ERROR_FRACTION)
     return image / history.samples.size
 
 
@@ -119,8 +124,8 @@ def polar_format(
 ) -> PolarFormat:
     """Image by (14): samples interpolated to the rectangular grid (13) of the rotated frame, then an FFT.
 
-    The grid is the rectangle within what was recorded, so it trims the aperture's corners, the more the
-    larger the relative bandwidth and the squint. Its step is c/(2·size): the image repeats with its size.
+    The grid is a rectangle within the recorded frequencies, so it trims the aperture's corners, the more the larger
+    the relative bandwidth and the squint are. Its step is c/(2·size): the image repeats with its size.
 
     Parameters
     ----------
@@ -133,8 +138,8 @@ def polar_format(
     shape : (2,) int
         Pixels along x′ and y′; they are those of `ground_grid(centre, look_azimuth, size, shape)`.
     centre : (2,) float
-        Centre of the patch, east and north. The samples are brought there by plane waves before they are
-        interpolated: (14) at other pixels, and no closer to the ground than (5) is. [m]
+        Centre of the patch, east and north. The samples are moved to it by plane waves before they are interpolated:
+        this is (14) at other pixels, with the same approximation (5). [m]
 
     Returns
     -------
@@ -143,7 +148,7 @@ def polar_format(
     Raises
     ------
     ValueError
-        The line of sight does not turn steadily over the aperture, no rectangle fits into what was recorded,
+        The line of sight does not turn steadily over the aperture, no rectangle fits into the recorded frequencies,
         or pixels are coarser than its resolution.
     """
     cosine, sine = math.cos(look_azimuth), math.sin(look_azimuth)
@@ -155,14 +160,17 @@ def polar_format(
     turn = np.diff(slope)
     if (turn < 0).all():
         samples, along, slope = samples[::-1], along[::-1], slope[::-1]
-    elif slope.size < _STENCIL or not (turn > 0).all():
+    elif slope.size < _STENCIL_SAMPLES or not (turn > 0).all():
         raise ValueError(
-            f"polar format needs {_STENCIL} pulses or more ({slope.size} given), the line of sight turning one way"
+            f"polar format needs {_STENCIL_SAMPLES} pulses or more ({slope.size} given), the line of sight turning "
+            "one way"
         )
     low, high = float(history.frequency[0]), float(history.frequency[-1])
-    if history.frequency.size < _STENCIL or not (along > 0).all():
-        raise ValueError(f"polar format needs {_STENCIL} frequencies or more, and x′ pointing at the platforms")
-    # (13), f₀ projected. At a squint the projection of one frequency changes over the aperture.
+    if history.frequency.size < _STENCIL_SAMPLES or not (along > 0).all():
+        raise ValueError(
+            f"polar format needs {_STENCIL_SAMPLES} frequencies or more, and x′ pointing at the platforms"
+        )
+    # (13), f₀ projected. At a squint the projection of a frequency changes over the aperture.
     fx = _grid(low * along.max(), high * along.min(), SPEED_OF_LIGHT / (2 * size[0]))
     if not fx.size:
         raise ValueError(
@@ -187,25 +195,27 @@ def polar_format(
 
 
 def _grid(low: float, high: float, step: float) -> Floats:
-    """Multiples of a step within bounds: their FFT needs no carrier taken out."""
+    """Multiples of a step within bounds, whose FFT has no carrier."""
     first, last = math.ceil(low / step), math.floor(high / step)
     return np.arange(first, last + 1, dtype=float) * step
 
 
-def _interpolated(rows: Complexes, place: Floats) -> Complexes:
-    """Lagrange interpolation of evenly spaced samples, the stencil kept inside at the ends.
+def _interpolated(rows: Complexes, positions: Floats) -> Complexes:
+    """Lagrange interpolation of evenly spaced samples; at the ends the stencil stays inside.
 
     Parameters
     ----------
     rows : (rows, samples) ndarray
-        Sampled about twice as finely as they need, or better: scenes half as large as they could be.
-    place : (rows, places) ndarray
-        In samples.
+        Sampled at least about twice as finely as necessary: the scene is at most half as large as it could be.
+    positions : (rows, points) ndarray
+        Positions along the rows. [samples]
     """
-    first = np.clip(np.floor(place).astype(np.int64) - _STENCIL // 2 + 1, 0, rows.shape[1] - _STENCIL)
-    offset = place - first
+    first = np.clip(
+        np.floor(positions).astype(np.int64) - _STENCIL_SAMPLES // 2 + 1, 0, rows.shape[1] - _STENCIL_SAMPLES
+    )
+    offset = positions - first
     line = np.arange(rows.shape[0])[:, None]
-    total = np.zeros(place.shape, dtype=complex)
-    for tap in range(_STENCIL):
-        total += lagrange_weight(offset, tap, _STENCIL) * rows[line, first + tap]
+    total = np.zeros(positions.shape, dtype=complex)
+    for tap in range(_STENCIL_SAMPLES):
+        total += lagrange_weight(offset, tap, _STENCIL_SAMPLES) * rows[line, first + tap]
     return total

@@ -1,8 +1,8 @@
-"""Image formers under one roof: which pixels each one takes, where it puts a point, and its image at baseband.
+"""Image formers with the same methods: the pixels that each one takes, where it puts a point, its baseband image.
 
 A former by exact ranges, (4), puts a response at the displaced point itself and takes pixels along lines of equal
 range. One by plane waves, (7) to (14), puts it where plane waves have the recorded range history, and takes straight
-lines along the axes (x′, y′) of (10). Both have the same methods; places are east, north [m].
+lines along the axes (x′, y′) of (10). Ground points are east, north [m].
 """
 
 import math
@@ -23,13 +23,13 @@ from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory
 
 IMAGE_FORMERS = ("backprojection", "polar_format", "matched_filter", "far_field")
 
-_ORDER = 8  # of the polynomials through range histories
-_BLOCK = 1 << 18  # pixels formed between two words on the progress
-_TRIED, _TRIED_QUICKLY = 1 << 10, 1 << 15  # pixels of which the time is taken; of compiled kernels more
+_HISTORY_ORDER = 8  # of the polynomials through range histories
+_PROGRESS_PIXELS_COUNT = 1 << 18  # pixels formed between two calls of the progress
+_TRIAL_PIXELS, _COMPILED_TRIAL_PIXELS = 1 << 10, 1 << 15  # of a timed trial
 _SECONDS_PER_SAMPLE = 3e-6  # of polar format or a non-uniform FFT to 1e-8, one core of 2024
-_DIRECT_BYTES = 30e6  # what the sums over all pulses and frequencies hold of a block of pixels
+_DIRECT_BYTES = 30e6  # held by the sums over all pulses and frequencies for a block of pixels
 
-Told = Callable[[int], None]
+OnPixels = Callable[[int], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,16 +43,16 @@ class ExactRangeFormer:
 
     @property
     def bytes_held(self) -> float:
-        """Beside the images and the phase history. [B]"""
+        """Memory in addition to the images and the phase history. [B]"""
         return _DIRECT_BYTES if self.is_direct else bytes_held(self.kernel)
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
-        """Where it puts a point, given its displaced point and its differential range over slow time. [m]"""
+        """Ground point at which the image shows a point, from its displaced point and recorded range history. [m]"""
         return displaced
 
-    def left(self, place: GroundVector, left: Floats, recorded: Floats) -> Floats:
-        """The range history that is left at a place, given what exact ranges leave at the displaced point. [m]"""
-        return left
+    def remaining_range(self, ground_point: GroundVector, remaining_range: Floats, recorded: Floats) -> Floats:
+        """Remaining range history at a ground point, from that by exact ranges at the displaced point. [m]"""
+        return remaining_range
 
     def cells(self, centre: GroundVector) -> tuple[float, float]:
         """Resolution along x′ and y′, peak to first null. [m]"""
@@ -67,26 +67,28 @@ class ExactRangeFormer:
         towards: Floats = self.lines.axes(centre)[:, 0]
         return towards
 
-    def offsets(self, places: Floats, centre: GroundVector) -> Floats:
-        """Resolution cells from the centre along x′ and y′; places (n, 2) give (n, 2)."""
-        return self.lines.offsets(places, centre, self.radar)
+    def offsets(self, ground_points: Floats, centre: GroundVector) -> Floats:
+        """Resolution cells from the centre along x′ and y′; ground points (n, 2) give (n, 2)."""
+        return self.lines.offsets(ground_points, centre, self.radar)
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
         """Pixels of a patch along lines of equal range and of equal Doppler, (nx, ny, 3). [m]"""
         return self.lines.grid(centre, spacing, shape)
 
-    def image(self, history: PhaseHistory, grid: Floats, told: Told) -> Complexes:
+    def image(self, history: PhaseHistory, grid: Floats, on_pixels: OnPixels) -> Complexes:
         """Form the image at pixels (nx, ny, 3)."""
-        return _in_blocks(lambda part: self._formed(history, part), grid, told)
+        return _in_blocks(lambda block: self._formed(history, block), grid, on_pixels)
 
-    def seconds(self, some: PhaseHistory, pulses: int, grid: Floats) -> float:
-        """About how long an image of so many pulses takes, measured with some of them. [s]"""
+    def seconds(self, trial_history: PhaseHistory, pulses: int, grid: Floats) -> float:
+        """Approximate time to form an image of `pulses` pulses, measured with a trial of few pulses. [s]"""
         is_quick = not self.is_direct and self.kernel != "numpy"
-        return _extrapolated(self._formed, some, pulses, grid, _TRIED_QUICKLY if is_quick else _TRIED)
+        return _extrapolated(
+            self._formed, trial_history, pulses, grid, _COMPILED_TRIAL_PIXELS if is_quick else _TRIAL_PIXELS
+        )
 
-    def _formed(self, history: PhaseHistory, part: Floats) -> Complexes:
-        formed = matched_filter(history, part) if self.is_direct else backprojection(history, part, self.kernel)
-        formed *= self.lines.baseband(part, SPEED_OF_LIGHT / self.radar.center_frequency)
+    def _formed(self, history: PhaseHistory, points: Floats) -> Complexes:
+        formed = matched_filter(history, points) if self.is_direct else backprojection(history, points, self.kernel)
+        formed *= self.lines.baseband(points, SPEED_OF_LIGHT / self.radar.center_frequency)
         return formed
 
 
@@ -94,8 +96,8 @@ class ExactRangeFormer:
 class PlaneWaves:
     """Far-field filter (12), or polar format (13) and (14).
 
-    `sight` are the look vectors of both measured platforms, added, over slow time, (times, 2), an odd number of them
-    with the midpoint in the middle.
+    `sight` is the sum of the look vectors of both measured platforms over slow time, (times, 2), for an odd number of
+    times with the midpoint in the middle.
     """
 
     sight: Floats
@@ -117,36 +119,36 @@ class PlaneWaves:
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
         """Point whose plane waves leave the phase with the least variance, (5) in place of exact ranges."""
-        slow_time, sampling = np.linspace(-1, 1, len(self.sight)), nodes(_ORDER + 1)
-        fitted = np.polynomial.legendre.legfit(slow_time, np.c_[self.sight, recorded], _ORDER)
+        slow_time, sampling = np.linspace(-1, 1, len(self.sight)), nodes(_HISTORY_ORDER + 1)
+        fitted = np.polynomial.legendre.legfit(slow_time, np.c_[self.sight, recorded], _HISTORY_ORDER)
         *sight, error = np.polynomial.legendre.legval(sampling.places, fitted)[..., None]
         matrix = GroundMatrix.of(np.array(sight), sampling.fit, np.atleast_1d(band_variance(self)))
         by_east, by_north = ((weights * error).sum() for weights in matrix.place_weights)
         return float(by_east), float(by_north)
 
-    def left(self, place: GroundVector, left: Floats, recorded: Floats) -> Floats:
-        """The range history that is left at a place: the far field's own error is in it."""
-        rest: Floats = recorded + self.sight @ np.asarray(place)
-        return rest
+    def remaining_range(self, ground_point: GroundVector, remaining_range: Floats, recorded: Floats) -> Floats:
+        """Remaining range history at a ground point, which includes the error of the far field. [m]"""
+        range_history: Floats = recorded + self.sight @ np.asarray(ground_point)
+        return range_history
 
     def cells(self, centre: GroundVector) -> tuple[float, float]:
-        """Resolution of all that was recorded, corners of the aperture included."""
+        """Resolution of the full recorded support, corners of the aperture included. [m]"""
         cosine, sine = math.cos(self.azimuth), math.sin(self.azimuth)
         along, across = cells_of_support(self.sight, np.array([[cosine, -sine], [sine, cosine]]), self)  # (9)
         return float(along), float(across)
 
     def sampled(self, centre: GroundVector) -> tuple[float, float]:
-        """Cells for pixels to sample: those of all that was recorded."""
+        """Cells for pixels to sample: those of the full recorded support. [m]"""
         return self.cells(centre)
 
     def look(self, centre: GroundVector) -> Floats:
         """Direction of x′, a unit vector (2,)."""
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth)])
 
-    def offsets(self, places: Floats, centre: GroundVector) -> Floats:
+    def offsets(self, ground_points: Floats, centre: GroundVector) -> Floats:
         """Cells from the centre, in the axes of (10)."""
         cosine, sine = self.look(centre)
-        rotated = (places - np.asarray(centre)) @ np.array([[cosine, -sine], [sine, cosine]])
+        rotated = (ground_points - np.asarray(centre)) @ np.array([[cosine, -sine], [sine, cosine]])
         return np.asarray(rotated / np.array(self.cells(centre)))
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
@@ -154,30 +156,30 @@ class PlaneWaves:
         size = (spacing[0] * shape[0], spacing[1] * shape[1])
         return ground_grid(centre, self.azimuth, size, shape)
 
-    def image(self, history: PhaseHistory, grid: Floats, told: Told) -> Complexes:
+    def image(self, history: PhaseHistory, grid: Floats, on_pixels: OnPixels) -> Complexes:
         """Form the image; by polar format on a grid of `grid` only."""
         if not self.is_polar:
-            return _in_blocks(lambda part: far_field_filter(history, part) * self._carrier(part), grid, told)
+            return _in_blocks(lambda block: far_field_filter(history, block) * self._carrier(block), grid, on_pixels)
         nx, ny = grid.shape[:2]
         size = tuple(
             count * float(np.linalg.norm(grid[step] - grid[0, 0]))
             for count, step in ((nx, (1, 0)), (ny, (0, 1)))
         )  # fmt: skip
-        east, north = (float(part) for part in grid[nx // 2, ny // 2, :2])
+        east, north = (float(coordinate) for coordinate in grid[nx // 2, ny // 2, :2])
         formed = polar_format(history, self.azimuth, (size[0], size[1]), (nx, ny), (east, north)).image
-        told(nx * ny)
+        on_pixels(nx * ny)
         return formed * self._carrier(grid)
 
-    def seconds(self, some: PhaseHistory, pulses: int, grid: Floats) -> float:
-        """About how long an image takes: a Fourier transform touches every sample and every pixel a few times."""
+    def seconds(self, trial_history: PhaseHistory, pulses: int, grid: Floats) -> float:
+        """Approximate time to form an image: a Fourier transform uses each sample and each pixel a few times. [s]"""
         if not self.is_polar and not is_nonuniform():
-            return _extrapolated(far_field_filter, some, pulses, grid, _TRIED)
+            return _extrapolated(far_field_filter, trial_history, pulses, grid, _TRIAL_PIXELS)
         pixels = grid.shape[0] * grid.shape[1]
-        blocks = 1 if self.is_polar else -(-pixels // _BLOCK)
-        return _SECONDS_PER_SAMPLE * float(blocks * pulses * some.frequency.size + pixels)
+        blocks = 1 if self.is_polar else -(-pixels // _PROGRESS_PIXELS_COUNT)
+        return _SECONDS_PER_SAMPLE * float(blocks * pulses * trial_history.frequency.size + pixels)
 
     def _carrier(self, points: Floats) -> Complexes:
-        """Phase of the range at the midpoint, as `RangeLines.baseband` has it, for plane waves."""
+        """Phase of the range at the midpoint for plane waves, as in `RangeLines.baseband`."""
         wavenumber = 2 * math.pi * self.center_frequency / SPEED_OF_LIGHT
         carrier: Complexes = np.exp(1j * wavenumber * (points[..., :2] @ self.middle))
         return carrier
@@ -187,22 +189,26 @@ Former = ExactRangeFormer | PlaneWaves
 
 
 def _extrapolated(
-    form: Callable[[PhaseHistory, Floats], Complexes], some: PhaseHistory, pulses: int, grid: Floats, tried: int
+    form: Callable[[PhaseHistory, Floats], Complexes],
+    trial_history: PhaseHistory,
+    pulses: int,
+    grid: Floats,
+    trial_count: int,
 ) -> float:
-    """Time for a grid and all pulses, from that for a few pixels and some pulses, on the second run. [s]"""
-    few = grid[: max(1, tried // grid.shape[1]), :tried]
-    form(some, few)
-    begun = time.perf_counter()
-    form(some, few)
-    took = time.perf_counter() - begun
-    return float(took * grid.size / few.size * pulses / len(some.slow_time))
+    """Time for a grid and all pulses, from the second run of a trial with few pixels and few pulses. [s]"""
+    trial_pixels = grid[: max(1, trial_count // grid.shape[1]), :trial_count]
+    form(trial_history, trial_pixels)
+    start_time = time.perf_counter()
+    form(trial_history, trial_pixels)
+    trial_seconds = time.perf_counter() - start_time
+    return float(trial_seconds * grid.size / trial_pixels.size * pulses / len(trial_history.slow_time))
 
 
-def _in_blocks(form: Callable[[Floats], Complexes], grid: Floats, told: Told) -> Complexes:
+def _in_blocks(form: Callable[[Floats], Complexes], grid: Floats, on_pixels: OnPixels) -> Complexes:
     formed = np.empty(grid.shape[:2], dtype=complex)
-    rows = max(1, _BLOCK // grid.shape[1])
+    rows = max(1, _PROGRESS_PIXELS_COUNT // grid.shape[1])
     for start in range(0, grid.shape[0], rows):
-        part = grid[start : start + rows]
-        formed[start : start + rows] = form(part)
-        told(part.shape[0] * part.shape[1])
+        block = grid[start : start + rows]
+        formed[start : start + rows] = form(block)
+        on_pixels(block.shape[0] * block.shape[1])
     return formed

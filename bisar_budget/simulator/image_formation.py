@@ -15,12 +15,12 @@ from bisar_budget.extras import install_command
 from bisar_budget.memory import is_spacious
 from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory, is_even, split
 
-PROFILE_BYTES = 3 * 16  # of a sample while it is formed: spectrum, profile and what the FFT holds
-_SAMPLES = 16  # of a profile in a range cell: what lies between two of them is read to -119 dB
-_BLOCK = 1 << 20  # complex samples held at once
-_PIXELS = 1 << 13  # handled at once: what they take stays in a processor's second cache
-_HELD = {"numpy": 30e6, "cubic": 110e6}  # bytes beside data and image: what works on them, and compiled code itself
-_SPACIOUS = 3 * _HELD["cubic"]
+PROFILE_BYTES = 3 * 16  # per sample while a profile is formed: spectrum, profile and working memory of the FFT
+_SAMPLES_PER_RANGE_CELL = 16  # of a profile; the interpolation between them is exact to -119 dB
+_BLOCK_TERMS_COUNT = 1 << 20  # complex samples held at once
+_CACHED_PIXELS_COUNT = 1 << 13  # formed at once; their data stay in a processor's second cache
+_WORKING_BYTES = {"numpy": 30e6, "cubic": 110e6}  # beside data and image: working arrays, and compiled code itself
+_SPACIOUS_BYTES = 3 * _WORKING_BYTES["cubic"]
 
 Kernel = Literal["auto", "numpy", "cubic", "linear"]
 
@@ -54,20 +54,20 @@ def matched_filter(history: PhaseHistory, points: Floats) -> Complexes:
 
 
 def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, int], Floats]) -> Complexes:
-    """Sum of (4) over pulses and frequencies, for what `ranges` says ΔR of some points (n, 3) is at a pulse."""
+    """Sum of (4) over pulses and frequencies, with ΔR of points (n, 3) at a pulse by `ranges(points, pulse)`."""
     image: Complexes = np.zeros(points.shape[0], dtype=complex)
     wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT
     coarse, fine = split(wavenumber) if is_even(history.frequency) else (wavenumber, np.zeros(1))
     shape = (coarse.size, fine.size)
-    block = max(1, _BLOCK // max(1, sum(shape)))
+    points_per_block = max(1, _BLOCK_TERMS_COUNT // max(1, sum(shape)))
     for pulse in range(history.slow_time.size):
         samples = np.zeros(shape, dtype=complex)
         samples.ravel()[: wavenumber.size] = history.samples[pulse]
-        for start in range(0, points.shape[0], block):
-            part = slice(start, start + block)
-            distance = ranges(points[part], pulse)
+        for start in range(0, points.shape[0], points_per_block):
+            block_points = slice(start, start + points_per_block)
+            distance = ranges(points[block_points], pulse)
             by_coarse = np.exp(1j * np.outer(distance, fine)) @ samples.T
-            image[part] += np.sum(np.exp(1j * np.outer(distance, coarse)) * by_coarse, axis=1)
+            image[block_points] += np.sum(np.exp(1j * np.outer(distance, coarse)) * by_coarse, axis=1)
     image /= max(1, history.samples.size)
     return image
 
@@ -77,7 +77,7 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
 
     Each pulse's spectrum is divided by the transform of a spline, taken to a range profile by FFT, and read at the
     pixels' differential ranges. A profile repeats every c/Δf in range; pixels farther
-    apart than that alias, and the caller sees to it.
+    apart than that alias; the caller must prevent this.
 
     Parameters
     ----------
@@ -102,9 +102,9 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
         A compiled kernel is asked for and Numba is missing.
     """
     points = np.asarray(points, dtype=float)
-    for what, where in (("points", points), ("transmitter", history.transmitter), ("receiver", history.receiver)):
-        if not np.isfinite(where).all():
-            raise ValueError(f"{what}: positions must be finite numbers of metres")
+    for name, positions in (("points", points), ("transmitter", history.transmitter), ("receiver", history.receiver)):
+        if not np.isfinite(positions).all():
+            raise ValueError(f"{name}: positions must be finite numbers of metres")
     if kernel == "auto":
         kernel = "cubic" if is_compiled() else "numpy"
     if kernel == "numpy":
@@ -118,30 +118,30 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
 
 
 def kernel_within(memory_limit: float) -> Kernel:
-    """Kernel for a limit of memory [B]: the compiled one, whose code takes 60 MB itself, only with room to spare."""
-    return "cubic" if is_compiled() and memory_limit >= _SPACIOUS else "numpy"
+    """Kernel for a limit of memory [B]: the compiled kernel, whose code takes 60 MB, only if memory is ample."""
+    return "cubic" if is_compiled() and memory_limit >= _SPACIOUS_BYTES else "numpy"
 
 
 def bytes_held(kernel: Kernel) -> float:
-    """Memory that backprojection takes beside data and image. [B]"""
-    return _HELD["numpy" if kernel == "numpy" else "cubic"]
+    """Memory that backprojection takes in addition to data and image. [B]"""
+    return _WORKING_BYTES["numpy" if kernel == "numpy" else "cubic"]
 
 
 @cache
 def is_compiled() -> bool:
-    """Whether images are formed by compiled kernels: Numba is there, has room and can keep what it compiles."""
+    """Whether images are formed by compiled kernels: Numba is installed, has memory and can cache compiled code."""
     if not is_spacious():
         return False
     try:
         import bisar_budget.simulator.compiled  # noqa: F401
-    except (ImportError, RuntimeError):  # not installed, or nowhere to keep what it compiles
+    except (ImportError, RuntimeError):  # not installed, or no cache for compiled code
         return False
     return True
 
 
 def _backprojection(history: PhaseHistory, points: Floats) -> Complexes:
     axes = np.ascontiguousarray(np.reshape(points, (-1, 3)).T)
-    length = profile_length(history, _SAMPLES)
+    length = profile_length(history, _SAMPLES_PER_RANGE_CELL)
     transform = np.sinc(harmonics(history) / length) ** 4  # of a cubic B-spline
     per_metre = cells_per_metre(history, length)
     carrier = 2 * math.pi * carrier_frequency(history) / SPEED_OF_LIGHT
@@ -149,31 +149,31 @@ def _backprojection(history: PhaseHistory, points: Floats) -> Complexes:
     for pulse in range(history.slow_time.size):
         spline = range_profiles(history, length, transform, slice(pulse, pulse + 1))[0]
         spline = np.concatenate((spline[-1:], spline, spline[:2]))
-        for start in range(0, axes.shape[1], _PIXELS):
-            part = slice(start, start + _PIXELS)
+        for start in range(0, axes.shape[1], _CACHED_PIXELS_COUNT):
+            block = slice(start, start + _CACHED_PIXELS_COUNT)
             ranges: Floats = np.zeros(())
             for positions in (history.transmitter, history.receiver):
-                leg = axes[:, part] - positions[pulse, :, None]
+                leg = axes[:, block] - positions[pulse, :, None]
                 ranges = ranges + (np.sqrt(np.einsum("ij,ij->j", leg, leg)) - np.linalg.norm(positions[pulse]))
             formed = _read(spline, ranges * per_metre)
             turn = np.empty_like(formed)
             np.cos(carrier * ranges, out=turn.real)
             np.sin(carrier * ranges, out=turn.imag)
-            image[part] += formed * turn
+            image[block] += formed * turn
     image /= max(1, history.samples.size)
     return image.reshape(np.shape(points)[:-1])
 
 
 def _read(spline: Complexes, cell: Floats) -> Complexes:
-    """Value at any cells, (n,), of a cyclic cubic B-spline (samples + 3,), wrapped by one before and two behind."""
+    """Values at any cells, (n,), of a cyclic cubic B-spline (samples + 3,), padded by one before and two behind."""
     first = np.floor(cell)
-    beyond = cell - first
-    left = 1 - beyond
+    fraction = cell - first
+    remainder = 1 - fraction
     weights = (
-        left * left * left / 6,
-        2 / 3 - beyond * beyond * (1 - beyond / 2),
-        2 / 3 - left * left * (1 - left / 2),
-        beyond * beyond * beyond / 6,
+        remainder * remainder * remainder / 6,
+        2 / 3 - fraction * fraction * (1 - fraction / 2),
+        2 / 3 - remainder * remainder * (1 - remainder / 2),
+        fraction * fraction * fraction / 6,
     )
     index = first.astype(np.int64) % (spline.size - 3)
     value: Complexes = np.zeros(cell.shape, dtype=complex)
@@ -195,15 +195,15 @@ def cells_per_metre(history: PhaseHistory, length: int) -> float:
 
 
 def carrier_frequency(history: PhaseHistory) -> float:
-    """Frequency that profiles leave out: the middle sample's, not always the middle of the band. [Hz]"""
+    """Frequency that profiles leave out: the middle sample, which is not always the middle of the band. [Hz]"""
     return float(history.frequency[history.frequency.size // 2])
 
 
 def range_profiles(history: PhaseHistory, length: int, transform: Floats, pulses: slice) -> Complexes:
-    """Profiles of some pulses: Σ S_k exp(+2πj k n/length), k counted from the carrier.
+    """Profiles of a slice of pulses: Σ S_k exp(+2πj k n/length), k counted from the carrier.
 
-    A profile is the sum of (4) over frequency, carrier left out, as a function of ΔR. It is sampled finer than it
-    needs, and read by convolution with a short kernel by whose transform the spectrum was divided beforehand.
+    A profile is the sum of (4) over frequency, without the carrier, as a function of ΔR. It is oversampled and read
+    by convolution with a short kernel. The spectrum is divided by the transform of this kernel beforehand.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def range_profiles(history: PhaseHistory, length: int, transform: Floats, pulses
     length : int
         Samples of a profile.
     transform : (frequencies,) ndarray
-        Of the kernels that will read it, at `harmonics`.
+        Fourier transform of the kernels that will read the profile, at `harmonics`.
     pulses : slice
         Which pulses.
 
@@ -273,7 +273,7 @@ def taylor_window(count: int, sidelobe_db: float = -35.0, nbar: int = 5) -> Floa
     sidelobe_db : float
         Level of the near sidelobes, below 0. [dB]
     nbar : int
-        Number of them at that level, plus one.
+        Number of sidelobes at that level, plus one.
 
     Notes
     -----
@@ -282,11 +282,11 @@ def taylor_window(count: int, sidelobe_db: float = -35.0, nbar: int = 5) -> Floa
     """
     a = math.acosh(10 ** (-sidelobe_db / 20)) / math.pi
     sigma2 = nbar**2 / (a**2 + (nbar - 0.5) ** 2)
-    place = (np.arange(count) - (count - 1) / 2) / count
+    positions = (np.arange(count) - (count - 1) / 2) / count
     weights: Floats = np.ones(count)
     for m in range(1, nbar):
-        over = math.prod(1 - m**2 / (sigma2 * (a**2 + (n - 0.5) ** 2)) for n in range(1, nbar))
-        under = math.prod(1 - m**2 / n**2 for n in range(1, nbar) if n != m)
-        weights += 2 * ((-1) ** (m + 1) * over / (2 * under)) * np.cos(2 * math.pi * m * place)
+        numerator = math.prod(1 - m**2 / (sigma2 * (a**2 + (n - 0.5) ** 2)) for n in range(1, nbar))
+        denominator = math.prod(1 - m**2 / n**2 for n in range(1, nbar) if n != m)
+        weights += 2 * ((-1) ** (m + 1) * numerator / (2 * denominator)) * np.cos(2 * math.pi * m * positions)
     weights /= weights.mean()
     return weights

@@ -1,10 +1,10 @@
 """Measures of a point response: width, peak, sidelobe ratios, and the quadratic phase error itself.
 
-A cut is a line of complex image samples, evenly spaced, that holds the whole response. Sidelobes can be
-counted outside a fixed mask, the first nulls of the error-free response, or outside the nulls that the
-response itself shows; under a window the second hides a quadratic phase error, because the shoulder it
-raises joins the mainlobe. Other tools stop counting at some distance: perseo-quality takes its PSLR within
-five widths of the peak and its ISLR within ten, which for a uniform aperture makes it -10.21 dB, not -9.68.
+A cut is a line of complex image samples, evenly spaced, that holds the full response. Sidelobes are counted outside a
+fixed mask, the first nulls of the error-free response, or outside the nulls of the response itself. Under a window
+the nulls of the response hide a quadratic phase error, because the shoulder that it raises joins the mainlobe. Other
+tools stop counting at a distance: perseo-quality takes its PSLR within five widths of the peak and its ISLR within
+ten, which for a uniform aperture makes the ISLR -10.21 dB, not -9.68 dB.
 """
 
 import math
@@ -15,29 +15,29 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from bisar_budget.simulator.phase_history import Complexes, Floats
 
-_WHOLE = slice(None), slice(None)
-_UPSAMPLING = 32
-_REACH = 8  # samples on each side from which what lies between is interpolated
-_KAISER = 12.0  # with these a line sampled three times per cell is read to -110 dB
-_CHIP_UPSAMPLING = 8
-_COLUMNS = 512  # interpolated at once
-_ASCENTS = 50  # at most, along x′ and y′ in turn
-_NARROWED = 3  # times: a row is then within some thousandths
-_SETTLED = 1e-4  # samples
-_SEARCH = 8  # towards a pixel's place in a grid
-_CLOSE = 0.02  # pixels: found
-_READ = 1 << 16  # points read at once
-_FINER = 2  # before the interpolation
-_TAPS = 6  # with these a response sampled three times per cell is read to -70 dB
+_FULL_WINDOW = slice(None), slice(None)
+_UPSAMPLING_FACTOR = 32
+_REACH_SAMPLES = 8  # on each side, from which values between samples are interpolated
+_KAISER_FACTOR = 12.0  # shape of the window; a line sampled three times per cell is then read to -110 dB
+_CHIP_UPSAMPLING_FACTOR = 8
+_BLOCK_COLUMNS = 512  # interpolated at once
+_MAX_ASCENT_STEPS = 50  # along x′ and y′ in turn
+_NARROWING_STEPS = 3  # after which a row is exact to some thousandths
+_PEAK_TOLERANCE_SAMPLES = 1e-4
+_GRID_SEARCH_STEPS = 8  # of Newton's method, towards the place of a point in a grid
+_GRID_TOLERANCE_PX = 0.02  # pixels; last step of a search that has found its point
+_BLOCK_POINTS = 1 << 16  # read at once
+_IMAGE_UPSAMPLING_FACTOR = 2  # before the interpolation
+_TAPS_COUNT = 6  # with which a response sampled three times per cell is read to -70 dB
 
 
 @dataclass(frozen=True, kw_only=True)
 class ImpulseResponse:
     """Measures of one cut.
 
-    `irw_m` is the width at half power, `peak` the magnitude and `peak_m` its place along the cut from the
-    middle sample. `pslr_db` and `islr_db` count sidelobes beyond `mask_m` from the peak; ISLR is their energy
-    over that of the mainlobe.
+    `irw_m` is the width at half power, `peak` the magnitude and `peak_m` its position along the cut from the middle
+    sample. `pslr_db` and `islr_db` count sidelobes beyond `mask_m` from the peak. ISLR is the energy of the sidelobes
+    over the energy of the mainlobe.
     """
 
     irw_m: float
@@ -50,10 +50,10 @@ class ImpulseResponse:
 
 @dataclass(frozen=True, kw_only=True)
 class ImpulseResponse2D:
-    """Measures of a chip: both cuts through its peak, which is between samples, and sidelobes of the whole area.
+    """Measures of a chip: both cuts through its peak, which lies between samples, and sidelobes of the full area.
 
-    `peak_m` counts from the middle sample of each axis. `pslr_db` and `islr_db` take as mainlobe the rectangle
-    `mask_m` of the cuts and as sidelobes everything outside it.
+    `peak_m` counts from the middle sample of each axis. For `pslr_db` and `islr_db` the mainlobe is the rectangle of
+    the `mask_m` of both cuts, and sidelobes are the area outside it.
     """
 
     range_cut: ImpulseResponse
@@ -65,25 +65,27 @@ class ImpulseResponse2D:
 
 
 def upsampled(cut: Complexes, factor: int) -> Complexes:
-    """Interpolate cuts, (..., samples), each a period of what repeats; the carrier may sit anywhere in the band."""
+    """Interpolate periodic cuts, (..., samples), each a full period. The carrier may lie anywhere in the band."""
     count = cut.shape[-1]
     steps = np.arange(count * factor) / factor
     carrier: Complexes = np.exp(2j * math.pi / count * _carrier_of(cut) * steps)
-    around = [(0, 0)] * (cut.ndim - 1) + [(_REACH - 1, _REACH)]
-    samples = sliding_window_view(np.pad(cut * carrier[::factor].conj(), around, mode="wrap"), 2 * _REACH, axis=-1)
+    around = [(0, 0)] * (cut.ndim - 1) + [(_REACH_SAMPLES - 1, _REACH_SAMPLES)]
+    samples = sliding_window_view(
+        np.pad(cut * carrier[::factor].conj(), around, mode="wrap"), 2 * _REACH_SAMPLES, axis=-1
+    )
     fine: Complexes = (samples @ _kernel(steps[:factor]).T).reshape(*cut.shape[:-1], count * factor)
     return fine * carrier
 
 
 def _kernel(offset: Floats) -> Floats:
-    """Weights (n, taps) of the samples around places so far behind one of them, (n,): a sinc under a Kaiser window.
+    """Weights (n, taps) of the samples around positions at offsets (n,) from a sample: a sinc under a Kaiser window.
 
-    A Fourier transform of the whole line would be exact for what does repeat. An image ends amid its sidelobes,
-    and near a platform its band changes along it: then what is far away would spoil what is here.
+    A Fourier transform of the full line would be exact for a periodic line. But an image ends amid its sidelobes, and
+    near a platform its band changes along it: distant samples would then add errors.
     """
-    apart = np.subtract.outer(offset, np.arange(1 - _REACH, _REACH + 1))
-    inside = np.sqrt(np.maximum(1 - (apart / _REACH) ** 2, 0))
-    weights: Floats = np.sinc(apart) * np.i0(_KAISER * inside) / np.i0(_KAISER)
+    distances = np.subtract.outer(offset, np.arange(1 - _REACH_SAMPLES, _REACH_SAMPLES + 1))
+    inside = np.sqrt(np.maximum(1 - (distances / _REACH_SAMPLES) ** 2, 0))
+    weights: Floats = np.sinc(distances) * np.i0(_KAISER_FACTOR * inside) / np.i0(_KAISER_FACTOR)
     return weights
 
 
@@ -93,7 +95,7 @@ def _carrier_of(cut: Complexes) -> int:
 
 
 def _carrier(power: Floats) -> int:
-    """Bin at the centre of gravity of spectra, (lines, bins), on the circle: zeros go where they are empty."""
+    """Bin at the centre of gravity of spectra, (lines, bins), on the circle, opposite to their empty bins."""
     count = power.shape[1]
     turn = np.exp(2j * math.pi * np.arange(count) / count)
     cycles = float(np.angle(power.sum(axis=0) @ turn)) / (2 * math.pi)
@@ -124,12 +126,12 @@ def impulse_response(
     Raises
     ------
     ValueError
-        The cut holds nothing or something else than numbers, or the peak, its half-power points, its mask or
-        the reach lie at the edge of the cut.
+        The samples of the cut are all zero or not finite, or the peak, its half-power points, its mask or the reach
+        lie at the edge of the cut.
     """
     _check(cut)
-    fine = np.abs(upsampled(cut, _UPSAMPLING))
-    step = spacing_m / _UPSAMPLING
+    fine = np.abs(upsampled(cut, _UPSAMPLING_FACTOR))
+    step = spacing_m / _UPSAMPLING_FACTOR
     top = int(np.argmax(fine))
     lower, upper = (_crossing(fine, top, direction) for direction in (-1, 1))
     power = fine**2
@@ -143,18 +145,18 @@ def impulse_response(
         raise ValueError("the mainlobe reaches the edge of the cut: take a longer one, or centre the peak")
     if first < 0 or last > fine.size - 1:
         raise ValueError(f"the cut ends within {reach_m:g} m of the peak, where sidelobes should be counted")
-    place = np.arange(fine.size)
-    outside = ((place <= left) & (place >= first)) | ((place >= right) & (place <= last))
+    positions = np.arange(fine.size)
+    outside = ((positions <= left) & (positions >= first)) | ((positions >= right) & (positions <= last))
     # The mask's edge lies between samples, and under a window the highest shoulder lies at the edge.
-    highest = max(*np.interp((left, right), place, fine), fine[outside].max(initial=0.0))
+    highest = max(*np.interp((left, right), positions, fine), fine[outside].max(initial=0.0))
     energy = np.concatenate(([0.0], np.cumsum((power[1:] + power[:-1]) / 2)))
-    start, below, above, end = np.interp((first, left, right, last), place, energy)
+    start, below, above, end = np.interp((first, left, right, last), positions, energy)
     mainlobe = above - below
     height = fine[top] ** 2 + (power[top + 1] - power[top - 1]) * (peak - top) / 4
     return ImpulseResponse(
         irw_m=(upper - lower) * step,
         peak=math.sqrt(height),
-        peak_m=(peak - cut.size // 2 * _UPSAMPLING) * step,
+        peak_m=(peak - cut.size // 2 * _UPSAMPLING_FACTOR) * step,
         pslr_db=20 * math.log10(float(highest) / math.sqrt(height)),
         islr_db=10 * math.log10(float((end - start - mainlobe) / mainlobe)),
         mask_m=(right - left) / 2 * step,
@@ -164,7 +166,7 @@ def impulse_response(
 def impulse_response_2d(
     chip: Complexes, spacing_m: tuple[float, float], mask_m: tuple[float, float] | None = None
 ) -> ImpulseResponse2D:
-    """Measure a chip: cuts along x′ and y′ through the peak of its interpolation, and its whole area.
+    """Measure a chip: cuts along x′ and y′ through its interpolated peak, and its full area.
 
     Parameters
     ----------
@@ -191,20 +193,20 @@ def impulse_response_2d(
     for index, count in ((row, chip.shape[0]), (column, chip.shape[1])):
         if not 2 <= index <= count - 3:
             raise ValueError("the peak lies at the edge of the chip: centre it")
-    for _ in range(_ASCENTS):
+    for _ in range(_MAX_ASCENT_STEPS):
         before = row, column
         column = _peak(line_at(chip, row))
         row = _peak(line_at(chip.T, column))
-        if max(abs(row - before[0]), abs(column - before[1])) < _SETTLED:
+        if max(abs(row - before[0]), abs(column - before[1])) < _PEAK_TOLERANCE_SAMPLES:
             break
     along, across = mask_m or (None, None)
     range_cut = impulse_response(line_at(chip.T, column), spacing_m[0], along)
     cross_range_cut = impulse_response(line_at(chip, row), spacing_m[1], across)
-    magnitude = np.abs(upsampled(upsampled(chip, _CHIP_UPSAMPLING).T, _CHIP_UPSAMPLING).T)
+    magnitude = np.abs(upsampled(upsampled(chip, _CHIP_UPSAMPLING_FACTOR).T, _CHIP_UPSAMPLING_FACTOR).T)
     pair = range_cut, cross_range_cut
     edges = [
-        tuple(_CHIP_UPSAMPLING * (place + sign * cut.mask_m / spacing) for sign in (-1, 1))
-        for place, cut, spacing in zip((row, column), pair, spacing_m, strict=True)
+        tuple(_CHIP_UPSAMPLING_FACTOR * (position + sign * cut.mask_m / spacing) for sign in (-1, 1))
+        for position, cut, spacing in zip((row, column), pair, spacing_m, strict=True)
     ]
     for size, (lower, upper) in zip(magnitude.shape, edges, strict=True):
         if lower < 0 or upper > size - 2:
@@ -233,22 +235,22 @@ def line_at(chip: Complexes, row: float | Floats) -> Complexes:
     turn = 2j * math.pi / count * _carrier_of(chip.T)
     rows = np.atleast_1d(row)
     first = np.floor(rows).astype(np.int64)
-    taps = first[:, None] + np.arange(1 - _REACH, _REACH + 1)
+    taps = first[:, None] + np.arange(1 - _REACH_SAMPLES, _REACH_SAMPLES + 1)
     weights = _kernel(rows - first) * np.exp(turn * (rows[:, None] - taps))
     lines: Complexes = np.einsum("nt,ntc->nc", weights, chip[taps % count])
     return lines if np.ndim(row) else lines[0]
 
 
-def row_of_peak(image: Complexes, window: tuple[slice, slice] = _WHOLE) -> float:
+def row_of_peak(image: Complexes, window: tuple[slice, slice] = _FULL_WINDOW) -> float:
     """Row of the peak in a window of an image (nx, ny), which repeats beyond its edges.
 
-    A peak lies between two lines of pixels: a third of a cell apart, the nearer of them may be 0.4 dB below it.
+    A peak lies between two lines of pixels. With lines a third of a cell apart, the nearer may be 0.4 dB below it.
     """
-    part = np.abs(image[window])
-    row = float(np.argmax(part.max(axis=1))) + window[0].indices(image.shape[0])[0]
+    magnitude = np.abs(image[window])
+    row = float(np.argmax(magnitude.max(axis=1))) + window[0].indices(image.shape[0])[0]
     columns, step = image[:, window[1]], 0.5
-    for _ in range(_NARROWED):
-        lines = upsampled(line_at(columns, row + step * np.arange(-1.0, 2.0)), _UPSAMPLING)
+    for _ in range(_NARROWING_STEPS):
+        lines = upsampled(line_at(columns, row + step * np.arange(-1.0, 2.0)), _UPSAMPLING_FACTOR)
         row += step * min(max(_vertex(np.max(np.abs(lines) ** 2, axis=1), 1), -1.0), 1.0)
         step /= 4
     return row
@@ -257,16 +259,16 @@ def row_of_peak(image: Complexes, window: tuple[slice, slice] = _WHOLE) -> float
 def place_of_peak(image: Complexes) -> tuple[float, float]:
     """Row and column of the peak of an image (nx, ny)."""
     row = row_of_peak(image)
-    power = np.abs(upsampled(line_at(image, row), _UPSAMPLING)) ** 2
+    power = np.abs(upsampled(line_at(image, row), _UPSAMPLING_FACTOR)) ** 2
     top = int(np.argmax(power))
-    return row, (top + min(max(_vertex(power, top), -1.0), 1.0)) / _UPSAMPLING
+    return row, (top + min(max(_vertex(power, top), -1.0), 1.0)) / _UPSAMPLING_FACTOR
 
 
 def highest(chip: Complexes) -> float:
     """Largest magnitude of the interpolation of a chip (nx, ny)."""
-    columns = upsampled(chip, _CHIP_UPSAMPLING).T
-    parts = (columns[start : start + _COLUMNS] for start in range(0, len(columns), _COLUMNS))
-    return max(float(np.abs(upsampled(part, _CHIP_UPSAMPLING)).max()) for part in parts)
+    columns = upsampled(chip, _CHIP_UPSAMPLING_FACTOR).T
+    blocks = (columns[start : start + _BLOCK_COLUMNS] for start in range(0, len(columns), _BLOCK_COLUMNS))
+    return max(float(np.abs(upsampled(block, _CHIP_UPSAMPLING_FACTOR)).max()) for block in blocks)
 
 
 def _check(samples: Complexes) -> None:
@@ -277,17 +279,17 @@ def _check(samples: Complexes) -> None:
 
 
 def _peak(cut: Complexes) -> float:
-    power = np.abs(upsampled(cut, _UPSAMPLING)) ** 2
+    power = np.abs(upsampled(cut, _UPSAMPLING_FACTOR)) ** 2
     top = int(np.argmax(power))
     if not 0 < top < power.size - 1:
         raise ValueError("the peak lies at the edge of the chip: centre it")
-    return (top + _vertex(power, top)) / _UPSAMPLING
+    return (top + _vertex(power, top)) / _UPSAMPLING_FACTOR
 
 
 def _inside(count: int, lower: float, upper: float) -> Floats:
-    """Weights of samples, cells of unit width, in an interval."""
-    place = np.arange(count)
-    return np.asarray(np.clip(np.minimum(place + 0.5, upper) - np.maximum(place - 0.5, lower), 0.0, 1.0))
+    """Share of each sample's cell of unit width that lies in an interval, (count,)."""
+    positions = np.arange(count)
+    return np.asarray(np.clip(np.minimum(positions + 0.5, upper) - np.maximum(positions - 0.5, lower), 0.0, 1.0))
 
 
 def _line_at(magnitude: Floats, row: float) -> Floats:
@@ -315,94 +317,96 @@ def _null(power: Floats, top: int, direction: int) -> float:
 
 
 def _vertex(values: Floats, top: int) -> float:
-    """Place of the extremum of the parabola through a sample and its neighbours, from that sample."""
-    before, at, after = values[top - 1 : top + 2]
-    bend = before - 2 * at + after
+    """Offset from a sample to the extremum of the parabola through the sample and its neighbours."""
+    before, middle, after = values[top - 1 : top + 2]
+    bend = before - 2 * middle + after
     return float((before - after) / (2 * bend)) if bend else 0.0
 
 
 # ---------------------------------------------------------------------- an image read anywhere
 def between(values: Floats, row: Floats, column: Floats) -> Floats:
-    """Read a table (nx, ny, k) at fractional rows and columns (n,), straight lines between; beyond it, continued."""
+    """Linear interpolation of a table (nx, ny, k) at fractional rows and columns (n,), continued beyond the table."""
     nx, ny = values.shape[:2]
     i = np.clip(np.floor(row).astype(np.int64), 0, nx - 2)
     j = np.clip(np.floor(column).astype(np.int64), 0, ny - 2)
     u, v = (row - i)[:, None], (column - j)[:, None]
-    read: Floats = (
+    value: Floats = (
         (1 - u) * ((1 - v) * values[i, j] + v * values[i, j + 1])
         + u * ((1 - v) * values[i + 1, j] + v * values[i + 1, j + 1])
     )  # fmt: skip
-    return read
+    return value
 
 
 def places_in(grid: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Fractional row and column in a grid (nx, ny, 2) at which it has ground points (n, 2); NaN outside."""
+    """Fractional rows and columns of ground points (n, 2) in a grid (nx, ny, 2), each (n,); NaN outside."""
     nx, ny = grid.shape[:2]
     middle = grid[nx // 2, ny // 2]
     steps = np.stack((np.gradient(grid, axis=0), np.gradient(grid, axis=1)), axis=-1)
     inverse = np.linalg.inv(steps[nx // 2, ny // 2])
-    place = (points - middle) @ inverse.T + (nx // 2, ny // 2)
-    for _ in range(_SEARCH):
-        clipped = np.clip(place, -1, (nx, ny))
+    positions = (points - middle) @ inverse.T + (nx // 2, ny // 2)
+    for _ in range(_GRID_SEARCH_STEPS):
+        clipped = np.clip(positions, -1, (nx, ny))
         jacobian = between(steps.reshape(nx, ny, 4), clipped[:, 0], clipped[:, 1]).reshape(-1, 2, 2)
-        off = points - between(grid, clipped[:, 0], clipped[:, 1])
-        step = np.linalg.solve(jacobian, off[..., None])[..., 0]
-        place = clipped + step
-    lost = np.abs(step).max(axis=1) > _CLOSE
-    lost |= ((place < -0.5) | (place > np.array([nx, ny]) - 0.5)).any(axis=1)
-    place[lost] = math.nan
-    return place[:, 0], place[:, 1]
+        residual = points - between(grid, clipped[:, 0], clipped[:, 1])
+        step = np.linalg.solve(jacobian, residual[..., None])[..., 0]
+        positions = clipped + step
+    is_outside = np.abs(step).max(axis=1) > _GRID_TOLERANCE_PX
+    is_outside |= ((positions < -0.5) | (positions > np.array([nx, ny]) - 0.5)).any(axis=1)
+    positions[is_outside] = math.nan
+    return positions[:, 0], positions[:, 1]
 
 
 def resampled(image: Complexes, grid: Floats, points: Floats) -> Complexes:
-    """Read an image on a grid at other ground points: in another rotation, the same image.
+    """Interpolate an image at other ground points, as of a rotated grid.
 
     Parameters
     ----------
     image : (nx, ny) ndarray
         At baseband, three samples per resolution cell or more.
     grid : (nx, ny, 3) ndarray
-        Its pixels: east, north, up. [m]
+        Pixels of the image: east, north, up. [m]
     points : (mx, my, 3) ndarray
-        Where to read it. [m]
+        Points at which the image is read. [m]
 
     Returns
     -------
     (mx, my) ndarray
-        Zero where the grid does not reach.
+        Zero outside the grid.
     """
     flat = points[..., :2].reshape(-1, 2)
     read = np.zeros(len(flat), dtype=complex)
-    fine = upsampled(upsampled(image, _FINER).T, _FINER).T
-    for start in range(0, len(flat), _READ):
-        row, column = places_in(grid[..., :2], flat[start : start + _READ])
+    fine = upsampled(upsampled(image, _IMAGE_UPSAMPLING_FACTOR).T, _IMAGE_UPSAMPLING_FACTOR).T
+    for start in range(0, len(flat), _BLOCK_POINTS):
+        row, column = places_in(grid[..., :2], flat[start : start + _BLOCK_POINTS])
         inside = np.nonzero(np.isfinite(row))[0]
-        read[start + inside] = _interpolated(fine, _FINER * row[inside], _FINER * column[inside])
+        read[start + inside] = _interpolated(
+            fine, _IMAGE_UPSAMPLING_FACTOR * row[inside], _IMAGE_UPSAMPLING_FACTOR * column[inside]
+        )
     return read.reshape(points.shape[:2])
 
 
 def _interpolated(image: Complexes, row: Floats, column: Floats) -> Complexes:
-    """Lagrange interpolation at scattered places; an image repeats beyond its edges, as its spectrum has it."""
+    """Lagrange interpolation at scattered rows and columns. An image repeats beyond its edges."""
     total = np.zeros(row.size, dtype=complex)
     (i, by_row), (j, by_column) = _weights(row), _weights(column)
-    for a in range(_TAPS):
+    for a in range(_TAPS_COUNT):
         line = np.zeros(row.size, dtype=complex)
-        for b in range(_TAPS):
+        for b in range(_TAPS_COUNT):
             line += by_column[b] * image[(i + a) % image.shape[0], (j + b) % image.shape[1]]
         total += by_row[a] * line
     return total
 
 
-def _weights(place: Floats) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], list[Floats]]:
+def _weights(positions: Floats) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], list[Floats]]:
     """First sample of each stencil, (n,), and the stencil's weights, (n,) for each tap."""
-    first = np.floor(place).astype(np.int64) - _TAPS // 2 + 1
-    return first, [lagrange_weight(place - first, tap, _TAPS) for tap in range(_TAPS)]
+    first = np.floor(positions).astype(np.int64) - _TAPS_COUNT // 2 + 1
+    return first, [lagrange_weight(positions - first, tap, _TAPS_COUNT) for tap in range(_TAPS_COUNT)]
 
 
 def lagrange_weight(offset: Floats, tap: int, taps: int) -> Floats:
-    """Weight of one sample of a stencil of Lagrange, for places so far from its first sample."""
+    """Lagrange weight of one sample of a stencil, at offsets from the first sample of the stencil."""
     weight: Floats = np.ones(offset.shape)
-    for other in range(taps):
-        if other != tap:
-            weight *= (offset - other) / (tap - other)
+    for node in range(taps):
+        if node != tap:
+            weight *= (offset - node) / (tap - node)
     return weight

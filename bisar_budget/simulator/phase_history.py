@@ -18,11 +18,11 @@ from bisar_budget.image_plane import LEADING, Sampling, band_variance
 from bisar_budget.mission.model import Radar
 from bisar_budget.ranges.exact_ranges import ExactEffect, ExactRanges, followed
 
-_HELD = 1 << 18  # complex numbers held at once
-_NO_SIGHT = 1e-20  # square of what a metre of a platform changes; less is rounding
-SMOOTH = 12  # order of what is smooth of a history
-_ORDER = 12  # of the fit to samples anywhere over the aperture
-_ROUNDING = 1e-14  # of a frequency: what numpy.linspace leaves
+_BLOCK_SAMPLES = 1 << 18  # complex numbers held at once
+_MIN_SIGHT_RATIO = 1e-20  # square of the change of the range by a metre of a platform; a smaller square is rounding
+SMOOTH_ORDER = 12  # of the polynomial that is the smooth part of a history
+_FIT_ORDER = 12  # of the fit to samples anywhere over the aperture
+_ROUNDING_FRACTION = 1e-14  # of a frequency: rounding of numpy.linspace
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -31,7 +31,8 @@ Complexes = NDArray[np.complex128]
 class PathSinusoid(NamedTuple):
     """One vibration: amplitude 0 to peak [m], frequency [Hz], phase at τ = 0 [rad].
 
-    It moves its platform along `axis`, a unit vector; along the line of sight, as it turns, where there is none.
+    It moves its platform along `axis`, a unit vector. Without an axis it moves the platform along the line of sight,
+    which turns.
     """
 
     amplitude: float
@@ -50,30 +51,30 @@ class Course:
     def at(self, slow_time: Floats) -> Floats:
         """Values at other times, (m,) or (m, 3)."""
         if self.values.ndim == 1:
-            found: Floats = np.interp(slow_time, self.times, self.values)
-            return found
-        return np.stack([np.interp(slow_time, self.times, along) for along in self.values.T], axis=1)
+            values: Floats = np.interp(slow_time, self.times, self.values)
+            return values
+        return np.stack([np.interp(slow_time, self.times, column) for column in self.values.T], axis=1)
 
-    def smooth(self, order: int = SMOOTH) -> "Course":
-        """The part that moves and defocuses a response: the polynomial fitted to it, without what is faster."""
-        place = 2 * (self.times - self.times[0]) / (self.times[-1] - self.times[0]) - 1
-        fit = np.polynomial.legendre.legfit(place, self.values, order)
-        return Course(self.times, np.polynomial.legendre.legval(place, fit).T)
+    def smooth(self, order: int = SMOOTH_ORDER) -> "Course":
+        """The polynomial fitted to the course: the slow part, which displaces and defocuses a response."""
+        scaled_time = 2 * (self.times - self.times[0]) / (self.times[-1] - self.times[0]) - 1
+        fit = np.polynomial.legendre.legfit(scaled_time, self.values, order)
+        return Course(self.times, np.polynomial.legendre.legval(scaled_time, fit).T)
 
     @property
     def mean(self) -> float:
-        """Mean over its times, of values (n,)."""
+        """Mean over time of values (n,)."""
         middles = (self.values[1:] + self.values[:-1]) / 2
         return float(middles @ np.diff(self.times) / (self.times[-1] - self.times[0]))
 
 
 class PathError(NamedTuple):
-    """Measured minus actual position of one platform, r̃(τ): (22) and what is faster.
+    """Measured minus actual position of one platform, r̃(τ): (22) and faster errors.
 
-    Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], which is any other history, are
-    east-north-up; noise is along the line of sight, positive away from the scene, and so is a vibration without an
-    axis. `time_tag` [s] takes the true path for what it is so much later. `wideband_rms` [m] is noise of the pulses,
-    white or within `wideband_band` (low, high) [Hz], and needs a generator.
+    Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], an error of any form over time, are
+    east-north-up. Noise and vibrations without an axis are along the line of sight, positive away from the scene.
+    `time_tag` [s] is the delay of a time tag: the measured path is the true path that much later. `wideband_rms` [m]
+    is the RMS noise of the pulses, white or within `wideband_band` (low, high) [Hz], and needs a generator.
     """
 
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -86,15 +87,15 @@ class PathError(NamedTuple):
     time_tag: float = 0.0
 
     def slow(self) -> "PathError":
-        """The same with what is smooth of its other history."""
+        """The same error with the smooth part of its course."""
         return self if self.course is None else self._replace(course=self.course.smooth())
 
     def still(self) -> "PathError":
-        """The same without vibration."""
+        """The same error without vibration."""
         return self._replace(sinusoids=(), wideband_rms=0.0)
 
     def plus(self, other: "PathError") -> "PathError":
-        """Both polynomial errors and time tags at once; vibration is not added."""
+        """Sum of both polynomial errors and both time tags, without vibration."""
         position, velocity, acceleration = (
             (u[0] + v[0], u[1] + v[1], u[2] + v[2]) for u, v in zip(self[:3], other[:3], strict=True)
         )
@@ -102,10 +103,11 @@ class PathError(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """Errors in one image: of both platforms, the clock's t̃₀ … t̃₃ of (1), and any other history of the clock.
+    """Errors in one image: of both platforms, of the clock, and of the air.
 
-    [s], [1], [1/s], [1/s²]; `clock_course` [s], which a delay in the air is too. `electrons` is the delay by free
-    electrons at a frequency f of 1 Hz, which falls as 1/f² and advances the phase. [s·Hz²]
+    `clock` holds t̃₀ … t̃₃ of (1), in s, 1, 1/s and 1/s². `clock_course` [s] is an error of the clock of any form over
+    time; a delay in the air is part of it. `electrons` [s·Hz²] is the delay by free electrons at a frequency f of
+    1 Hz, which falls as 1/f² and advances the phase.
     """
 
     transmitter: PathError = PathError()
@@ -115,19 +117,19 @@ class Errors(NamedTuple):
     electrons: Course | None = None
 
     def of(self, platform: str, error: PathError) -> "Errors":
-        """Give one platform an error."""
+        """The same errors with the error of one platform replaced."""
         return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
 
     def smooth(self) -> "Errors":
-        """The same errors without vibration, and with what is smooth of other histories."""
+        """The same errors without vibration and with the smooth parts of all courses."""
         return self.slow().still()
 
     def still(self) -> "Errors":
-        """The same without vibration."""
+        """The same errors without vibration."""
         return self._replace(transmitter=self.transmitter.still(), receiver=self.receiver.still())
 
     def slow(self) -> "Errors":
-        """The same with what is smooth of other histories: noise between a few nodes would pass for a phase."""
+        """The same errors with the smooth parts of all courses: a few nodes would take noise for a phase."""
         return self._replace(
             transmitter=self.transmitter.slow(),
             receiver=self.receiver.slow(),
@@ -136,14 +138,14 @@ class Errors(NamedTuple):
         )
 
 
-def superposed(parts: Iterable[Errors]) -> Errors:
-    """All of several polynomial errors at once; vibration is not added."""
+def superposed(errors_of_sources: Iterable[Errors]) -> Errors:
+    """Sum of several polynomial errors, without vibration."""
     total = Errors()
-    for part in parts:
+    for errors in errors_of_sources:
         total = Errors(
-            transmitter=total.transmitter.plus(part.transmitter),
-            receiver=total.receiver.plus(part.receiver),
-            clock=tuple(a + b for a, b in zip(total.clock, part.clock, strict=True)),
+            transmitter=total.transmitter.plus(errors.transmitter),
+            receiver=total.receiver.plus(errors.receiver),
+            clock=tuple(a + b for a, b in zip(total.clock, errors.clock, strict=True)),
         )
     return total
 
@@ -155,18 +157,18 @@ class Path:
     actual: Floats
     measured: Floats
 
-    def seen_from(self, place: GroundVector) -> "Path":
-        """The same with a ground point for its origin."""
-        away = np.array([*place, 0.0])
-        return Path(actual=self.actual - away, measured=self.measured - away)
+    def seen_from(self, ground_point: GroundVector) -> "Path":
+        """The same path with a ground point as its origin."""
+        offset = np.array([*ground_point, 0.0])
+        return Path(actual=self.actual - offset, measured=self.measured - offset)
 
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """Both platforms at some slow times, and the error of the clock there, (times,). [s]
+    """Paths of both platforms at some slow times, and the error of the clock at these times, (times,). [s]
 
-    `electrons` is the delay by free electrons at 1 Hz [s·Hz²], None without. `seen` is the error of a clock that has
-    the same effect at the centre frequency as the clock and they have together. [s]
+    `electrons` is the delay by free electrons at 1 Hz, or None. [s·Hz²] `seen` is the clock error that has the same
+    effect at the centre frequency as the clock and the electrons together. [s]
     """
 
     transmitter: Path
@@ -177,20 +179,22 @@ class Flight:
 
     @property
     def paths(self) -> tuple[Path, Path]:
-        """Those of transmitter and receiver."""
+        """Paths of transmitter and receiver."""
         return self.transmitter, self.receiver
 
     def as_measured(self) -> "Flight":
-        """The flight that the processor believes in: where the paths were measured, by a perfect clock."""
-        transmitter, receiver = (Path(actual=one.measured, measured=one.measured) for one in self.paths)
+        """The flight that the processor assumes: the measured paths and a perfect clock."""
+        transmitter, receiver = (Path(actual=path.measured, measured=path.measured) for path in self.paths)
         return Flight(transmitter, receiver, np.zeros_like(self.clock), np.zeros_like(self.clock))
 
     def range_error(self, scatterer: GroundVector, seen_at: GroundVector) -> Floats:
-        """Range sum of a ground point as recorded, less that of another by the measured paths, (times,). [m]"""
-        there, here = np.array([*scatterer, 0.0]), np.array([*seen_at, 0.0])
+        """Recorded range sum of `scatterer` minus the range sum of `seen_at` by the measured paths, (times,). [m]"""
+        scatterer_position, seen_position = np.array([*scatterer, 0.0]), np.array([*seen_at, 0.0])
         total: Floats = np.zeros(self.clock.shape)
-        for one in self.paths:
-            total += np.linalg.norm(one.actual - there, axis=1) - np.linalg.norm(one.measured - here, axis=1)
+        for path in self.paths:
+            total += np.linalg.norm(path.actual - scatterer_position, axis=1) - np.linalg.norm(
+                path.measured - seen_position, axis=1
+            )
         return total + SPEED_OF_LIGHT * self.seen
 
     def record(
@@ -212,7 +216,7 @@ class Flight:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PhaseHistory:
-    """Received samples after motion compensation to the scene centre, and what the processor knows of them.
+    """Received samples after motion compensation to the scene centre, with the paths that the processor knows.
 
     `samples` is (pulses, frequencies); `slow_time` [s] and `frequency` [Hz] are evenly spaced;
     `transmitter` and `receiver` are the measured positions, (pulses, 3). [m]
@@ -226,7 +230,7 @@ class PhaseHistory:
 
 
 def look_sum(transmitter: Floats, receiver: Floats) -> Floats:
-    """Unit vectors from the origin of positions (pulses, 3) to them, added: what stands in (6). (pulses, 3)"""
+    """Sum of the unit vectors from the origin to both platforms, as in (6). (pulses, 3)"""
     total: Floats = np.zeros(transmitter.shape)
     for positions in (transmitter, receiver):
         total += positions / np.linalg.norm(positions, axis=1, keepdims=True)
@@ -234,20 +238,22 @@ def look_sum(transmitter: Floats, receiver: Floats) -> Floats:
 
 
 def cell_centres(length: float, count: int) -> Floats:
-    """Centres of `count` equal cells of an interval about zero: samples that stand for the whole of it."""
+    """Centres of `count` equal cells of an interval about zero, which together cover the interval."""
     centres: Floats = np.linspace(-(length - length / count) / 2, (length - length / count) / 2, count)
     return centres
 
 
 def is_even(frequency: Floats) -> bool:
-    """Whether frequencies are evenly spaced, to rounding: over kilometres of range that is no phase."""
-    return frequency.size > 2 and float(np.ptp(np.diff(frequency))) <= _ROUNDING * float(np.abs(frequency).max())
+    """Whether frequencies are evenly spaced, to rounding. Over kilometres of range, rounding gives no phase."""
+    return frequency.size > 2 and float(np.ptp(np.diff(frequency))) <= _ROUNDING_FRACTION * float(
+        np.abs(frequency).max()
+    )
 
 
 def split(wavenumber: Floats) -> tuple[Floats, Floats]:
-    """Wavenumbers, evenly spaced, as the sums of a coarse and a fine one, row by row; the last row may be too long.
+    """Coarse and fine wavenumbers whose sums, row by row, are evenly spaced wavenumbers; the last row may be longer.
 
-    A phase over n of them is a product, of which only 2√n exponentials are formed.
+    The phasor of a sum is a product, so n wavenumbers take only 2√n exponentials.
     """
     fine = math.isqrt(wavenumber.size - 1) + 1
     coarse = -(-wavenumber.size // fine)
@@ -262,7 +268,7 @@ def path(
     rng: np.random.Generator | None = None,
     way: Floats | None = None,
 ) -> Path:
-    """Fly one platform along its path, and measure it with an error.
+    """Positions of one platform along its path, and its positions as measured with an error.
 
     Parameters
     ----------
@@ -275,7 +281,7 @@ def path(
     rng : numpy Generator, optional
         Needed for wideband vibration only.
     way : (pulses, 3) ndarray, optional
-        By which a vibration of a metre moves; a metre along the line of sight. [m/m]
+        Movement by a vibration of one metre. None is one metre along the line of sight. [m/m]
 
     Raises
     ------
@@ -320,11 +326,11 @@ def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.G
     step = float(slow_time[1] - slow_time[0])
     frequency = np.fft.rfftfreq(slow_time.size, step)
     inside = (frequency >= band[0]) & (frequency <= band[1])
-    # Every frequency stands for two of the full spectrum, but zero and, of an even number, the highest.
-    stands_for = np.full(frequency.size, 2.0)
-    stands_for[0] = 1.0
-    stands_for[-1] = 2.0 if slow_time.size % 2 else 1.0
-    weight = stands_for @ inside
+    # Each frequency is two of the full spectrum, except zero and, for an even number of pulses, the highest.
+    bin_count = np.full(frequency.size, 2.0)
+    bin_count[0] = 1.0
+    bin_count[-1] = 2.0 if slow_time.size % 2 else 1.0
+    weight = bin_count @ inside
     if not weight:
         raise ValueError(
             f"the band from {band[0]:g} to {band[1]:g} Hz holds no frequency of the pulses: they are "
@@ -335,28 +341,34 @@ def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.G
 
 
 def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Floats, Floats]:
-    """Shortest ways of both platforms that change the range less the direct path by a metre, each (pulses, 3). [m/m]
+    """Shortest displacements of both platforms that change the range minus the direct path by one metre. [m/m]
 
-    They lead along u_t − b and u_r + b. A platform that changes nothing has none.
+    Each is (pulses, 3), along u_t − b and u_r + b; zero for a platform that does not change that difference.
     """
-    places = (PlatformState(position=one.place(slow_time), velocity=one.velocity) for one in geometry.both)
-    moved = BistaticGeometry(**dict(zip(("transmitter", "receiver"), places, strict=True)))
-    sights = (np.stack(one, axis=1) for one in moved.sights(has_direct_path=True))
+    platforms = (
+        PlatformState(position=platform.place(slow_time), velocity=platform.velocity) for platform in geometry.both
+    )
+    geometries = BistaticGeometry(**dict(zip(("transmitter", "receiver"), platforms, strict=True)))
+    sights = (np.stack(sight, axis=1) for sight in geometries.sights(has_direct_path=True))
     squares = ((sight, np.sum(sight**2, axis=1, keepdims=True)) for sight in sights)
     transmitter, receiver = (
-        np.where(square > _NO_SIGHT, sight / np.maximum(square, _NO_SIGHT), 0.0) for sight, square in squares
+        np.where(square > _MIN_SIGHT_RATIO, sight / np.maximum(square, _MIN_SIGHT_RATIO), 0.0)
+        for sight, square in squares
     )
     return transmitter, receiver
 
 
 def direct_path_error(paths: tuple[Path, Path]) -> Floats:
-    """Clock error of a receiver that hears the transmitter, (pulses,): how much too far apart both are measured. [s]
+    """Clock error of a receiver that hears the transmitter: error of their measured distance over c, (pulses,). [s]
 
-    Its clock is the direct signal, which is late by the actual distance; the processor takes the measured one off.
+    The receiver's clock is the direct signal, which is late by the actual distance. The processor subtracts the
+    measured distance.
     """
-    a, b = paths
-    grown: Floats = np.linalg.norm(a.measured - b.measured, axis=-1) - np.linalg.norm(a.actual - b.actual, axis=-1)
-    return grown / SPEED_OF_LIGHT
+    transmitter, receiver = paths
+    excess_range: Floats = np.linalg.norm(transmitter.measured - receiver.measured, axis=-1) - np.linalg.norm(
+        transmitter.actual - receiver.actual, axis=-1
+    )
+    return excess_range / SPEED_OF_LIGHT
 
 
 def phase_history(
@@ -372,7 +384,7 @@ def phase_history(
     noise_power: float = 0.0,
     rng: np.random.Generator | None = None,
 ) -> PhaseHistory:
-    """Return what the receiver records, motion compensated with the measured positions.
+    """Return the samples that the receiver records, motion compensated with the measured positions.
 
     Parameters
     ----------
@@ -412,22 +424,22 @@ def phase_history(
     if len(scatterers) != len(amplitudes):
         raise ValueError(f"{len(scatterers)} scatterers have {len(amplitudes)} amplitudes")
     # (3) with the frequency split into coarse and fine steps: e^{-j(k + q)R} is a product, and the sum over
-    # scatterers one of matrices, so that 2√n exponentials do for n frequencies.
+    # scatterers is a product of matrices, so that n frequencies take 2√n exponentials.
     coarse, fine = split(wavenumber) if is_even(frequency) else (wavenumber, np.zeros(1))
-    many = max(1, _HELD // (coarse.size + fine.size))
-    together = max(1, min(many, len(scatterers)))
-    pulses = max(1, min(many // together, _HELD // (coarse.size * fine.size)))
-    for begin in range(0, slow_time.size, pulses):
-        some = slice(begin, begin + pulses)
-        total: Complexes = np.zeros((slow_time[some].size, coarse.size, fine.size), dtype=complex)
-        for start in range(0, len(scatterers), together):
-            part = slice(start, start + together)
-            ranges = np.linalg.norm(transmitter.actual[some, None] - scatterers[part], axis=-1)
-            ranges += np.linalg.norm(receiver.actual[some, None] - scatterers[part], axis=-1)
-            ranges = ranges - reference[some, None] + clock[some, None]  # (1)
-            by_coarse = np.exp(-1j * coarse[:, None] * ranges[:, None]) * amplitudes[part]  # (2), (3)
+    block_exponentials = max(1, _BLOCK_SAMPLES // (coarse.size + fine.size))
+    block_scatterers = max(1, min(block_exponentials, len(scatterers)))
+    block_pulses = max(1, min(block_exponentials // block_scatterers, _BLOCK_SAMPLES // (coarse.size * fine.size)))
+    for begin in range(0, slow_time.size, block_pulses):
+        pulse_block = slice(begin, begin + block_pulses)
+        total: Complexes = np.zeros((slow_time[pulse_block].size, coarse.size, fine.size), dtype=complex)
+        for start in range(0, len(scatterers), block_scatterers):
+            scatterer_block = slice(start, start + block_scatterers)
+            ranges = np.linalg.norm(transmitter.actual[pulse_block, None] - scatterers[scatterer_block], axis=-1)
+            ranges += np.linalg.norm(receiver.actual[pulse_block, None] - scatterers[scatterer_block], axis=-1)
+            ranges = ranges - reference[pulse_block, None] + clock[pulse_block, None]  # (1)
+            by_coarse = np.exp(-1j * coarse[:, None] * ranges[:, None]) * amplitudes[scatterer_block]  # (2), (3)
             total += by_coarse @ np.exp(-1j * ranges[..., None] * fine)
-        samples[some] = total.reshape(len(total), -1)[:, : wavenumber.size]
+        samples[pulse_block] = total.reshape(len(total), -1)[:, : wavenumber.size]
     if electrons is not None:  # a delay of K/f² is a phase of +2πK/f: its derivative by 2πf is -K/f²
         samples *= np.exp(2j * math.pi * electrons[:, None] / frequency)
     if noise_power:
@@ -457,7 +469,7 @@ def exact_effect(
     radar: Radar,
     aperture_time_s: float,
 ) -> ExactEffect:
-    """Effect of one error, its paths sampled anywhere over the aperture: see `ranges.exact_ranges`.
+    """Effect of one error by exact ranges, with paths sampled at any slow times (see `ranges.exact_ranges`).
 
     Raises
     ------
@@ -470,25 +482,25 @@ def exact_effect(
         np.array([2 * math.pi / radar.wavelength]),
         np.array([band_variance(radar)]),
         _sampling(slow_time / half),
-        [_columns(one.actual) for one in paths],
-        [_columns(one.actual[slow_time.size // 2]) for one in paths],
+        [_columns(path.actual) for path in paths],
+        [_columns(path.actual[slow_time.size // 2]) for path in paths],
     )
     clock = np.broadcast_to(SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float), slow_time.shape)[:, None]
-    shifts = [_columns(one.measured - one.actual) for one in paths]
-    found = followed(exact, clock, shifts, np.zeros(1, dtype=int))
-    if not found.is_settled[0]:
+    shifts = [_columns(path.measured - path.actual) for path in paths]
+    solution = followed(exact, clock, shifts, np.zeros(1, dtype=int))
+    if not solution.is_settled[0]:
         raise NoGroundPointError("no ground point has the recorded range history")
-    east, north, *phases = (float(one[0]) for one in found[1:-1])
+    east, north, *phases = (float(values[0]) for values in solution[1:-1])
     return ExactEffect((east, north), *phases)
 
 
 def _columns(positions: Floats) -> Vectors:
-    """Positions (..., 3) by component, each (..., 1)."""
+    """Components x, y and z of positions (..., 3), each (..., 1)."""
     x, y, z = np.moveaxis(positions, -1, 0)[..., None]
     return x, y, z
 
 
-def _sampling(places: Floats) -> Sampling:
-    """Samples anywhere in −1 … 1, fitted by the polynomial through them."""
-    legendre = np.polynomial.legendre.legvander(places, min(_ORDER, max(3, places.size // 4)))
-    return Sampling(places, LEADING[:, None] * np.linalg.pinv(legendre)[:4])
+def _sampling(nodes: Floats) -> Sampling:
+    """Sampling at any nodes in −1 … 1, by a polynomial fitted through them."""
+    legendre = np.polynomial.legendre.legvander(nodes, min(_FIT_ORDER, max(3, nodes.size // 4)))
+    return Sampling(nodes, LEADING[:, None] * np.linalg.pinv(legendre)[:4])

@@ -44,22 +44,22 @@ from bisar_budget.simulator.realisations import drawn_errors, oscillator_sinusoi
 from bisar_budget.simulator.targets import Target, Targets
 from bisar_budget.workers import Progress, unseen
 
-_MARGIN_CELLS = 16  # of the patch beyond the smear, each way
+_MARGIN_CELLS = 16  # of the patch beyond the smear, on each side
 _SAMPLES_PER_CELL = 3
 _MIN_PULSES, _MAX_PULSES = 256, 1 << 15
 _MIN_FREQUENCIES = 64
-_FEW_PULSES = 64  # with which the time is foreseen
-_ECHO_CELLS = 256  # from the peak; paired echoes farther away are said, not shown
+_TRIAL_PULSES = 64  # pulses of the trial that foresees the time
+_MAX_ECHO_CELLS = 256  # from the peak; paired echoes farther away are named, not shown
 _SCENE_PIXELS = 1 << 18  # of the image in (x, y)
-_BYTES_PER_PIXEL = 16 * 8  # in (x, y): image and grid, the image rotated back, and all of them in an archive
-_BYTES_PER_ROTATED = 16 * 16  # grid, three images, and what autofocus and interpolation hold of one
+_BYTES_PER_SCENE_PIXEL = 16 * 8  # in (x, y): image and grid, the image rotated back, and all of them in an archive
+_BYTES_PER_ROTATED_PIXEL = 16 * 16  # grid, three images, and one image within autofocus and interpolation
 _BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
-_APART = 3.0  # range cells: what is nearer in range shares a line with a target's response
-_NEAREST = 6  # cells across that a response takes, at least
-_BLUR = 6  # columns for each line beside a patch of finer pixels, by which a point there is out of focus
-_THERE = 0.5  # of a target's height, at least, that is read at its place; else the patch does not reach there
-_FINE = 16  # samples of a line for each, between which its highest is found to 1e-3 dB
-_CLUTTER_STREAM = 1  # of the file's seed, so that clutter changes no noise
+_SEPARATE_RANGE_CELLS = 3.0  # targets nearer in range share a line with a target's response
+_MIN_WINDOW_CELLS = 6  # half width of a target's response across
+_BLUR_COLUMNS_PER_LINE = 6  # blur of a point beyond a patch of finer pixels, for each line of its distance
+_MIN_HEIGHT_FRACTION = 0.5  # of a target's height that its place shows; else the patch does not reach the target
+_LINE_UPSAMPLING_FACTOR = 16  # interpolation of a line, whose highest sample is then exact to 1e-3 dB
+_CLUTTER_STREAM_INDEX = 1  # beside the file's seed, so that clutter changes no noise
 
 
 A_POINT = Targets()  # at the scene centre
@@ -73,10 +73,9 @@ class SimulationError(Exception):
 class Response:
     """One target as the images show it.
 
-    `effect` is what the errors do to it by exact ranges, its displacement counted from the target; `shown` is where
-    the image former puts it in the rotated images, `shown_in_scene` in the one along (x, y) (east, north). [m]
-    `clean`, `smeared` and `focused` are its cross-range cuts, None where it cannot be measured for what stands beside
-    it.
+    `effect` is the effect of the errors by exact ranges, with the displacement counted from the target. The image
+    former puts the target at `shown` in the rotated images and at `shown_in_scene` in the image along (x, y) (east,
+    north). [m] `clean`, `smeared` and `focused` are measures of its cross-range cuts, None where neighbours hide it.
     """
 
     target: Target
@@ -89,21 +88,24 @@ class Response:
 
 
 class PointImages(NamedTuple):
-    """Images of point scatterers, by themselves one at the scene centre, and what explains them.
+    """Images of point scatterers, by default of one at the scene centre, and the quantities that explain them.
 
-    All places are in the axes of the scene, east and north of its centre. [m]
+    All points are in the axes of the scene, east and north of its centre. [m]
 
-    `in_scene` is on `scene_grid`, (nx, ny, 3) along (x, y), of as much of the patch as a quarter of a million pixels
-    hold; the others are on `grid`, (nx, ny, 3), along (x′, y′): by exact ranges along lines of equal range, by plane
-    waves along the axes of (10). All are complex and lie where the errors move the targets; `scene_spacing` and
-    `spacing`, (2,) [m], are those of their pixels. `range_error` is what is quadratic and higher in the range error
-    of the scene centre over `slow_time`; `segments` (3, 2) are its value [m] and slope [m/s] at `segment_times`,
-    `points` (3, 2) the ground points (29) of those pieces of the whole range error: the middle one is where (25) puts
-    a point at the scene centre; `points_by` says by which gradients (29) has them. `effect` is that of the
-    scene centre, too. `responses` are one for each target, and `clean_response`, `response`, `focused_response` the
-    cuts through the peaks of the brightest, which lie in these `rows` of the images. A lone point without errors is
-    read `misread_db` too high where its pixels do not sample it; NaN where that is not known. `outside` says which
-    declared echoes lie beyond the patch.
+    Images are complex and lie where the errors move the targets. `in_scene` is on `scene_grid`, (nx, ny, 3) along
+    (x, y), and shows as much of the patch as a quarter of a million pixels hold. `rotated`, `focused` and
+    `error_free` are on `grid`, (nx, ny, 3), along (x′, y′): by exact ranges along lines of equal range, by plane
+    waves along the axes of (10). The pixels are `scene_spacing` and `spacing` apart, (2,). [m]
+
+    `effect` and `range_error` are for a point at the scene centre; `range_error` is the range error over `slow_time`
+    without its constant and linear part. `segments` (3, 2) are its value [m] and slope [m/s] at `segment_times`.
+    `points` (3, 2) are the ground points (29) of these pieces of the full range error, by the gradients that
+    `points_by` names. (25) puts a point at the scene centre at the middle one of them.
+
+    `responses` has one entry for each target. `clean_response`, `response` and `focused_response` are cuts through
+    the peaks of the brightest target, which lie in `rows` of the images. `misread_db` is how much too high a single
+    point without errors is read because its pixels do not sample it; NaN if unknown. `outside` names the declared
+    echoes that lie beyond the patch.
     """
 
     slow_time: Floats
@@ -142,20 +144,21 @@ class Patch:
 
     @property
     def pixels(self) -> int:
-        """Number of them."""
+        """Number of pixels."""
         return self.shape[0] * self.shape[1]
 
     @property
     def size(self) -> tuple[float, float]:
-        """Extent. [m]"""
+        """Extent along both axes. [m]"""
         return (self.shape[0] * self.spacing[0], self.shape[1] * self.spacing[1])
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Patches, samples and memory that the images of a mission take, known before any is formed.
+    """Patches, samples and memory that the images of a mission take, known before an image is formed.
 
-    A range cell has `finer` times as many pixels as one across.
+    A range cell has `finer` times as many pixels as a cross-range cell. A target's response takes `own_cells` cells
+    across.
     """
 
     rotated: Patch
@@ -169,13 +172,13 @@ class Plan:
 
     @property
     def memory(self) -> float:
-        """At the peak. [B]"""
-        images = _BYTES_PER_PIXEL * self.in_scene.pixels + _BYTES_PER_ROTATED * self.rotated.pixels
+        """Largest memory held at a time. [B]"""
+        images = _BYTES_PER_SCENE_PIXEL * self.in_scene.pixels + _BYTES_PER_ROTATED_PIXEL * self.rotated.pixels
         return images + _BYTES_PER_SAMPLE * self.pulses * self.frequencies + self.bytes_held
 
     @property
     def work(self) -> int:
-        """Pixels times pulses: of the image in the scene's axes, of the rotated one and of the error-free one."""
+        """Pixels times pulses: of the image in the scene's axes, the rotated image and the error-free image."""
         return self.pulses * (self.in_scene.pixels + 2 * self.rotated.pixels)
 
     def require_memory(self, limit: float, given_pulses: int | None) -> None:
@@ -201,32 +204,34 @@ def simulate_point(
 ) -> PointImages:
     """Form the image of points with the declared errors, before and after autofocus.
 
-    Signs and coverage factor of the file are used; of a covariance, which has no sign, the most probable error
-    whose quadratic phase is one sigma, times the coverage factor. Vibration along the line of sight is in the
-    data, wideband by the file's seed. The patch lies where the errors move the points, along the lines of equal range
-    of the measured paths, and is as long as the smear and the paired echoes. The error-free image is that of the same
-    processor: points at the displaced places, recorded from where the paths were measured.
+    Errors have the signs and the coverage factor of the file. A covariance has no sign: its error is the most
+    probable one whose quadratic phase is one sigma, times the coverage factor. Vibration along the line of sight is
+    in the data; wideband vibration is drawn with the file's seed. The patch lies where the errors move the points,
+    along the lines of equal range of the measured paths, and is as long as the smear and the paired echoes. The
+    error-free image is an image by the same processor: of points at the displaced places, recorded from the measured
+    paths.
 
     Parameters
     ----------
     mission : Mission
         As loaded.
     progress : callable
-        Told how many pixels times pulses are done, and how many there are.
+        Called with the pixels times pulses that are done, and with their total.
     image_former : str
-        One of `IMAGE_FORMERS`. Polar format forms the rotated images; the one along (x, y) is backprojected then, as
-        Figure 5 of the paper is by (4) and Figure 6 by (14).
+        One of `IMAGE_FORMERS`. With polar format, which forms the rotated images, the image along (x, y) is formed by
+        backprojection, as Figure 5 of the paper is by (4) and Figure 6 by (14).
     targets : Targets
-        What stands in the scene. Clutter is one random scatterer for each resolution cell of the patch.
+        Points and clutter of the scene. Clutter is one random scatterer for each resolution cell of the patch.
     foreseen : callable
-        Told about how long it will take [s], measured on a few pulses and pixels, before the images are formed.
+        Called before the images are formed with the time that they will take [s], estimated from a trial with a few
+        pulses and pixels.
 
     Raises
     ------
     SimulationError
         No ground point has the recorded range history, too few pulses for the patch, images and phase history
-        beyond `simulation.memory_limit`, or a collection that the image former cannot take. Nothing is formed before
-        that is known.
+        beyond `simulation.memory_limit`, or a collection that the image former cannot take. These are checked before
+        an image is formed.
     ValueError
         An unknown image former.
     """
@@ -236,18 +241,18 @@ def simulate_point(
     T = mission.collection.aperture_time
     fine = cell_centres(T, 2049)
     collection, declared = PointCollection(mission, geometry), declared_errors(mission)
-    standing = [(one.east, one.north) for one in targets.points]
+    target_points = [(target.east, target.north) for target in targets.points]
     try:
-        effect, *effects = (collection.effect(declared.still(), place) for place in ((0.0, 0.0), *standing))
+        effect, *effects = (collection.effect(declared.still(), point) for point in ((0.0, 0.0), *target_points))
         slow = declared.smooth()
         smooth = collection.flight(slow, fine)
         former, scene_former = _formers(collection, image_former, collection.range_lines(declared), smooth)
-        displaced = [moved.moved(place) for place, moved in zip(standing, effects, strict=True)]
-        left = smooth.range_error((0.0, 0.0), effect.displacement)
-        recorded = [smooth.range_error(place, (0.0, 0.0)) for place in standing]
-        shown = [former.place(*one) for one in zip(displaced, recorded, strict=True)]
-        in_scene_shown = [scene_former.place(*one) for one in zip(displaced, recorded, strict=True)]
-        smear = former.left(shown[0], left, recorded[0])
+        displaced = [moved.moved(point) for point, moved in zip(target_points, effects, strict=True)]
+        remaining_range = smooth.range_error((0.0, 0.0), effect.displacement)
+        recorded_range = [smooth.range_error(point, (0.0, 0.0)) for point in target_points]
+        shown = [former.place(*point) for point in zip(displaced, recorded_range, strict=True)]
+        in_scene_shown = [scene_former.place(*point) for point in zip(displaced, recorded_range, strict=True)]
+        smear = former.remaining_range(shown[0], remaining_range, recorded_range[0])
         slope = np.gradient(smear, fine)
         plan = _plan(mission, former, scene_former, np.array(shown), np.array(in_scene_shown), smear, slope)
     except ValueError as error:
@@ -258,32 +263,34 @@ def simulate_point(
     lines = former.grid(_middle(shown), plan.rotated.spacing, plan.rotated.shape)
     scene = ground_grid(_middle(in_scene_shown), 0.0, plan.in_scene.size, plan.in_scene.shape)
     clutter, clutter_amplitudes = _clutter(targets.clutter_db, lines, plan.finer, settings.seed)
-    amplitudes = np.concatenate(([10 ** (one.level_db / 20) for one in targets.points], clutter_amplitudes))
+    amplitudes = np.concatenate(([10 ** (target.level_db / 20) for target in targets.points], clutter_amplitudes))
 
-    def history(flight: Flight, places: Floats) -> PhaseHistory:
-        scatterers, power = np.c_[places, np.zeros(len(places))], settings.noise
+    def history(flight: Flight, scatterer_places: Floats) -> PhaseHistory:
+        scatterers, power = np.c_[scatterer_places, np.zeros(len(scatterer_places))], settings.noise
         noise = {"noise_power": 0.0 if power is None else 10 ** (power / 10), "rng": rng}
         return collection.record(flight, scatterers, amplitudes.astype(complex), slow_time, plan.frequencies, **noise)
 
-    done = 0
+    done_work = 0
 
     def image(by: Former, data: PhaseHistory, grid: Floats) -> Complexes:
-        def told(pixels: int) -> None:
-            nonlocal done
-            done += plan.pulses * pixels
-            progress(done, plan.work)
+        def on_pixels(pixels: int) -> None:
+            nonlocal done_work
+            done_work += plan.pulses * pixels
+            progress(done_work, plan.work)
 
-        return by.image(data, grid, told)
+        return by.image(data, grid, on_pixels)
 
-    begun, few = time.perf_counter(), cell_centres(T, _FEW_PULSES)
-    still = collection.flight(slow, few)
-    places = np.pad(np.concatenate((standing, clutter)), ((0, 0), (0, 1)))
-    some = collection.record(still, places, amplitudes.astype(complex), few, plan.frequencies)
-    recording = 2 * (time.perf_counter() - begun) * plan.pulses / few.size
-    rotating = 2 * former.seconds(some, plan.pulses, lines)
-    foreseen(recording + rotating + scene_former.seconds(some, plan.pulses, scene))
+    trial_start, trial_times = time.perf_counter(), cell_centres(T, _TRIAL_PULSES)
+    trial_flight = collection.flight(slow, trial_times)
+    scatterer_places = np.pad(np.concatenate((target_points, clutter)), ((0, 0), (0, 1)))
+    trial_history = collection.record(
+        trial_flight, scatterer_places, amplitudes.astype(complex), trial_times, plan.frequencies
+    )
+    recording = 2 * (time.perf_counter() - trial_start) * plan.pulses / trial_times.size
+    rotating = 2 * former.seconds(trial_history, plan.pulses, lines)
+    foreseen(recording + rotating + scene_former.seconds(trial_history, plan.pulses, scene))
     as_declared = collection.flight(declared, slow_time, rng)
-    data = history(as_declared, np.concatenate((standing, clutter - np.asarray(effect.displacement))))
+    data = history(as_declared, np.concatenate((target_points, clutter - np.asarray(effect.displacement))))
     try:
         rotated, in_scene = image(former, data, lines), image(scene_former, data, scene)
         del data
@@ -296,11 +303,14 @@ def simulate_point(
     formed, windows = (error_free, rotated, focused), [_window(plan, cells, index) for index in range(len(shown))]
 
     def rows_of(index: int) -> tuple[float, ...]:
-        """Rows of a target's peaks. Without errors it is at its place; errors are in focus at another range."""
-        found = [row_of_peak(image, windows[index]) for image in formed[1:]]
+        """Rows of a target's peaks, one for each image. Errors bring a target into focus at another range."""
+        smeared_rows = [row_of_peak(image, windows[index]) for image in formed[1:]]
         if isinstance(former, ExactRangeFormer):
-            return (plan.rotated.shape[0] // 2 + _SAMPLES_PER_CELL * plan.finer * float(cells[index, 0]), *found)
-        return (row_of_peak(error_free, windows[index]), *found)  # plane waves may put it beside
+            return (
+                plan.rotated.shape[0] // 2 + _SAMPLES_PER_CELL * plan.finer * float(cells[index, 0]),
+                *smeared_rows,
+            )
+        return (row_of_peak(error_free, windows[index]), *smeared_rows)  # plane waves may displace the peak
 
     across, heights = plan.rotated.spacing[1], np.abs(amplitudes[: len(shown)])
     rows_of_all = [rows_of(index) for index in range(len(shown))]
@@ -314,20 +324,23 @@ def simulate_point(
     clean = _measured(through_peak[0], across, None)
     misread_db, is_alone = math.nan, len(shown) == 1 and targets.clutter_db is None and settings.noise is None
     if is_alone and isinstance(former, ExactRangeFormer):
-        read = np.abs(upsampled(line_at(error_free, row_of_peak(error_free)), _FINE)).max()
-        misread_db = 20 * math.log10(read / heights[0])
-    # Figure 3 has what is quadratic and higher, from mid-aperture on; (29) all of it, from the displaced point on.
-    slope = np.gradient(left, fine)
-    bent = left - left[fine.size // 2] - slope[fine.size // 2] * fine
+        highest_sample = np.abs(
+            upsampled(line_at(error_free, row_of_peak(error_free)), _LINE_UPSAMPLING_FACTOR)
+        ).max()
+        misread_db = 20 * math.log10(highest_sample / heights[0])
+    # Figure 3 shows the range error without constant and linear part, from mid-aperture; (29) takes all of the range
+    # error, from the displaced point.
+    slope = np.gradient(remaining_range, fine)
+    curved_range_error = remaining_range - remaining_range[fine.size // 2] - slope[fine.size // 2] * fine
     times = np.array([-T / 3, 0.0, T / 3])  # centres of three sub-apertures
-    values, slopes = np.interp(times, fine, left), np.interp(times, fine, slope)
-    pieces = [LinePiece(*map(float, one)) for one in zip(times, values, slopes, strict=True)]
+    values, slopes = np.interp(times, fine, remaining_range), np.interp(times, fine, slope)
+    pieces = [LinePiece(*map(float, numbers)) for numbers in zip(times, values, slopes, strict=True)]
     model = mission.gating_model
     return PointImages(
         slow_time=fine,
-        range_error=bent,
+        range_error=curved_range_error,
         segment_times=times,
-        segments=np.stack((np.interp(times, fine, bent), slopes - slope[fine.size // 2]), axis=1),
+        segments=np.stack((np.interp(times, fine, curved_range_error), slopes - slope[fine.size // 2]), axis=1),
         points=np.array(effect.displacement)
         + [indicated_point(geometry, piece, model, seen_from=effect.displacement) for piece in pieces],
         points_by=gradients_of(model),
@@ -349,8 +362,8 @@ def simulate_point(
         focused_response=_measured(through_peak[2], across, clean.mask_m),
         clean_response=clean,
         responses=tuple(
-            Response(target, moved, place, at, *measured)
-            for target, moved, place, at, measured in zip(
+            Response(target, moved, place, scene_place, *measured)
+            for target, moved, place, scene_place, measured in zip(
                 targets.points, effects, shown, in_scene_shown, cuts, strict=True
             )
         ),
@@ -359,14 +372,14 @@ def simulate_point(
 
 
 def declared_errors(mission: Mission) -> Errors:
-    """The declared errors of a mission as they are flown once: by its signs, its seed and its coverage factor.
+    """The declared errors of a mission as flown once, with its signs, its seed and its coverage factor.
 
-    A covariance has no sign to fly with: flown is its most probable error of one sigma of quadratic phase.
+    A covariance has no sign: its error is the most probable one with one sigma of quadratic phase.
     """
     analysis, factor, common = Analysis(mission), mission.allocation.coverage_factor, mission.common_motion_error
     errors = drawn_errors(analysis)
     sources = {source.id: source for source in analysis.sources}
-    likely = {
+    likely_errors = {
         group.platform: likely_error(group, [sources[row_id] for row_id in group.ids])
         for group in correlated_errors(mission)
     }
@@ -376,13 +389,13 @@ def declared_errors(mission: Mission) -> Errors:
         axes = state.frame(declared.frame)
         error = _turned((declared.position, declared.velocity, declared.acceleration), axes, factor)
         error = error._replace(time_tag=factor * (declared.time_tag or 0.0))
-        if name in likely:
-            flown = _turned((likely[name][:3], likely[name][3:]), axes, 1.0)
-            error = flown._replace(acceleration=error.acceleration)
+        if name in likely_errors:
+            likely_path_error = _turned((likely_errors[name][:3], likely_errors[name][3:]), axes, 1.0)
+            error = likely_path_error._replace(acceleration=error.acceleration)
         if common is not None:
-            shared = (common.position, common.velocity, common.acceleration)
-            of_both = _turned(shared, state.frame(common.frame), factor)
-            error = error.plus(of_both._replace(time_tag=factor * (common.time_tag or 0.0)))
+            common_vectors = (common.position, common.velocity, common.acceleration)
+            common_error = _turned(common_vectors, state.frame(common.frame), factor)
+            error = error.plus(common_error._replace(time_tag=factor * (common.time_tag or 0.0)))
         if mission.scene.height_error:  # a higher scene: both platforms are measured too high
             error = error.plus(PathError(position=(0.0, 0.0, mission.scene.height_error)))
         wideband = declared.vibration.wideband
@@ -392,39 +405,41 @@ def declared_errors(mission: Mission) -> Errors:
             course=getattr(errors, name).course,
         )
         errors = errors.of(name, error)
-    of_clocks = [[one.declared * term for term in one.clock] for one in analysis.stated if one.clock is not None]
-    return errors._replace(clock=tuple(map(math.fsum, zip((0.0,) * 4, *of_clocks, strict=True))))
+    clock_terms = [
+        [source.declared * term for term in source.clock] for source in analysis.stated if source.clock is not None
+    ]
+    return errors._replace(clock=tuple(map(math.fsum, zip((0.0,) * 4, *clock_terms, strict=True))))
 
 
 def _turned(
-    stated: Sequence[Sequence[float] | None], axes: tuple[Vector, Vector, Vector], factor: float
+    vectors: Sequence[Sequence[float] | None], axes: tuple[Vector, Vector, Vector], factor: float
 ) -> PathError:
-    """Position, velocity, acceleration error stated along a frame's axes, along the scene's, with their signs."""
-    found = []
-    for vector in stated:
-        parts = (0.0, 0.0, 0.0) if vector is None else vector
-        x, y, z = (factor * sum(d * axis[i] for d, axis in zip(parts, axes, strict=True)) for i in range(3))
-        found.append((x, y, z))
-    position, velocity, acceleration = (*found, (0.0, 0.0, 0.0))[:3]
+    """Turn position, velocity and acceleration errors from a frame's axes to the scene's axes, signs kept."""
+    turned = []
+    for vector in vectors:
+        components = (0.0, 0.0, 0.0) if vector is None else vector
+        x, y, z = (factor * sum(d * axis[i] for d, axis in zip(components, axes, strict=True)) for i in range(3))
+        turned.append((x, y, z))
+    position, velocity, acceleration = (*turned, (0.0, 0.0, 0.0))[:3]
     return PathError(position, velocity, acceleration)
 
 
 def _formers(
     collection: PointCollection, image_former: str, lines: RangeLines, flight: Flight
 ) -> tuple[Former, Former]:
-    """Image formers of the rotated images, and of the one along (x, y)."""
+    """Image formers of the rotated images and of the image along (x, y)."""
     radar = collection.radar
     exact = ExactRangeFormer(lines, radar, image_former == "matched_filter", collection.kernel)
     if image_former in ("backprojection", "matched_filter"):
         return exact, exact
-    sight = look_sum(*(one.measured for one in flight.paths))[:, :2]
+    sight = look_sum(*(path.measured for path in flight.paths))[:, :2]
     plane = PlaneWaves(sight, radar.center_frequency, radar.bandwidth, image_former == "polar_format")
     return plane, exact if plane.is_polar else plane
 
 
-def _middle(places: Sequence[GroundVector] | Floats) -> GroundVector:
-    """Middle of the box around some places, on which a patch is centred."""
-    low, high = np.min(places, axis=0), np.max(places, axis=0)
+def _middle(points: Sequence[GroundVector] | Floats) -> GroundVector:
+    """Middle of the box around ground points, on which a patch is centred."""
+    low, high = np.min(points, axis=0), np.max(points, axis=0)
     return float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2
 
 
@@ -434,10 +449,10 @@ def _plan(
     scene_former: Former,
     shown: Floats,
     scene_shown: Floats,
-    left: Floats,
+    remaining_range: Floats,
     slope: Floats,
 ) -> Plan:
-    """Choose patches and samples no larger than the responses ask for, from their range error and its slope.
+    """Choose the smallest patches and samples that hold the responses, from their range error and its slope.
 
     Along lines of equal range and of equal Doppler the band of a response is a box, and its smear lies along y′; in
     (x, y) both are turned.
@@ -446,37 +461,49 @@ def _plan(
     centre, scene_centre = _middle(shown), _middle(scene_shown)
     cell, scene_cell = former.sampled(centre), scene_former.sampled(scene_centre)
     finer = former.cells(centre)[0] / cell[0]
-    # Cycles over the aperture are cells of cross range; what the range error walks, cells of c/B.
+    # Cycles over the aperture are cells of cross range. The walk of the range error is in cells of c/B.
     reach = float(np.abs(slope).max()) * T / radar.wavelength
-    time = cell_centres(T, left.size)
-    walk = float(np.abs(left - slope * time).max()) * radar.bandwidth / SPEED_OF_LIGHT
-    apart = np.abs(former.offsets(shown, centre)).max(axis=0)
+    time = cell_centres(T, remaining_range.size)
+    walk = float(np.abs(remaining_range - slope * time).max()) * radar.bandwidth / SPEED_OF_LIGHT
+    farthest_cells = np.abs(former.offsets(shown, centre)).max(axis=0)
     echoes = sorted({line.frequency * T for line in _flown_lines(mission)})
-    given = mission.collection.pulses
-    room = _ECHO_CELLS if given is None else min(_ECHO_CELLS, given / 4 - reach - apart[1] - _MARGIN_CELLS - 1)
-    seen = [cycles for cycles in echoes if cycles <= room]
-    outside = "" if len(seen) == len(echoes) else (
-        f"echoes {', '.join(f'{cycles:.4g}' for cycles in echoes[len(seen) :])} resolution cells from the peak lie "
+    mission_pulses = mission.collection.pulses
+    echo_room = (
+        _MAX_ECHO_CELLS
+        if mission_pulses is None
+        else min(_MAX_ECHO_CELLS, mission_pulses / 4 - reach - farthest_cells[1] - _MARGIN_CELLS - 1)
+    )
+    shown_echoes = [cycles for cycles in echoes if cycles <= echo_room]
+    hidden_echoes = echoes[len(shown_echoes) :]
+    outside = "" if not hidden_echoes else (
+        f"echoes {', '.join(f'{cycles:.4g}' for cycles in hidden_echoes)} resolution cells from the peak lie "
         "outside the patch"
     )  # fmt: skip
-    reach += max(seen, default=0.0)
-    cells = [2 * math.ceil(extra + _MARGIN_CELLS) for extra in (finer * (walk + apart[0]), reach + apart[1])]
+    reach += max(shown_echoes, default=0.0)
+    cells = [
+        2 * math.ceil(extra + _MARGIN_CELLS)
+        for extra in (finer * (walk + farthest_cells[0]), reach + farthest_cells[1])
+    ]
     pulses = pulses_for(mission, cells[1])
     rotated = Patch(
         (_SAMPLES_PER_CELL * cells[0], _SAMPLES_PER_CELL * cells[1]),
         (cell[0] / _SAMPLES_PER_CELL, cell[1] / _SAMPLES_PER_CELL),
     )
-    cosine, sine = (float(part) for part in np.abs(scene_former.look(scene_centre)))
+    cosine, sine = (float(component) for component in np.abs(scene_former.look(scene_centre)))
     size = rotated.size
     extent = max(size[0] * cosine + size[1] * sine, size[0] * sine + size[1] * cosine)
-    band = (cosine / scene_cell[0] + sine / scene_cell[1], sine / scene_cell[0] + cosine / scene_cell[1])
-    capped = extent * min(1.0, math.sqrt(_SCENE_PIXELS / (_SAMPLES_PER_CELL**2 * extent**2 * band[0] * band[1])))
-    # All targets, whatever the cap says, with the ends of their responses.
-    around = 2 * float(np.abs(scene_shown - scene_centre).max())
-    extent = max(capped, min(extent, around + _MARGIN_CELLS * max(scene_cell))) if around else capped
-    shape = tuple(2 * math.ceil(_SAMPLES_PER_CELL * extent * one / 2) for one in band)
+    samples_per_metre = (cosine / scene_cell[0] + sine / scene_cell[1], sine / scene_cell[0] + cosine / scene_cell[1])
+    capped = extent * min(
+        1.0,
+        math.sqrt(_SCENE_PIXELS / (_SAMPLES_PER_CELL**2 * extent**2 * samples_per_metre[0] * samples_per_metre[1])),
+    )
+    # All targets with the ends of their responses, even if the patch then exceeds the cap.
+    targets_extent = 2 * float(np.abs(scene_shown - scene_centre).max())
+    extent = max(capped, min(extent, targets_extent + _MARGIN_CELLS * max(scene_cell))) if targets_extent else capped
+    shape = tuple(2 * math.ceil(_SAMPLES_PER_CELL * extent * density / 2) for density in samples_per_metre)
     in_scene = Patch((shape[0], shape[1]), (extent / shape[0], extent / shape[1]))
-    # Twice what keeps a profile from repeating within a patch: over its range cells and what those across walk.
+    # Twice the frequencies that keep a profile from repeating within a patch: over its range cells and the range walk
+    # of its cross-range cells.
     relative = radar.bandwidth / radar.center_frequency
     diagonal = extent * (cosine + sine)
     longest = max(
@@ -484,27 +511,27 @@ def _plan(
         diagonal / scene_former.cells(scene_centre)[0] + diagonal / scene_cell[1] * relative,
     )
     frequencies = max(_MIN_FREQUENCIES, math.ceil(2 * longest))
-    own = 2 * math.ceil(reach + _MARGIN_CELLS)
-    held = max(former.bytes_held, scene_former.bytes_held)
-    return Plan(rotated, in_scene, pulses, frequencies, own, finer, outside, held)
+    own_cells = 2 * math.ceil(reach + _MARGIN_CELLS)
+    bytes_held = max(former.bytes_held, scene_former.bytes_held)
+    return Plan(rotated, in_scene, pulses, frequencies, own_cells, finer, outside, bytes_held)
 
 
 def _flown_lines(mission: Mission) -> list[PathSinusoid]:
-    """Declared vibrations, and what they do to oscillators."""
+    """Declared vibrations, and the phases that they cause in oscillators."""
     return [line for name in PLATFORMS for line in _sinusoids(mission, name) if line.amplitude]
 
 
 def _sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
-    """Those of one platform."""
+    """Declared vibrations of one platform, and the phases that they cause in its oscillator."""
     count = len(getattr(mission.platforms, name).motion_error.vibration.sinusoidal)
-    lines = (one for entry in range(count) for one in sinusoids_of(mission, name, entry))
-    return (*lines, *oscillator_sinusoids(mission, name))
+    declared_lines = (line for entry in range(count) for line in sinusoids_of(mission, name, entry))
+    return (*declared_lines, *oscillator_sinusoids(mission, name))
 
 
 def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
-    """Motion of one declared vibration: of three axes along each, else along the line of sight.
+    """Motion of one declared vibration: along three axes, or along the line of sight if the file gives one number.
 
-    The axes are in the phase in which they add along the line of sight of mid-aperture.
+    The phases of the axes are those with which the motions add along the line of sight of mid-aperture.
     """
     error: DeclaredError = getattr(mission.platforms, name).motion_error
     line = error.vibration.sinusoidal[entry]
@@ -520,14 +547,14 @@ def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
 
 def pulses_for(mission: Mission, cells: int) -> int:
     """Pulses that sample the patch and every declared vibration twice over."""
-    given = mission.collection.pulses
+    pulses = mission.collection.pulses
     cycles = max((line.frequency for line in _flown_lines(mission)), default=0.0) * mission.collection.aperture_time
-    if given is not None and given <= 2 * cycles:
+    if pulses is not None and pulses <= 2 * cycles:
         raise SimulationError(
-            f"collection.pulses is {given}, but a declared vibration makes {cycles:.4g} cycles in the aperture and "
+            f"collection.pulses is {pulses}, but a declared vibration makes {cycles:.4g} cycles in the aperture and "
             f"aliases up to {2 * cycles:.4g} pulses; omit the key to get what it takes"
         )
-    if given is None:
+    if pulses is None:
         needed = max(2 * cells, 4 * cycles)
         if needed > _MAX_PULSES:
             raise SimulationError(
@@ -535,54 +562,57 @@ def pulses_for(mission: Mission, cells: int) -> int:
                 f"at most {_MAX_PULSES} are simulated unless collection.pulses asks for more"
             )
         return max(_MIN_PULSES, 1 << (math.ceil(needed) - 1).bit_length())
-    if given < 2 * cells:
+    if pulses < 2 * cells:
         raise SimulationError(
-            f"collection.pulses is {given}, but the patch is {cells} resolution cells wide and aliases below "
+            f"collection.pulses is {pulses}, but the patch is {cells} resolution cells wide and aliases below "
             f"{2 * cells} pulses; omit the key to get what it takes"
         )
-    return given
+    return pulses
 
 
 def _measured(cut: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:
-    """Measure a cross-range cut through a peak, moved to the middle.
+    """Measure a cross-range cut through a peak, with the peak moved to the middle.
 
-    A smear over most of the patch has its peak at one end, and would wrap around; it gets as much room again.
+    A smear over most of the patch has its peak at one end and would wrap around; the cut is then doubled with zeros.
     """
     count, column = cut.size, int(np.argmax(np.abs(cut)))
     try:
         return impulse_response(np.roll(cut, count // 2 - column), spacing, mask_m)
     except ValueError:
-        wide = np.concatenate((cut, np.zeros(count, dtype=complex)))
-        return impulse_response(np.roll(wide, count - column), spacing, mask_m)
+        padded = np.concatenate((cut, np.zeros(count, dtype=complex)))
+        return impulse_response(np.roll(padded, count - column), spacing, mask_m)
 
 
 def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> tuple[Floats, Complexes]:
     """Random scatterers over a patch, (n, 2) [m] and (n,): one for each resolution cell, circular normal.
 
     A cell is as large as the energy of a response of unit peak, so `level_db` is the mean power of a pixel. A patch
-    of finer pixels is narrower than a range cell is wide: what stands a range cell beside it counts there too, and is
+    of finer pixels is narrower than a range cell: scatterers up to a range cell beyond the patch contribute to it,
     out of focus by some cells across for each finer line.
     """
     if level_db is None:
         return np.empty((0, 2)), np.empty(0, dtype=complex)
-    rng = np.random.default_rng([seed, _CLUTTER_STREAM])
+    rng = np.random.default_rng([seed, _CLUTTER_STREAM_INDEX])
     nx, ny = grid.shape[:2]
-    above = min(_SAMPLES_PER_CELL * (finer - 1), 2 * nx)  # farther away, lines do not go on as they do here
-    beside = _BLUR * above
-    count = round((nx - 1 + 2 * above) * (ny - 1 + 2 * beside) / (_SAMPLES_PER_CELL**2 * finer))
-    row, column = rng.uniform(-above, nx - 1 + above, count), rng.uniform(-beside, ny - 1 + beside, count)
+    margin_rows = min(_SAMPLES_PER_CELL * (finer - 1), 2 * nx)  # farther away, lines cannot be continued
+    margin_columns = _BLUR_COLUMNS_PER_LINE * margin_rows
+    count = round((nx - 1 + 2 * margin_rows) * (ny - 1 + 2 * margin_columns) / (_SAMPLES_PER_CELL**2 * finer))
+    row, column = (
+        rng.uniform(-margin_rows, nx - 1 + margin_rows, count),
+        rng.uniform(-margin_columns, ny - 1 + margin_columns, count),
+    )
     amplitudes = 10 ** (level_db / 20) * (rng.normal(size=count) + 1j * rng.normal(size=count)) / math.sqrt(2)
     return between(grid[..., :2], row, column), amplitudes
 
 
 def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
-    """Part of the rotated patch in which a target's response is by itself, as far as the others leave room."""
-    away = np.abs(cells - cells[index])
-    beside = away[(away[:, 0] < 2 * _APART) & (away[:, 1] > 0), 1]
+    """Window of the rotated patch around a target's response, as far from other targets as they leave room."""
+    distances = np.abs(cells - cells[index])
+    neighbours = distances[(distances[:, 0] < 2 * _SEPARATE_RANGE_CELLS) & (distances[:, 1] > 0), 1]
     reach = plan.own_cells // 2 if len(cells) > 1 else plan.rotated.shape[1]
-    if beside.size:
-        reach = min(reach, max(_NEAREST, int(beside.min() / 2)))
-    rows = math.ceil(plan.finer * _APART) if len(cells) > 1 else plan.rotated.shape[0]
+    if neighbours.size:
+        reach = min(reach, max(_MIN_WINDOW_CELLS, int(neighbours.min() / 2)))
+    rows = math.ceil(plan.finer * _SEPARATE_RANGE_CELLS) if len(cells) > 1 else plan.rotated.shape[0]
     slices = []
     for cell, half, count in zip(cells[index] * (plan.finer, 1.0), (rows, reach), plan.rotated.shape, strict=True):
         middle = count // 2 + round(_SAMPLES_PER_CELL * float(cell))
@@ -593,14 +623,14 @@ def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
 def _cuts(
     images: Sequence[Complexes], rows: Sequence[float], columns: slice, spacing: float, amplitude: float
 ) -> list[ImpulseResponse | None]:
-    """Measure a target in the error-free image first, whose mask the others take; None where it is not there."""
-    found: list[ImpulseResponse | None] = []
+    """Measures of a target in each image, with the mask of the error-free image (the first); None if not there."""
+    measures: list[ImpulseResponse | None] = []
     mask = None
     for image, row in zip(images, rows, strict=True):
         try:
-            found.append(_measured(line_at(image[:, columns], row), spacing, mask))
-        except ValueError:  # what stands beside it reaches into its mainlobe
-            found.append(None)
-        mask = found[0].mask_m if found[0] else None
-    clean = found[0]
-    return found if clean and clean.peak > _THERE * amplitude else [None] * len(found)
+            measures.append(_measured(line_at(image[:, columns], row), spacing, mask))
+        except ValueError:  # a neighbour reaches into its mainlobe
+            measures.append(None)
+        mask = measures[0].mask_m if measures[0] else None
+    error_free = measures[0]
+    return measures if error_free and error_free.peak > _MIN_HEIGHT_FRACTION * amplitude else [None] * len(measures)

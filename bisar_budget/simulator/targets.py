@@ -11,20 +11,20 @@ from bisar_budget.faults import InvalidValueError
 from bisar_budget.resources import DISK, UnreadableError
 from bisar_budget.units import parse_quantity
 
-_MOST_POINTS = 100
-_FARTHEST = 1e5  # m
-_LEVELS = (-200.0, 200.0)  # dB
-_FORM = (
+_MAX_POINTS = 100
+_MAX_DISTANCE_M = 1e5  # from the scene centre
+_LEVEL_RANGE_DB = (-200.0, 200.0)
+_ACCEPTED_FORMS = (
     "EAST, NORTH or EAST, NORTH, LEVEL or grid:NXxNY:SPACING or clutter LEVEL, separated by semicolons; or the name "
     "of a .csv file"
 )
-_GRID = re.compile(r"grid:\s*(\d{1,3})\s*x\s*(\d{1,3})\s*:(.+)", re.ASCII)
-_COLUMNS = ("east [m]", "north [m]", "amplitude")
-_MOST_BYTES = 1 << 20  # of a list
+_GRID_PATTERN = re.compile(r"grid:\s*(\d{1,3})\s*x\s*(\d{1,3})\s*:(.+)", re.ASCII)
+_LIST_COLUMNS = ("east [m]", "north [m]", "amplitude")
+_MAX_LIST_BYTES = 1 << 20
 
 
 class Target(NamedTuple):
-    """A point on the ground: east, north of the scene centre [m], and its power over that of amplitude 1. [dB]"""
+    """A point on the ground: east and north of the scene centre [m], and power relative to amplitude 1 [dB]."""
 
     east: float = 0.0
     north: float = 0.0
@@ -32,7 +32,7 @@ class Target(NamedTuple):
 
 
 class Targets(NamedTuple):
-    """Points of a scene, and the mean power of its clutter over that of a point of 0 dB in a pixel; None is none."""
+    """Points of a scene, and its clutter: mean power of a pixel relative to a point of 0 dB [dB], or None."""
 
     points: tuple[Target, ...] = (Target(),)
     clutter_db: float | None = None
@@ -41,10 +41,14 @@ class Targets(NamedTuple):
 def parse_targets(text: str) -> Targets:
     """Read `0, 0; 30 m, -20 m, -6 dB; clutter -25 dB`, or `grid:3x3:50 m`, or the name of a list.
 
-    These are points, grids about the scene centre, and at most one clutter, in the units of a mission file; bare
-    numbers are metres and decibels. What ends in .csv is a file with the columns east [m], north [m], amplitude. A
-    `ValueError` says what is wrong with the first entry that cannot be read, or that there is no point, or more than
-    a hundred.
+    Entries are points, grids about the scene centre, and at most one clutter level, in the units of a mission file;
+    bare numbers are metres and decibels. An entry that ends in .csv names a file with the columns east [m],
+    north [m], amplitude.
+
+    Raises
+    ------
+    ValueError
+        The first entry that cannot be read, with the reason; or no point, or more than a hundred.
     """
     points: list[Target] = []
     clutter = None
@@ -62,26 +66,26 @@ def parse_targets(text: str) -> Targets:
         if entry.startswith("grid"):
             points += _grid(entry)
             continue
-        parts = [part.strip() for part in entry.split(",")]
-        if len(parts) not in (2, 3):
-            raise ValueError(f"{entry!r} has {len(parts)} parts; accepted: {_FORM}")
-        east, north = (_number(entry, part, units.LENGTH) for part in parts[:2])
-        points.append(Target(east, north, _number(entry, parts[2], units.POWER_RATIO) if parts[2:] else 0.0))
+        fields = [field.strip() for field in entry.split(",")]
+        if len(fields) not in (2, 3):
+            raise ValueError(f"{entry!r} has {len(fields)} parts; accepted: {_ACCEPTED_FORMS}")
+        east, north = (_number(entry, field, units.LENGTH) for field in fields[:2])
+        points.append(Target(east, north, _number(entry, fields[2], units.POWER_RATIO) if fields[2:] else 0.0))
     if not points:
-        raise ValueError(f"there is no point; accepted: {_FORM}")
-    if len(points) > _MOST_POINTS:
-        raise ValueError(f"there are {len(points)} points, at most {_MOST_POINTS} are simulated")
+        raise ValueError(f"there is no point; accepted: {_ACCEPTED_FORMS}")
+    if len(points) > _MAX_POINTS:
+        raise ValueError(f"there are {len(points)} points, at most {_MAX_POINTS} are simulated")
     return Targets(tuple(points), clutter)
 
 
 def _grid(entry: str) -> Iterator[Target]:
     """Points of equal level, `grid:NXxNY:SPACING`, about the scene centre."""
-    match = _GRID.fullmatch(entry)
+    match = _GRID_PATTERN.fullmatch(entry)
     if match is None:
-        raise ValueError(f"{entry!r} is no grid; accepted: {_FORM}")
+        raise ValueError(f"{entry!r} is no grid; accepted: {_ACCEPTED_FORMS}")
     columns, rows = int(match[1]), int(match[2])
-    if not 0 < columns * rows <= _MOST_POINTS:
-        raise ValueError(f"{entry!r} has {columns * rows} points, 1 to {_MOST_POINTS} are simulated")
+    if not 0 < columns * rows <= _MAX_POINTS:
+        raise ValueError(f"{entry!r} has {columns * rows} points, 1 to {_MAX_POINTS} are simulated")
     spacing = _number(entry, match[3].strip(), units.LENGTH)
     for row in range(rows):
         for column in range(columns):
@@ -89,44 +93,44 @@ def _grid(entry: str) -> Iterator[Target]:
 
 
 def read_list(file: str) -> list[Target]:
-    """Read points from a CSV file; a `ValueError` says the file and line of what is no list of points."""
+    """Read points from a CSV file; a `ValueError` names the file and the line that is not a point."""
     try:
-        data = DISK.content(file, _MOST_BYTES)
+        data = DISK.content(file, _MAX_LIST_BYTES)
     except UnreadableError as error:
         raise ValueError(str(error)) from None
-    if len(data) > _MOST_BYTES:
-        raise ValueError(f"{file} is longer than {_MOST_BYTES} bytes")
+    if len(data) > _MAX_LIST_BYTES:
+        raise ValueError(f"{file} is longer than {_MAX_LIST_BYTES} bytes")
     try:
         rows = list(csv.reader(data.decode("utf-8-sig").splitlines()))
     except UnicodeDecodeError:
         raise ValueError(f"{file} cannot be read: it is no text") from None
     except csv.Error as error:
         raise ValueError(f"{file} is not CSV: {error}") from None
-    head = [name.strip() for name in (rows or [[]])[0]]
-    if tuple(head) != _COLUMNS:
-        raise ValueError(f"{file}:1: the columns must be {', '.join(_COLUMNS)} (got {', '.join(head)[:60]})")
+    header = [name.strip() for name in (rows or [[]])[0]]
+    if tuple(header) != _LIST_COLUMNS:
+        raise ValueError(f"{file}:1: the columns must be {', '.join(_LIST_COLUMNS)} (got {', '.join(header)[:60]})")
     return [_listed(f"{file}:{line}", row) for line, row in enumerate(rows[1:], 2) if row]
 
 
-def _listed(place: str, row: list[str]) -> Target:
+def _listed(line_name: str, row: list[str]) -> Target:
     try:
-        east, north, amplitude = (float(part) for part in row)
+        east, north, amplitude = (float(field) for field in row)
     except ValueError:
-        raise ValueError(f"{place}: {', '.join(row)[:60]!r} is not three numbers") from None
-    if not (abs(east) <= _FARTHEST and abs(north) <= _FARTHEST):
-        raise ValueError(f"{place}: a point is beyond {_FARTHEST:g} m from the scene centre, or nowhere")
+        raise ValueError(f"{line_name}: {', '.join(row)[:60]!r} is not three numbers") from None
+    if not (abs(east) <= _MAX_DISTANCE_M and abs(north) <= _MAX_DISTANCE_M):
+        raise ValueError(f"{line_name}: a point is beyond {_MAX_DISTANCE_M:g} m from the scene centre, or nowhere")
     level = 20 * math.log10(amplitude) if 0 < amplitude < math.inf else -math.inf
-    if not _LEVELS[0] <= level <= _LEVELS[1]:
-        raise ValueError(f"{place}: the amplitude must be from 1e-10 to 1e10 (got {amplitude:g})")
+    if not _LEVEL_RANGE_DB[0] <= level <= _LEVEL_RANGE_DB[1]:
+        raise ValueError(f"{line_name}: the amplitude must be from 1e-10 to 1e10 (got {amplitude:g})")
     return Target(east, north, level)
 
 
-def _number(entry: str, part: str, dimension: units.Dimension) -> float:
+def _number(entry: str, quantity: str, dimension: units.Dimension) -> float:
     try:
-        number = parse_quantity(part, dimension)
+        number = parse_quantity(quantity, dimension)
     except InvalidValueError as error:
-        raise ValueError(f"{entry!r}: {part!r} {error.problem.problem}; accepted: {_FORM}") from None
-    low, high = (-_FARTHEST, _FARTHEST) if dimension is units.LENGTH else _LEVELS
+        raise ValueError(f"{entry!r}: {quantity!r} {error.problem.problem}; accepted: {_ACCEPTED_FORMS}") from None
+    low, high = (-_MAX_DISTANCE_M, _MAX_DISTANCE_M) if dimension is units.LENGTH else _LEVEL_RANGE_DB
     if not low <= number <= high:
-        raise ValueError(f"{entry!r}: {part!r} is beyond {low:g} to {high:g} {dimension.si}")
+        raise ValueError(f"{entry!r}: {quantity!r} is beyond {low:g} to {high:g} {dimension.si}")
     return number

@@ -45,7 +45,7 @@ def distance(one: Matrix, other: Matrix) -> Expr:
 
 
 def observed_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
-    """Return ΔR̂_m of (1): true distances to a scatterer less measured ones to the scene centre, and the clock. [m]"""
+    """Return ΔR̂_m of (1): true distances to a scatterer minus measured distances to the centre, and the clock. [m]"""
     total = c * Function("ttilde")(tau)
     for platform in platforms:
         measured = platform.position + measured_error(platform)
@@ -59,9 +59,10 @@ def measured_error(platform: PlatformSymbols) -> Matrix:
 
 
 def direct_path_clock() -> Expr:
-    """The c·t̃ of (1) for a receiver that hears the transmitter: measured less actual distance of both. [m]
+    """The c·t̃ of (1) for a receiver that hears the transmitter: measured minus actual distance of both. [m]
 
-    Its clock is the direct signal, which is late by the actual distance; the processor takes the measured one off.
+    The receiver's clock is the direct signal, which is late by the actual distance. The processor subtracts the
+    measured distance.
     """
     transmitter, receiver = (platform.position + measured_error(platform) for platform in PLATFORMS)
     actual = distance(*(platform.position for platform in PLATFORMS))
@@ -161,7 +162,7 @@ def _grown(expression: Expr) -> Expr:
 
 @cache
 def direct_path_range_error() -> Expr:
-    """First order of (1) for the scene centre where the direct path is the clock, errors of any course. [m]
+    """First order of (1) for the scene centre if the direct path is the clock, for any errors over time. [m]
 
     Slant ranges and the distance of the platforms are written R_t, R_r and D.
     """
@@ -175,9 +176,9 @@ def direct_path_range_error() -> Expr:
 
 @cache
 def range_error_of_tracks() -> Expr:
-    """Return (23): error of the differential range for errors of any course. [m]
+    """Return (23): error of the differential range for any errors over time. [m]
 
-    The processor subtracts the measured distance |r + r̃| where the data hold |r|, so (1) leaves
+    The processor subtracts the measured distance |r + r̃| while the data have |r|, so (1) leaves
     |r| − |r + r̃| for each platform. First order in r̃, then the motion model of (17).
     """
     total = c * Function("ttilde")(tau)

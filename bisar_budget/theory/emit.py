@@ -1,8 +1,8 @@
-"""Turn what is derived into `bisar_budget/evaluators.py`, plain arithmetic without imports, and `catalogue.py`.
+"""Write the derived formulas to `bisar_budget/evaluators.py`, plain arithmetic without imports, and `catalogue.py`.
 
-The catalogue has the formulas' text by name, their LaTeX and MathML by text: a report typesets those it uses without
-SymPy. Emission is deterministic: arguments, rows and common subexpressions keep a fixed order, constants are
-literals, nothing is dated. Anything that can meet a zero is left to the caller.
+The catalogue has the formulas' text by name, and their LaTeX and MathML by text, so that a report typesets formulas
+without SymPy. Emission is deterministic: arguments, rows and common subexpressions keep a fixed order, constants are
+literals, and there are no dates. The caller prevents divisions by zero.
 """
 
 import textwrap
@@ -36,7 +36,7 @@ from bisar_budget.theory.symbols import (
 )
 
 SYMPY_VERSION: str = sympy.__version__
-TIMES = r" \, "  # between factors of LaTeX, where a number may come to stand for each
+TIMES = r" \, "  # between factors of LaTeX, so that numbers can replace the factors
 
 _EVALUATORS = '''\
 """Numeric evaluators of the derived formulas.
@@ -66,10 +66,10 @@ MathML the invisible times, so that numbers can be put in.
 
 @dataclass(frozen=True)
 class Evaluator:
-    """One function to emit: its arguments in order and its rows of results, named where they are several.
+    """One function to emit: its arguments in order and its rows of results, with names if there are several rows.
 
-    `quotients` names negated quotients -numerator/denominator to write the rest in. Where they are results
-    themselves, arrays are divided once and no intermediate array stays alive.
+    `quotients` names negated quotients -numerator/denominator in which the rows are written. If a quotient is itself
+    a result, arrays are divided once and no intermediate array stays alive.
     """
 
     name: str
@@ -110,7 +110,7 @@ def both_platforms_arguments() -> tuple[tuple[Symbol, str], ...]:
 
 
 def effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
-    """Return what one unit of an error does: β̃₀, β̃₁, QPE, cubic phase at the aperture edge, signed like β̃."""
+    """Return the effects of one unit of an error: β̃₀, β̃₁, QPE, cubic phase at the aperture edge, signed like β̃."""
     per_unit = [published.sensitivity(term, error) for term in beta]
     return (
         per_unit[0],
@@ -218,7 +218,7 @@ def evaluators() -> tuple[Evaluator, ...]:
 
 
 def _of_random_errors() -> tuple[Evaluator, ...]:
-    """Evaluators for the effect of noise over an aperture; mean squares where it is a process."""
+    """Evaluators for the effect of noise over an aperture; mean squares for processes."""
     figures = random_errors.inertial()
     columns = "Columns: quadratic and cubic phase at the aperture edge, what is left after the cubic. "
     parts = "Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic, "
@@ -308,7 +308,7 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
 
 
 def _decimal(expression: Expr) -> Expr:
-    """Write factors such as 1/8 as decimals where that is exact."""
+    """Write factors such as 1/8 as decimals if that is exact."""
     dyadic = {r: Float(r) for r in expression.atoms(Rational) if r.q > 1 and r.q & (r.q - 1) == 0}
     return expression.xreplace(dyadic)
 
@@ -352,7 +352,7 @@ _SHOWN = ("(11)", "(19)", "(22)", "(25)", "(30)", "(31)")
 
 
 def equations() -> tuple[Equation, ...]:
-    """Return the equations that a report shows, the paper's first; of (30) the one at mid-aperture."""
+    """Return the equations that a report shows, the paper's first. (30) is shown at mid-aperture."""
     shown = (one for one in published.equations() if one.number in _SHOWN and not one.right.has(published.tau_i))
     return (*shown, *full.equations())
 
@@ -383,7 +383,7 @@ def named() -> Iterator[tuple[str, Expr]]:
 
 
 def formulas() -> Iterator[Expr]:
-    """Every expression of the catalogue: the named ones, and both sides of the equations."""
+    """All expressions of the catalogue: the named expressions, and both sides of the equations."""
     yield from (formula for _, formula in named())
     for equation in equations():
         yield equation.left

@@ -1,13 +1,13 @@
-"""The full model: every first-order term of the range error, and what the displacement of the image adds.
+"""The full model: all first-order terms of the range error, and the terms that the displacement of the image adds.
 
-Rigling & Moses hold the range constant and look at the quadratic term alone. Here the line of sight turns as it
-does: with u(τ) the unit vector to a platform, a position error r̃(τ) changes the range by −u(τ)·r̃(τ) to first
-order. Constant and linear terms move the response to x̂, where a point has a history of its own; what defocuses is
-the rest. Derived here; nothing of it is in the paper.
+Rigling & Moses hold the range constant and use only the quadratic term. Here the line of sight turns: with u(τ) the
+unit vector to a platform, a position error r̃(τ) changes the range by −u(τ)·r̃(τ) to first order. Constant and linear
+terms move the response to x̂, where a point has a range history. The range error minus that history defocuses. The
+model is derived here; it is not in the paper.
 
-Numbers come from `range_error_at` at the nodes of Gauss-Legendre quadrature, as `ranges` has it, whatever the length
-of the aperture. The series about its middle is what a reader compares with Table I: over a short aperture both are
-the same.
+Numbers come from `range_error_at` at the nodes of Gauss-Legendre quadrature, as in `ranges`, for any length of the
+aperture. The series about the middle of the aperture is for comparison with Table I: over a short aperture both
+agree.
 """
 
 from collections.abc import Sequence
@@ -52,7 +52,7 @@ from bisar_budget.theory.symbols import (
     tau,
 )
 
-ORDER = 4  # of slow time: the quartic term of a long aperture is in part a quadratic phase
+ORDER = 4  # of slow time: the quartic term of a long aperture is partly a quadratic phase
 
 DIRECT_PATH = ImmutableMatrix([real(f"b_{axis}") for axis in AXES])  # unit vector from receiver to transmitter
 DISPLACEMENT = ImmutableMatrix([real("xhat"), real("yhat")])
@@ -71,18 +71,18 @@ def growth(platform: PlatformSymbols) -> dict[Symbol, Expr]:
 @cache
 def look_series(platform: PlatformSymbols) -> tuple[Matrix, ...]:
     """Derivatives of the line of sight u = r/|r| at τ = 0, orders 0 to 4, (3,) each, in `growth`. [1/sⁿ]"""
-    grown = 1 + sum(d * tau**n for n, d in enumerate(growth(platform), start=1))
-    inverse = [diff(1 / sqrt(grown), tau, n).subs(tau, 0) / factorial(n) for n in range(ORDER + 1)]
+    growth_sum = 1 + sum(d * tau**n for n, d in enumerate(growth(platform), start=1))
+    inverse = [diff(1 / sqrt(growth_sum), tau, n).subs(tau, 0) / factorial(n) for n in range(ORDER + 1)]
     track = (platform.position, platform.velocity, platform.acceleration / 2)
     series = []
     for n in range(ORDER + 1):
-        terms = (component * inverse[n - k] for k, component in enumerate(track) if k <= n)
+        terms = (term * inverse[n - k] for k, term in enumerate(track) if k <= n)
         series.append(sum(terms, start=Matrix([0, 0, 0])) * factorial(n) / platform.slant_range)
     return tuple(series)
 
 
 def range_error_at(platform: PlatformSymbols) -> Expr:
-    """Range error of one platform at one slow time to first order, −u·r̃(τ), its position being that at τ. [m]"""
+    """Range error of one platform at one slow time to first order, −u·r̃(τ), with the position at τ. [m]"""
     first_order = dr.first_order_range_error(platform)
     return first_order.subs(platform.exact_slant_range(), platform.slant_range)
 
@@ -102,32 +102,32 @@ def range_error() -> tuple[Expr, ...]:
 
 
 def direct_range_error(platform: PlatformSymbols) -> Expr:
-    """Range error of one platform where the direct path is the clock: −(u_t − b)·r̃_t or −(u_r + b)·r̃_r. [m]
+    """Range error of one platform if the direct path is the clock: −(u_t − b)·r̃_t or −(u_r + b)·r̃_r. [m]
 
-    Its error is of any course; b is the unit vector from receiver to transmitter at that time.
+    The error may have any form over time; b is the unit vector from receiver to transmitter at that time.
     """
-    (other,) = (of_platform for of_platform in PLATFORMS if of_platform is not platform)
+    (other_platform,) = (platform_symbols for platform_symbols in PLATFORMS if platform_symbols is not platform)
     b = DIRECT_PATH if platform is TRANSMITTER else -DIRECT_PATH
-    total = dr.direct_path_range_error().subs(dict.fromkeys(dr.error_track(other), 0))
-    return expand(total.subs(dict(zip(other.position, platform.position - baseline * b, strict=True))))
+    total = dr.direct_path_range_error().subs(dict.fromkeys(dr.error_track(other_platform), 0))
+    return expand(total.subs(dict(zip(other_platform.position, platform.position - baseline * b, strict=True))))
 
 
 def direct_sight(platform: PlatformSymbols) -> Matrix:
-    """Decrease of the range per metre of each error where the direct path is the clock: u_t − b or u_r + b."""
-    sight = dict(zip(platform.position, platform.slant_range * platform.look[0], strict=True))
-    return Matrix([-direct_range_error(platform).coeff(e).subs(sight) for e in dr.error_track(platform)])
+    """Decrease of the range per metre of each error if the direct path is the clock: u_t − b or u_r + b."""
+    unit_sight = dict(zip(platform.position, platform.slant_range * platform.look[0], strict=True))
+    return Matrix([-direct_range_error(platform).coeff(e).subs(unit_sight) for e in dr.error_track(platform)])
 
 
 def ground_history() -> tuple[Matrix, ...]:
     """Derivatives of s = u_t + u_r on the ground, orders 0 to 4, (2,) each: a point has the range −s(τ)·x."""
     looks = zip(*(platform.look for platform in PLATFORMS), strict=True)
-    return tuple(Matrix([sum(u[axis] for u in both) for axis in range(2)]) for both in looks)
+    return tuple(Matrix([sum(u[axis] for u in looks_of_both) for axis in range(2)]) for looks_of_both in looks)
 
 
 def gradient_inverse() -> tuple[tuple[Symbol, ...], Matrix, Expr]:
     """Gradients s_x, s_y, ṡ_x, ṡ_y on the ground, and adjugate (2, 2) and determinant of their Q = −[s; ṡ].
 
-    Q takes a ground point to its constant and linear range. [-], [1/s]
+    Q maps a ground point to its constant and linear range. [-], [1/s]
     """
     s, rate = Matrix([real("s_x"), real("s_y")]), Matrix([real("sdot_x"), real("sdot_y")])
     Q = -Matrix([list(s), list(rate)])
@@ -135,23 +135,23 @@ def gradient_inverse() -> tuple[tuple[Symbol, ...], Matrix, Expr]:
 
 
 def amplitude_share(own: Expr, other: Expr) -> Expr:
-    """Part of a platform in an amplitude that both make, in the ratio of the roots of their shares of power."""
-    part = positive("a")
-    (found,) = solve(Eq(part * sqrt(other), (1 - part) * sqrt(own)), part)
-    return found
+    """Part of a platform in an amplitude of both platforms, in the ratio of the roots of their shares of power."""
+    platform_part = positive("a")
+    (solution,) = solve(Eq(platform_part * sqrt(other), (1 - platform_part) * sqrt(own)), platform_part)
+    return solution
 
 
 def motion_of_phase(phase: Expr) -> Expr:
-    """Motion along the line of sight that makes a phase, one way. [m]"""
+    """Motion along the line of sight with a given phase, one way. [m]"""
     motion = positive("A")
-    (motion_error,) = solve(Eq(published.one_way_phase(motion), phase), motion)
-    return motion_error
+    (solution,) = solve(Eq(published.one_way_phase(motion), phase), motion)
+    return solution
 
 
 def quartic_as_quadratic() -> Expr:
     """Quadratic coefficient of the cubic fitted to x⁴ over −1 … 1: 6/7.
 
-    Its projection on the second Legendre polynomial, the only one up to the third that holds an x².
+    It follows from the projection on the second Legendre polynomial, the only one up to the third that has an x².
     """
     x = real("x")
     second = legendre(2, x)
@@ -175,7 +175,7 @@ def displacement_coefficients() -> tuple[Expr, ...]:
 
 
 def effective_coefficients() -> tuple[Expr, Expr, Expr]:
-    """β₂, β₃, β₄ left at the displaced point: β̃ₙ + s⁽ⁿ⁾·x̂/n!."""
+    """β₂, β₃, β₄ at the displaced point: β̃ₙ + s⁽ⁿ⁾·x̂/n!."""
     beta, added = range_error(), displacement_coefficients()
     second, third, fourth = (beta[n] + added[n] for n in (2, 3, 4))
     return second, third, fourth
@@ -183,7 +183,7 @@ def effective_coefficients() -> tuple[Expr, Expr, Expr]:
 
 @cache
 def table() -> Table:
-    """Coefficients of the range error with every first-order term, before what the displacement adds."""
+    """Coefficients of the range error with all first-order terms, without the terms of the displacement."""
     return Table(
         number="Full model",
         title="Differential range errors with the line of sight turning as it does",
@@ -199,41 +199,43 @@ def table() -> Table:
 
 @cache
 def equations() -> tuple[Equation, ...]:
-    """How the line of sight turns, where a response goes, and what defocuses there."""
+    """Turn of the line of sight, displacement of a response, and the coefficients that defocus it."""
     platform = PLATFORMS[0]
     second, third, fourth = effective_coefficients()
     history = ground_history()
     determinant = history[0][0] * history[1][1] - history[0][1] * history[1][0]
-    left = [real(f"beta_{n}") for n in range(ORDER + 1)]
-    fitted = quadratic_phase(left)
+    remaining = [real(f"beta_{n}") for n in range(ORDER + 1)]
+    fitted = quadratic_phase(remaining)
     constant, linear = real("beta_0tilde"), real("beta_1tilde")
-    moved = -Matrix(
+    displacement = -Matrix(
         [history[1][1] * constant - history[0][1] * linear, history[0][0] * linear - history[1][0] * constant]
     )
-    grown = (Equation("", "Growth of the squared range", d, value) for d, value in growth(platform).items())
+    growth_equations = (
+        Equation("", "Growth of the squared range", d, value) for d, value in growth(platform).items()
+    )
     names = ("u", "udot", "uddot", "udddot", "uddddot")
     orders = ("first", "second", "third", "fourth")
     titles = ("Line of sight", *(f"Line of sight, {order} derivative" for order in orders))
     looks = zip(names, titles, look_series(platform), strict=True)
     return (
-        *grown,
+        *growth_equations,
         *(Equation("", title, Symbol(f"{name}_{platform.subscript}"), look) for name, title, look in looks),
-        Equation("", "Displacement of the image, times the determinant", Symbol("detQ") * DISPLACEMENT, moved),
+        Equation("", "Displacement of the image, times the determinant", Symbol("detQ") * DISPLACEMENT, displacement),
         Equation("", "Determinant of Q", Symbol("detQ"), determinant),
         Equation("", "Quadratic coefficient at the displaced point", real("beta_2"), _collected(second)),
         Equation("", "Cubic coefficient at the displaced point", real("beta_3"), _collected(third)),
         Equation("", "Quartic coefficient at the displaced point", real("beta_4"), _collected(fourth)),
         Equation("", "Quadratic phase error, of the quadratic fitted over the aperture", real("phi_2"), fitted),
-        Equation("", "Cubic phase at the aperture edge", real("phi_3"), cubic_phase(left)),
+        Equation("", "Cubic phase at the aperture edge", real("phi_3"), cubic_phase(remaining)),
         *_of_the_direct_path(),
     )
 
 
 def _of_the_direct_path() -> tuple[Equation, ...]:
-    """Where the receiver hears the transmitter: what stands for u_t, u_r and t̃ in every term."""
-    apart = (TRANSMITTER.position - RECEIVER.position) / baseline
+    """If the receiver hears the transmitter: the terms that replace u_t, u_r and t̃."""
+    direction = (TRANSMITTER.position - RECEIVER.position) / baseline
     return (
-        Equation("", "Direct path, from receiver to transmitter", Symbol("b"), apart),
+        Equation("", "Direct path, from receiver to transmitter", Symbol("b"), direction),
         *(
             Equation(
                 "",
@@ -247,28 +249,28 @@ def _of_the_direct_path() -> tuple[Equation, ...]:
 
 
 def _collected(coefficient: Expr) -> Expr:
-    """Write β̃ₙ for what the table has, and keep what the displacement adds."""
+    """Coefficient as β̃ₙ of the table plus the terms that the displacement adds."""
     order = 2 + effective_coefficients().index(coefficient)
     return Add(real(f"beta_{order}tilde"), expand(coefficient - range_error()[order]), evaluate=False)
 
 
 @cache
 def vibration() -> Table:
-    """Vibration from first principles: what a phase of peak φ or rms σ does, and the motion that does it.
+    """Vibration from first principles: the effect of a phase of peak φ or RMS σ, and the motion with that phase.
 
-    A sinusoid's echoes are J₁(φ)/J₀(φ) of the response, φ/2 to first order. Of Gaussian noise exp(-σ²) of the power
-    stays in the response, and a share E of that within its first nulls, so that the rest over it is (exp(σ²) - 1)/E.
-    Both platforms at one frequency divide amplitudes, both with noise of their own divide powers.
+    A sinusoid's echoes are J₁(φ)/J₀(φ) of the response, φ/2 to first order. With Gaussian noise, exp(-σ²) of the
+    power stays in the response, and a share E of that within its first nulls. So the ISLR is (exp(σ²) - 1)/E. Both
+    platforms at one frequency share the amplitude; both with independent noise share the power.
     """
-    amplitude, rms, phase, component, energy = (positive(name) for name in ("A", "sigma", "phi", "a", "E"))
-    over, under = (series(besselj(n, phase), phase, 0, 2).removeO() for n in (1, 0))
-    echo = over / under
+    amplitude, rms, phase, platform_part, energy = (positive(name) for name in ("A", "sigma", "phi", "a", "E"))
+    first_order, zeroth_order = (series(besselj(n, phase), phase, 0, 2).removeO() for n in (1, 0))
+    echo = first_order / zeroth_order
     (largest,) = solve(Eq(echo, sqrt(pslr)), phase)
     spread = (exp(phase**2) - 1) / energy
     (noise,) = (root for root in solve(Eq(spread, islr), phase) if root.is_nonnegative is not False)
     rows = (
         (amplitude, echo**2, motion_of_phase(largest), "one platform alone"),
-        (amplitude, echo**2, component * motion_of_phase(largest), "a part a of the amplitude of both, in phase"),
+        (amplitude, echo**2, platform_part * motion_of_phase(largest), "a part a of the amplitude of both, in phase"),
         (rms, spread, sqrt(share) * motion_of_phase(noise), "share s of the power of both, independent"),
     )
     return Table(

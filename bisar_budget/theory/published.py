@@ -1,7 +1,7 @@
 """Rigling & Moses as published: every numbered equation, (1) to (31), Tables I and II, vibration and pull-in.
 
-Equations are defined as the paper does, or derived from those before; tables are derived row by row in print order.
-What the print gets wrong is said where it occurs, and the equation is the right one. Sums keep their indices: i
+Equations are defined as in the paper, or derived from earlier equations. Tables are derived row by row in print
+order. An error of the print is noted at its equation, and the equation here is correct. Sums keep their indices: i
 counts frequencies, k pulses, m scatterers, k_x and k_y the samples of the rectangular grid.
 """
 
@@ -66,7 +66,7 @@ EQUAL_SHARE_QPE = pi / 8  # per platform, half of the monostatic custom, Section
 
 @dataclass(frozen=True)
 class TableRow:
-    """One row of a table: its number in print, the error it is about, its cells left to right."""
+    """One row of a table: its number in print, its error, and its cells from left to right."""
 
     number: int | None
     error: Symbol
@@ -105,7 +105,7 @@ def motion_errors(platform: PlatformSymbols) -> tuple[Symbol, ...]:
 
 
 def single_error(expression: Expr, error: Symbol) -> Expr:
-    """Keep what one error alone does: every other error is set to zero."""
+    """Keep the effect of one error: all other errors are set to zero."""
     every = [*clock_coefficients, *(e for platform in PLATFORMS for e in motion_errors(platform))]
     return expression.xreplace({other: Integer(0) for other in every if other != error})
 
@@ -271,7 +271,7 @@ def phase(differential_range: Expr) -> Expr:
 
 
 def in_slow_time(expression: Expr, at: Expr = tau_k) -> Expr:
-    """Put φ_t(τ_k) for φ̄_t, and so on: angles at any time for those of the aperture's middle."""
+    """Replace φ̄_t by φ_t(τ_k), and so on: angles of the aperture's middle by angles at any time."""
     for platform in PLATFORMS:
         s = platform.subscript
         expression = expression.subs(
@@ -296,7 +296,7 @@ def unrotated(x: Expr, y: Expr) -> Matrix:
 
 
 def exponent(products: Expr) -> Expr:
-    """Exponent of a far-field filter, −jΦ by (2), where x·f_x + y·f_y + z·f_z stands for −f·ΔR/2 by (6) and (8)."""
+    """Exponent of a far-field filter, −jΦ by (2), with x·f_x + y·f_y + z·f_z for −f·ΔR/2 by (6) and (8)."""
     together = real("products")
     return (-I * phase(-2 * together / f_i)).subs(together, products)
 
@@ -338,7 +338,7 @@ def geometric_sum(step: Expr, count: Expr) -> tuple[Expr, Expr]:
 
 def response() -> Expr:
     """Return (16): the filter (14) of the samples (15), its sums done: two Dirichlet kernels for each scatterer."""
-    # Of one scatterer the sums part: exp(−j(4π/c)(x′ − x′_m)(f₀ + B_x k_x/N_x)), and the same in y′.
+    # The sums of one scatterer separate: exp(−j(4π/c)(x′ − x′_m)(f₀ + B_x k_x/N_x)), and the same in y′.
     whole, kernels = [], []
     for offset, start, band, count in (
         (x_turned - x_of[m], f_0, B_x, N_x),
@@ -346,7 +346,7 @@ def response() -> Expr:
     ):
         turn, kernel = geometric_sum(4 * pi / c * offset * band / count, count)
         phase_of_it = -4 * I * pi / c * offset * start + turn
-        # What multiplies the offset: 2f₀ + B_x − B_x/N_x, and B_y/N_y, which is left of −B_y + B_y.
+        # Factor of the offset: 2f₀ + B_x − B_x/N_x, and B_y/N_y, which is left of −B_y + B_y.
         whole.append(offset * expand(simplify(phase_of_it / offset / (-2 * I * pi / c))))
         kernels.append(kernel)
     turned = exp(-2 * I * pi / c * (whole[0] + whole[1]))
@@ -359,7 +359,7 @@ def general_matrix() -> Matrix:
 
 
 def observed_polynomial() -> tuple[Expr, ...]:
-    """β̂₀ … β̂₃ of (24): what (17) and (23) add up to, order by order."""
+    """β̂₀ … β̂₃ of (24): the sum of (17) and (23), order by order."""
     scatterer = beta[0] + beta[1] * tau
     error = sum(coefficient * tau**n for n, coefficient in enumerate(beta_error))
     return dr.coefficients(scatterer + error)
@@ -373,7 +373,7 @@ def tangent() -> tuple[Expr, Expr]:
 
 @cache
 def piece_inverse() -> tuple[Matrix, Expr]:
-    """Adjugate (2, 2) and determinant of Q_i, platforms where they are at τ_i and their ranges held: (30)."""
+    """Adjugate (2, 2) and determinant of Q_i, for the platforms at τ_i with constant ranges: (30)."""
     moved = {
         coordinate: coordinate + speed * tau_i
         for platform in PLATFORMS

@@ -1,9 +1,9 @@
-"""Random errors over one aperture: what noise of sensors and clocks does to quadratic phase, cubic phase and ISLR.
+"""Random errors over one aperture: quadratic phase, cubic phase and ISLR by noise of sensors and clocks.
 
 An error x over the aperture is a sum of Legendre polynomials Pₙ(2τ/T). Orders 0 and 1 displace, 3/2 of order 2 is the
-quadratic phase at the aperture edge, 5/2 of order 3 the cubic one, and what is left of its mean square spreads over
+quadratic phase at the aperture edge, 5/2 of order 3 is the cubic phase, and the rest of the mean square spreads over
 the image. A tone of frequency f has the part (2n + 1)·jₙ(πfT) in order n, so that a spectrum is integrated with its
-square. A range error has the phase k·x, k = 2π/λ, one way. Derived here; nothing of it is in the paper.
+square. A range error has the phase k·x, k = 2π/λ, one way. All is derived here; the paper has no random errors.
 
 Spectra are one-sided. One sigma each; axes and platforms are independent.
 """
@@ -36,13 +36,13 @@ from sympy import (
 from bisar_budget.theory.published import Equation, Table, TableRow, one_way_phase
 from bisar_budget.theory.symbols import T, center_frequency, positive, real
 
-ORDERS = 4  # 0 to 3; what is left of a history after them spreads
+ORDERS = 4  # 0 to 3; the rest of a history spreads
 LEADING = (1, 1, Rational(3, 2), Rational(5, 2))  # coefficient of xⁿ in Pₙ: the order's value at the aperture edge
-TERMS = 9  # powers of a series about zero; below 0.5 what is left out is less than 1e-8 of it
+TERMS = 9  # powers of a series about zero; the truncation is less than 1e-8 of it for arguments below 0.5
 
 along = positive("u")  # length of the line of sight; with a size for each axis, the root of Σ(u·σ)²
-# Along the line of sight, per unit: the specific force f that a tilt turns into it, |u × f|, and what each axis of a
-# unit scale factor measures of f too much.
+# Along the line of sight, per unit: the specific force f that a tilt turns into it, |u × f|, and the excess of f by
+# each axis of a unit scale factor.
 turned, scaled = positive("f_u"), positive("f_s")
 ratio = positive("a")  # T/(2τ_c): half the aperture over the correlation time
 decay = positive("d")  # exp(−2a)
@@ -55,22 +55,22 @@ _x, _m, _M, _w = real("xi"), positive("m"), positive("M"), positive("w")
 
 
 class Moments(NamedTuple):
-    """Mean squares over an aperture: quadratic and cubic part at its edge, and what is left after the cubic."""
+    """Mean squares over an aperture: quadratic and cubic part at its edge, and the remainder after the cubic."""
 
     quadratic: Expr
     cubic: Expr
     left: Expr
 
     def times(self, factor: Expr) -> "Moments":
-        """Scale them."""
-        return Moments(*(expand(factor * part) for part in self))
+        """The moments times a factor."""
+        return Moments(*(expand(factor * moment) for moment in self))
 
 
 class PlaceMoments(NamedTuple):
-    """Moments of what displaces, beside `Moments`: mean squares of orders 0 and 1, and products with what defocuses.
+    """Moments of the orders that displace: mean squares of orders 0 and 1, and their products with orders 2 and 3.
 
-    Of the constant and the linear part at the aperture edge, of constant times quadratic and of linear times cubic
-    part. Over time that runs either way alike even and odd orders know nothing of each other.
+    The moments are of the constant and the linear part at the aperture edge, of constant times quadratic and of
+    linear times cubic part. For processes that are symmetric in time, even and odd orders are uncorrelated.
     """
 
     constant: Expr
@@ -79,11 +79,11 @@ class PlaceMoments(NamedTuple):
     linear_cubic: Expr
 
 
-_PLACE_ORDERS = ((0, 0), (1, 1), (0, 2), (1, 3))  # of `PlaceMoments`
+_PLACE_ORDERS = ((0, 0), (1, 1), (0, 2), (1, 3))  # pairs of orders of the fields of `PlaceMoments`
 
 
 def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
-    """Sort the mean squares of the coefficients of P₀ … P₃ and that of the whole history."""
+    """Moments from the mean squares of the coefficients of P₀ … P₃ and the mean square of the full history."""
     orders = [square / (2 * n + 1) for n, square in enumerate(coefficients)]
     return Moments(
         LEADING[2] ** 2 * coefficients[2],
@@ -94,9 +94,9 @@ def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
 
 # ---------------------------------------------------------------------- inertial sensors
 def _from_middle(response: Callable[[Expr], Expr]) -> Callable[[Expr, Expr], Expr]:
-    """Covariance at m ≤ M on one side of mid-aperture of white noise that acts from there on, by its response.
+    """Covariance at m ≤ M, on one side of mid-aperture, of white noise that acts from mid-aperture, by its response.
 
-    Both sides are independent: an error that is zero at mid-aperture has grown by other noise before than after.
+    Both sides are independent: an error that is zero at mid-aperture grows by different noise before and after.
     """
 
     def covariance(m: Expr, M: Expr) -> Expr:
@@ -114,8 +114,8 @@ def walk(order: int) -> Moments:
         earlier = integrate(expand(legendre(n, _m) * covariance(_m, _M)), (_m, 0, _M))
         one_side = 2 * integrate(expand(legendre(n, _M) * earlier), (_M, 0, 1))
         squares.append(Rational(2 * n + 1, 2) ** 2 * 2 * one_side)
-    whole = integrate(covariance(_M, _M), (_M, 0, 1))
-    return moments(tuple(squares), whole).times(Rational(1, 2) ** (2 * order - 1))  # from half an aperture to T
+    mean_square = integrate(covariance(_M, _M), (_M, 0, 1))
+    return moments(tuple(squares), mean_square).times(Rational(1, 2) ** (2 * order - 1))  # from half an aperture to T
 
 
 def constant(order: int) -> Moments:
@@ -129,7 +129,7 @@ def constant(order: int) -> Moments:
 
 
 class Figure(NamedTuple):
-    """A figure of an inertial sensor: its symbol, what it is, mean squares of the phase that a unit of it makes."""
+    """A figure of an inertial sensor: symbol, name, explanation, and mean squares of the phase of one unit."""
 
     symbol: Symbol
     name: str
@@ -159,7 +159,7 @@ def inertial() -> tuple[Figure, ...]:
 
 # ---------------------------------------------------------------------- Gauss-Markov
 def _with_exponential(polynomial: Poly, rate: Expr) -> Expr:
-    """Factor of exp(rate·x) in the antiderivative of polynomial·exp(rate·x): by parts, over and over."""
+    """Factor of exp(rate·x) in the antiderivative of polynomial·exp(rate·x), by repeated integration by parts."""
     total, sign = Integer(0), 1
     for order in range(polynomial.degree() + 1):
         total += sign * polynomial.as_expr() / rate ** (order + 1)
@@ -170,12 +170,12 @@ def _with_exponential(polynomial: Poly, rate: Expr) -> Expr:
 def _gauss_markov_coefficients(m: int, n: int) -> Expr:
     """Mean product of the coefficients of Pₘ and Pₙ, both even or both odd, of a process of variance 1."""
     first, second = (Poly(legendre(order, _x), _x) for order in (m, n))
-    # ∫ Pₙ(t)·exp(−a(s − t)) dt from −1 to s is q(s) − q(−1)·exp(−a(s + 1)); r is that of Pₘ for −a, and integrates
-    # what is left.
+    # ∫ Pₙ(t)·exp(−a(s − t)) dt from −1 to s is q(s) − q(−1)·exp(−a(s + 1)). The factor r is the same for Pₘ and −a,
+    # and integrates the second term.
     q, r = _with_exponential(second, ratio), _with_exponential(first, -ratio)
-    both = integrate(expand(first.as_expr() * q), (_x, -1, 1))
-    both -= q.subs(_x, -1) * (r.subs(_x, 1) * decay - r.subs(_x, -1))
-    return expand(Rational((2 * m + 1) * (2 * n + 1), 4) * 2 * both)
+    product = integrate(expand(first.as_expr() * q), (_x, -1, 1))
+    product -= q.subs(_x, -1) * (r.subs(_x, 1) * decay - r.subs(_x, -1))
+    return expand(Rational((2 * m + 1) * (2 * n + 1), 4) * 2 * product)
 
 
 @cache
@@ -186,21 +186,21 @@ def gauss_markov() -> Moments:
 
 @cache
 def gauss_markov_place() -> PlaceMoments:
-    """The same of what displaces."""
+    """`PlaceMoments` of the process of `gauss_markov`, in `ratio` and `decay`."""
     return PlaceMoments(*(LEADING[n] * _gauss_markov_coefficients(m, n) for m, n in _PLACE_ORDERS))
 
 
 @cache
 def gauss_markov_slow() -> tuple[Expr, ...]:
-    """Both where the correlation time is long, as a series in `ratio`."""
+    """`gauss_markov` and `gauss_markov_place` for a long correlation time, as series in `ratio`."""
     exact = (*gauss_markov(), *gauss_markov_place())
-    return tuple(_series(part.subs(decay, exp(-2 * ratio)), ratio) for part in exact)
+    return tuple(_series(moment.subs(decay, exp(-2 * ratio)), ratio) for moment in exact)
 
 
 def _series(expression: Expr, variable: Symbol) -> Expr:
     """Series about zero of an expression whose terms cancel there: powers of the variable times e, sine and cosine.
 
-    Taylor's polynomials in their place are exact as far as they go, and sums of powers are what SymPy is quick at.
+    Taylor polynomials replace these functions: they are exact up to their order, and SymPy is fast at sums of powers.
     """
     powers = range(4 * ORDERS + 2 * TERMS)
     taylor = {
@@ -208,11 +208,11 @@ def _series(expression: Expr, variable: Symbol) -> Expr:
         sin(variable): sum(Integer(-1) ** (n // 2) * variable**n / factorial(n) for n in powers if n % 2),
         cos(variable): sum(Integer(-1) ** (n // 2) * variable**n / factorial(n) for n in powers if n % 2 == 0),
     }
-    # No term has the variable to more than this power below it.
+    # No term is divided by a higher power of the variable.
     exact = Poly(expand(expand(expression).subs(taylor) * variable ** (2 * ORDERS)), variable)
-    known = [(power - 2 * ORDERS, coefficient) for (power,), coefficient in exact.terms()]
-    first = min(power for power, _ in known)
-    return sum(coefficient * variable**power for power, coefficient in known if power < first + TERMS)
+    terms = [(power - 2 * ORDERS, coefficient) for (power,), coefficient in exact.terms()]
+    first = min(power for power, _ in terms)
+    return sum(coefficient * variable**power for power, coefficient in terms if power < first + TERMS)
 
 
 # ---------------------------------------------------------------------- spectra
@@ -226,9 +226,9 @@ def spherical_bessel(n: int) -> Expr:
 @cache
 def tone() -> Moments:
     """Amplitudes of the quadratic and the cubic phase of a tone of amplitude 1, and the share of its power left."""
-    parts = [spherical_bessel(n) for n in range(ORDERS)]
-    left = 1 - sum((2 * n + 1) * part**2 for n, part in enumerate(parts))
-    return Moments(LEADING[2] * 5 * parts[2], LEADING[3] * 7 * parts[3], left)
+    amplitudes = [spherical_bessel(n) for n in range(ORDERS)]
+    remaining_share = 1 - sum((2 * n + 1) * amplitude**2 for n, amplitude in enumerate(amplitudes))
+    return Moments(LEADING[2] * 5 * amplitudes[2], LEADING[3] * 7 * amplitudes[3], remaining_share)
 
 
 def tone_place() -> tuple[Expr, Expr]:
@@ -239,24 +239,24 @@ def tone_place() -> tuple[Expr, Expr]:
 @cache
 def tone_in_terms() -> tuple[Expr, ...]:
     """`tone` and `tone_place` in `sine` and `cosine` of `angle`."""
-    return tuple(part.subs({sin(angle): sine, cos(angle): cosine}) for part in (*tone(), *tone_place()))
+    return tuple(expression.subs({sin(angle): sine, cos(angle): cosine}) for expression in (*tone(), *tone_place()))
 
 
 def tone_slow() -> tuple[Expr, ...]:
-    """Both of a slow tone, as a series in `angle`."""
-    return tuple(_series(part, angle) for part in (*tone(), *tone_place()))
+    """`tone` and `tone_place` of a slow tone, as series in `angle`."""
+    return tuple(_series(expression, angle) for expression in (*tone(), *tone_place()))
 
 
 def tone_fast() -> tuple[Expr, ...]:
     """`Moments` and `PlaceMoments` of a fast tone, sine and cosine averaged, in `inverse` powers of the angle.
 
-    Order n of a tone turns by n quarters: those that are two apart have opposite signs.
+    Order n of a tone turns by n quarters of a cycle, so orders n and n + 2 have opposite signs.
     """
     quadratic, cubic, left, constant, linear = tone_in_terms()
     mean = {sine**2: Rational(1, 2), cosine**2: Rational(1, 2), sine * cosine: Integer(0)}
     products = (quadratic**2, cubic**2, left, constant**2, linear**2, -constant * quadratic, -linear * cubic)
-    averaged = (Poly(expand(expand(part).subs(mean)), 1 / angle) for part in products)
-    return tuple(sum(c * inverse[n // 2] for (n,), c in part.terms()) for part in averaged)
+    averaged = (Poly(expand(expand(product).subs(mean)), 1 / angle) for product in products)
+    return tuple(sum(c * inverse[n // 2] for (n,), c in polynomial.terms()) for polynomial in averaged)
 
 
 def power_law_integral(n: int, slope: int) -> Expr:
@@ -281,26 +281,26 @@ def power_law(order: int) -> tuple[Expr, ...]:
 
 def passed() -> Expr:
     """Amplitude of a tone that straight lines between its samples pass, sinc²(f·T_s): the transform of a triangle."""
-    part = positive("nu")
-    return simplify(2 * integrate((1 - part) * cos(step * part), (part, 0, 1)))
+    fraction = positive("nu")
+    return simplify(2 * integrate((1 - fraction) * cos(step * fraction), (fraction, 0, 1)))
 
 
 def interpolated() -> Expr:
-    """Share of a tone's power that linear interpolation between samples leaves, in y = 2πf·T_s.
+    """Share of a tone's power that remains after linear interpolation between samples, in y = 2πf·T_s.
 
-    At its own frequency (1 − sinc²)² of it, at each of those that it is folded to sinc⁴ there.
+    The share is (1 − sinc²)² at the frequency of the tone, and sinc⁴ at each frequency to which it is folded.
     """
-    part = positive("nu")
-    missed = exp(I * step * part) - (1 - part) - part * exp(I * step)
-    there = (1 - part) + part * exp(-I * step)
-    square = expand_complex(expand(missed * (exp(-I * step * part) - there)))
-    return simplify(integrate(expand(square), (part, 0, 1)).rewrite(cos))
+    fraction = positive("nu")
+    error = exp(I * step * fraction) - (1 - fraction) - fraction * exp(I * step)
+    conjugate_line = (1 - fraction) + fraction * exp(-I * step)
+    square = expand_complex(expand(error * (exp(-I * step * fraction) - conjugate_line)))
+    return simplify(integrate(expand(square), (fraction, 0, 1)).rewrite(cos))
 
 
 def interpolated_noise() -> Expr:
     """Mean square of samples of variance 1 with linear interpolation between them."""
-    part = positive("nu")
-    return integrate((1 - part) ** 2 + part**2, (part, 0, 1))
+    fraction = positive("nu")
+    return integrate((1 - fraction) ** 2 + fraction**2, (fraction, 0, 1))
 
 
 # ---------------------------------------------------------------------- vibration
@@ -316,13 +316,13 @@ def vibrating_oscillator() -> Expr:
 
 
 def vibrating_path() -> Expr:
-    """Amplitude of the displacement of what is accelerated by a·cos(2πft), less uniform motion. [m]"""
+    """Amplitude of the displacement by an acceleration a·cos(2πft), without uniform motion. [m]"""
     wave = cos(2 * pi * _frequency * _time)
     return simplify(-integrate(integrate(_acceleration * wave, _time), _time) / wave)
 
 
 def of_spectrum(amplitude: Expr) -> Expr:
-    """Spectrum of what a tone of acceleration does with an amplitude, of one with the spectrum S_a."""
+    """Spectrum for accelerations of spectrum S_a, from the amplitude for a tone of acceleration."""
     return amplitude.subs(_acceleration, 1) ** 2 * positive("S_a")
 
 
@@ -356,7 +356,7 @@ def table() -> Table:
 
 
 def equations() -> tuple[Equation, ...]:
-    """Parts of a tone, integrals of power laws, what synchronisation leaves, and what vibration does."""
+    """Parts of a tone, integrals of power laws, remainders after synchronisation, and effects of vibration."""
     quadratic, cubic, left = tone()
     names = (("quadratic", "phi_2", quadratic), ("cubic", "phi_3", cubic))
     laws = (
@@ -364,8 +364,8 @@ def equations() -> tuple[Equation, ...]:
         for slope, value in enumerate(power_law(2))
     )
     return (
-        *(Equation("", f"Amplitude of the {what} phase of a tone, x = πfT", real(name), simplify(value))
-          for what, name, value in names),
+        *(Equation("", f"Amplitude of the {order_name} phase of a tone, x = πfT", real(name), simplify(value))
+          for order_name, name, value in names),
         Equation("", "Share of a tone's power left after the cubic", real("L"), left),
         *laws,
         Equation("", "Amplitude that straight lines between samples pass, y = 2πfT_s", real("H"), passed()),

@@ -239,7 +239,7 @@ def as_text(expression: Basic) -> str:
 
 
 def as_latex(expression: Basic, times: str = " ") -> str:
-    """LaTeX without delimiters; `times` stands between factors."""
+    """LaTeX without delimiters; `times` is between factors."""
     return str(_Latex({"mul_symbol": times, "imaginary_unit": "j"}).doprint(expression))
 
 
@@ -263,7 +263,7 @@ def as_mathml_content(expression: Basic) -> str:
 
 
 def derivation(selection: str, format_name: str) -> str:
-    """Write what `bisar-budget derive` prints: `all`, `equations`, `I`, `II`, `vibration`, `full` or `random`."""
+    """Text of `bisar-budget derive`: `all`, `equations`, `I`, `II`, `vibration`, `full` or `random`."""
     tables: dict[str, Callable[[], Table]] = {
         "I": published.table_1,
         "II": published.table_2,
@@ -288,7 +288,7 @@ def derivation(selection: str, format_name: str) -> str:
 
 
 def numbered(number: int, format_name: str) -> str:
-    """Write one equation of the paper, all its parts."""
+    """Write all parts of one equation of the paper."""
     return _EQUATIONS[format_name](_TITLE, tuple(e for e in published.equations() if e.number == f"({number})"))
 
 

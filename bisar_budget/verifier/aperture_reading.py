@@ -1,11 +1,11 @@
-"""A chip read for each part of the aperture: the phase that an error leaves there, taken from the image.
+"""Phase of an error over the aperture, measured in the image of a chip.
 
-Every pulse contributes to every pixel what exact ranges by the measured paths say. A polynomial of the phase over the
-aperture is fitted to the pixels themselves, so that the ends of the patch, where a finite image cuts sidelobes off,
-count as what they are. The fit starts where exact ranges put the response. What it leaves over of the image says
-whether the polynomial is the image's; if not, the image is correlated with each pulse's contribution. That gives the
-pulse's phase: the projection of the spectrum to slow time, with range walk and bent lines as they are. The error-free
-response, formed and read by the same paths, takes out what is common to both.
+The contribution of each pulse to each pixel follows from exact ranges by the measured paths. A polynomial of the
+phase over the aperture is fitted to the pixels, so that the ends of the patch, where a finite image cuts off
+sidelobes, are modelled too. The fit starts at the position of the response by exact ranges. The remainder of the fit
+shows whether the polynomial describes the image. If not, the image is correlated with the contribution of each pulse,
+which gives the phase of the pulse: the projection of the spectrum to slow time, including range walk and bent lines.
+The error-free response is formed and read with the same paths, so that effects common to both responses cancel.
 """
 
 import math
@@ -32,31 +32,32 @@ from bisar_budget.simulator.image_formation import taylor_window
 from bisar_budget.simulator.impulse_response import place_of_peak
 from bisar_budget.simulator.phase_history import Complexes, Errors, Floats, cell_centres
 
-READ_CELLS = 1  # of range that a chip needs around the middle line, beside what a response walks
-_STRIDE = 2  # lines from one that is read to the next
-_INNER = 0.95  # of the aperture, in the correlation; its edges ring in a patch of finite extent
-# Order of the polynomial: a turn of ±0.5 rad shows sixth powers; continued to what a patch does not hold, high ones
-# are worth nothing.
-_ORDERS = ((0.9, 6), (0.6, 3), (-1.0, 2))
-_PRESENT = 0.25  # of the median strength over the aperture; less is smeared out of the patch
-_WALKS = 2  # fits, the range walk being that of the fit before
-_REFINEMENTS, _HALVINGS, _SETTLED_RAD = 20, 6, 1e-5
-# Of an image's norm, which is the phase's rms: less left over, and the polynomial is the image's; is it for sure, a
-# quarter of the 0.02 rad that a measured phase may be off.
-_REPRODUCED, _EXACT = 0.05, 5e-3
-_BLOCK = 1 << 18  # contributions formed at once
-_SUPPORT = 0.4  # of the largest error-free spectral magnitude; the band's edges ring in a finite image
-_TIMES = 64  # read from the lines' spectra at once
-_KERNEL = np.linspace(0, 64, 4097)  # range cells, of a tapered range response
+READ_CELLS = 1  # of range that a chip needs around the middle line, in addition to the range walk
+_READ_STRIDE_LINES = 2  # from one line that is read to the next
+_INNER_FRACTION = 0.95  # of the aperture, in the correlation; its edges ring in a patch of finite extent
+# Orders of the polynomial, each with the share of the aperture that it needs. A turn of ±0.5 rad shows sixth powers.
+# High orders are worthless where they are extrapolated beyond the patch.
+_POLYNOMIAL_ORDERS = ((0.9, 6), (0.6, 3), (-1.0, 2))
+_PRESENT_FRACTION = 0.25  # of the median strength over the aperture; weaker pulses are smeared out of the patch
+_WALK_ROUNDS = 2  # of the fit, each with the range walk of the fit before
+_MAX_REFINEMENT_STEPS, _MAX_HALVING_STEPS, _REFINEMENT_TOLERANCE_RAD = 20, 6, 1e-5
+# Norm of the remainder over the norm of the image, which is the RMS of the phase. Below the first limit the
+# polynomial fits the image. Below the second it does so for certain: a quarter of the allowed error of a measured
+# phase, 0.02 rad.
+_FITTED_RAD, _EXACT_RAD = 0.05, 5e-3
+_BLOCK_CONTRIBUTIONS_COUNT = 1 << 18  # formed at once
+_SPECTRUM_FRACTION = 0.4  # of the largest error-free spectral magnitude; the band's edges ring in a finite image
+_BLOCK_TIMES_COUNT = 64  # slow times read from the lines' spectra at once
+_KERNEL_CELLS = np.linspace(0, 64, 4097)  # range cells of a tapered range response
 
 
 class ApertureReading(NamedTuple):
     """Phases at the aperture edge, signed like the range error [rad].
 
-    `across_pixels` is how far the response lies from the middle along y′, by the linear part of the phase.
-    `walked_pixels` is what the other parts put the centre of gravity nearer along x′: at a frequency of y′ it lies
-    where the range error less its slope times slow time puts it. `coverage` is what the patch holds of the aperture,
-    1 unless a smear leaves it.
+    `across_pixels` is the offset of the response from the middle along y′, by the linear part of the phase.
+    `walked_pixels` is the offset of the centre of gravity along x′ by the other parts of the phase: at a frequency of
+    y′ the response lies at the range error minus its slope times slow time. `coverage` is the share of the aperture
+    that the patch holds, 1 unless a smear leaves the patch.
     """
 
     quadratic: float
@@ -72,7 +73,7 @@ def read_aperture(
     centre: GroundVector,
     chip: Chip,
     reference: Chip,
-    beside: int = 0,
+    half_lines: int = 0,
     expected: ExactEffect | None = None,
 ) -> ApertureReading:
     """Read quadratic and cubic phase of a response.
@@ -80,15 +81,15 @@ def read_aperture(
     Parameters
     ----------
     collection, errors
-        Those that formed the chips; the errors are of the measured paths.
+        Collection and errors that formed the chips; the errors are in the measured paths.
     centre : (2,) float
         Middle of the chips and place of the reference. [m]
     chip, reference : Chip
         With and without error, on the same pixels.
-    beside : int
-        Lines on either side of the middle one that are read too.
+    half_lines : int
+        Additional lines to read, on either side of the middle.
     expected : ExactEffect, optional
-        Where the fit starts. If no polynomial near it reproduces the pixels, what single pulses say is tried too.
+        Start of the fit. If no polynomial near it fits the pixels, the phases of single pulses are tried too.
 
     Raises
     ------
@@ -97,44 +98,44 @@ def read_aperture(
     """
     lines, columns = chip.image.shape
     middle = lines // 2
-    half = min(middle, lines - 1 - middle, beside) // _STRIDE * _STRIDE
-    rows = slice(middle - half, middle + half + 1, _STRIDE)
+    half = min(middle, lines - 1 - middle, half_lines) // _READ_STRIDE_LINES * _READ_STRIDE_LINES
+    rows = slice(middle - half, middle + half + 1, _READ_STRIDE_LINES)
     slow_time = cell_centres(collection.aperture_time, pulses_for(round(columns / OVERSAMPLING)))
     pixels = chip.grid[rows].reshape(-1, 3)
-    images = [one.image[rows] for one in (chip, reference)]
-    fitting = _Fitting(collection, errors, centre, pixels, slow_time, images, bool(beside))
-    best, covered = _Refined(np.zeros(4), math.inf), 1.0
+    images = [member.image[rows] for member in (chip, reference)]
+    fitting = _Fitting(collection, errors, centre, pixels, slow_time, images, bool(half_lines))
+    solution, coverage = _Refined(np.zeros(4), math.inf), 1.0
     if expected is not None:
-        best = fitting.refined(np.array([0.0, 0.0, -expected.quadratic / 1.5, -expected.cubic / 2.5]))
-    if best.misfit >= _EXACT:
-        by_pulses, covered = _fit_to_pulses(_Pixels(collection, errors, centre, pixels), slow_time, images, columns)
-        if expected is None and not covered:
+        solution = fitting.refined(np.array([0.0, 0.0, -expected.quadratic / 1.5, -expected.cubic / 2.5]))
+    if solution.misfit >= _EXACT_RAD:
+        by_pulses, coverage = _fit_to_pulses(_Pixels(collection, errors, centre, pixels), slow_time, images, columns)
+        if expected is None and not coverage:
             raise ValueError("the response is not in the image")
-        best = min(best, fitting.refined(by_pulses), key=lambda one: one.misfit)
-        if best.misfit < _REPRODUCED:
-            covered = 1.0
-        elif covered:
-            best = _Refined(by_pulses, best.misfit)
+        solution = min(solution, fitting.refined(by_pulses), key=lambda candidate: candidate.misfit)
+        if solution.misfit < _FITTED_RAD:
+            coverage = 1.0
+        elif coverage:
+            solution = _Refined(by_pulses, solution.misfit)
         else:
             raise ValueError("the response is not in the image")
-    fit = best.fit
-    # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING, twice its P₁ part.
+    fit = solution.fit
+    # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING, which is twice its P₁ part.
     turn = 1 if collection.range_lines(errors).turns_left(centre) else -1
     across = -turn * OVERSAMPLING / math.pi * float(fit[1])
-    place = 2 * slow_time / collection.aperture_time
+    scaled_time = 2 * slow_time / collection.aperture_time
     slope = np.polynomial.legendre.legder([0.0, 0.0, *fit[2:]])
-    mean = float(np.mean(place * np.polynomial.legendre.legval(place, slope)))
+    mean = float(np.mean(scaled_time * np.polynomial.legendre.legval(scaled_time, slope)))
     radar = collection.radar
     by_range = collection.range_lines(errors).gradients(np.asarray(centre, dtype=float))[0]
     lines_per_cell = collection.range_cell / (float(np.hypot(*by_range)) * chip.spacing[0])
-    # Range cells that a wavelength of range error walks: the bandwidth over the centre frequency.
+    # Range walk of a wavelength of range error, in range cells: the bandwidth over the centre frequency.
     walked = mean / (2 * math.pi) * (radar.bandwidth / radar.center_frequency) * lines_per_cell
     # The image's phase is −2π/λ times the range error; P₂ = (3t² - 1)/2, P₃ = (5t³ - 3t)/2.
-    return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, covered * 1.02))
+    return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, coverage * 1.02))
 
 
 class _Pixels:
-    """Pixels (n, 3) of an image, and what each pulse adds to them of a point at a place."""
+    """Pixels (n, 3) of an image, and the contributions of each pulse to them for a point at a position."""
 
     def __init__(self, collection: PointCollection, errors: Errors, centre: GroundVector, pixels: Floats) -> None:
         self.collection, self.errors, self.places = collection, errors.smooth(), pixels
@@ -144,50 +145,53 @@ class _Pixels:
         self.squares = _squares(pixels)
         if collection.is_tapered:
             weights, frequency = taylor_window(257), cell_centres(1.0, 257)
-            self.kernel = np.cos(2 * math.pi * np.outer(_KERNEL, frequency)) @ weights / 257
+            self.kernel = np.cos(2 * math.pi * np.outer(_KERNEL_CELLS, frequency)) @ weights / 257
 
-    def contributions(self, slow_time: Floats, left: Floats | None = None) -> NDArray[np.complex64]:
+    def contributions(self, slow_time: Floats, remaining_range: Floats | None = None) -> NDArray[np.complex64]:
         """Contributions of pulses (m,) to pixels (n,), (m, n), at baseband.
 
-        `left` (m,) is a range error that displaces the range responses, and has no part in the phase. [m]
+        `remaining_range` (m,) is a range error that displaces the range responses without changing the phase. [m]
         """
         collection = self.collection
         paths = collection.flight(self.errors, slow_time).paths
         if collection.is_tapered:  # over the aperture too
-            fine = taylor_window(1024)
-            by_time = np.interp(slow_time, cell_centres(collection.aperture_time, fine.size), fine)[:, None]
+            weights = taylor_window(1024)
+            by_time = np.interp(slow_time, cell_centres(collection.aperture_time, weights.size), weights)[:, None]
         contribution = np.empty((slow_time.size, self.places.shape[0]), dtype=np.complex64)
-        pulses = max(1, _BLOCK // self.places.shape[0])
+        pulses = max(1, _BLOCK_CONTRIBUTIONS_COUNT // self.places.shape[0])
         for start in range(0, slow_time.size, pulses):
-            part = slice(start, start + pulses)
-            farther = np.zeros(contribution[part].shape)
-            for one in paths:
-                farther += _distance(one.measured[part], self.places, self.squares)
-                farther -= _distance(one.measured[part], self.point, _squares(self.point))
-            # Whole cycles are taken off in double precision; of what is left single precision holds 1e-6 rad, in a
-            # quarter of the time.
-            cycles = (farther - self.carrier) / collection.wavelength
+            block = slice(start, start + pulses)
+            range_difference = np.zeros(contribution[block].shape)
+            for path in paths:
+                range_difference += _distance(path.measured[block], self.places, self.squares)
+                range_difference -= _distance(path.measured[block], self.point, _squares(self.point))
+            # Whole cycles are subtracted in double precision. Single precision then holds the remainder to 1e-6 rad,
+            # in a quarter of the time.
+            cycles = (range_difference - self.carrier) / collection.wavelength
             cycles -= np.rint(cycles)
-            turned = (2 * math.pi * cycles).astype(np.float32)
-            if left is not None:
-                farther -= left[part, None]
-            cells = (farther * (collection.radar.bandwidth / SPEED_OF_LIGHT)).astype(np.float32)
+            phase = (2 * math.pi * cycles).astype(np.float32)
+            if remaining_range is not None:
+                range_difference -= remaining_range[block, None]
+            cells = (range_difference * (collection.radar.bandwidth / SPEED_OF_LIGHT)).astype(np.float32)
             if collection.is_tapered:
-                strength = np.interp(np.abs(cells), _KERNEL, self.kernel, right=0.0) * by_time[part]
+                strength = np.interp(np.abs(cells), _KERNEL_CELLS, self.kernel, right=0.0) * by_time[block]
             else:
                 strength = np.sinc(cells)
-            np.multiply(np.cos(turned), strength, out=contribution[part].real)
-            np.multiply(np.sin(turned), strength, out=contribution[part].imag)
+            np.multiply(np.cos(phase), strength, out=contribution[block].real)
+            np.multiply(np.sin(phase), strength, out=contribution[block].imag)
         return contribution
 
 
 def _squares(points: Floats) -> Floats:
-    found: Floats = np.einsum("ij,ij->i", points, points)
-    return found
+    squares: Floats = np.einsum("ij,ij->i", points, points)
+    return squares
 
 
 def _distance(positions: Floats, points: Floats, squares: Floats) -> Floats:
-    """From positions (m, 3) to points (n, 3), their squares known, (m, n): to 1e-8 m from geostationary orbit. [m]"""
+    """Distances (m, n) from positions (m, 3) to points (n, 3), exact to 1e-8 m from geostationary orbit. [m]
+
+    `squares` (n,) are the squares of the points.
+    """
     square: Floats = positions @ (-2 * points.T)
     square += _squares(positions)[:, None]
     square += squares
@@ -195,55 +199,57 @@ def _distance(positions: Floats, points: Floats, squares: Floats) -> Floats:
 
 
 def _fit_to_pulses(
-    every: _Pixels, slow_time: Floats, images: Sequence[Complexes], columns: int
+    pulse_pixels: _Pixels, slow_time: Floats, images: Sequence[Complexes], columns: int
 ) -> tuple[Floats, float]:
-    """A polynomial through the phases of single pulses, and its share of the aperture: 0 without its middle.
+    """Polynomial through the phases of single pulses, and the share of the aperture that they cover.
 
-    `images` are with and without error, of the same pixels.
+    The share is 0 if the middle of the aperture is missing. `images` are with and without error, of the same pixels.
     """
-    place = 2 * slow_time / every.collection.aperture_time
-    # The ends of a line, half the cells of a response without smear, fade.
+    scaled_time = 2 * slow_time / pulse_pixels.collection.aperture_time
+    # A taper over the ends of a line, each half as long as a response without smear.
     inside = np.minimum(np.arange(columns) + 0.5, columns - np.arange(columns) - 0.5)
     taper = np.sin(math.pi / 2 * np.clip(inside / round(CELLS * OVERSAMPLING / 2), 0, 1)) ** 2
-    tapered = np.stack([(one * taper).reshape(-1) for one in images])
+    tapered = np.stack([(image * taper).reshape(-1) for image in images])
     correlated = np.empty((2, slow_time.size), dtype=complex)
-    block = max(1, _BLOCK // every.places.shape[0])
-    for start in range(0, slow_time.size, block):
-        part = slice(start, start + block)
-        correlated[:, part] = tapered @ every.contributions(slow_time[part]).conj().T
-    seen, clean = correlated
-    strength = np.abs(seen) / np.maximum(np.abs(clean), 1e-30)
-    inner = np.abs(place) < _INNER
-    present = strength > _PRESENT * np.median(strength[inner])
-    middle = place.size // 2
+    block_pulses = max(1, _BLOCK_CONTRIBUTIONS_COUNT // pulse_pixels.places.shape[0])
+    for start in range(0, slow_time.size, block_pulses):
+        block = slice(start, start + block_pulses)
+        correlated[:, block] = tapered @ pulse_pixels.contributions(slow_time[block]).conj().T
+    with_error, clean = correlated
+    strength = np.abs(with_error) / np.maximum(np.abs(clean), 1e-30)
+    inner = np.abs(scaled_time) < _INNER_FRACTION
+    present = strength > _PRESENT_FRACTION * np.median(strength[inner])
+    middle = scaled_time.size // 2
     if not np.isfinite(strength).all():
         raise ValueError("the response is not in the image")
     if not present[middle]:
         return np.zeros(4), 0.0
     gaps = np.nonzero(~(present & inner))[0]
     first = int(gaps[gaps < middle].max(initial=-1)) + 1
-    last = int(gaps[gaps > middle].min(initial=place.size))
-    if last - first <= _ORDERS[0][1]:  # too few pulses for a polynomial
+    last = int(gaps[gaps > middle].min(initial=scaled_time.size))
+    if last - first <= _POLYNOMIAL_ORDERS[0][1]:  # too few pulses for a polynomial
         return np.zeros(4), 0.0
-    kept = slice(first, last)
-    covered = float(place[last - 1] - place[first]) / (2 * _INNER)
-    order = next(order for part, order in _ORDERS if covered > part)
-    phase = np.unwrap(np.angle((seen * clean.conj())[kept]))
+    fitted_pulses = slice(first, last)
+    coverage = float(scaled_time[last - 1] - scaled_time[first]) / (2 * _INNER_FRACTION)
+    order = next(order for least_coverage, order in _POLYNOMIAL_ORDERS if coverage > least_coverage)
+    phase = np.unwrap(np.angle((with_error * clean.conj())[fitted_pulses]))
     fit = np.zeros(max(4, order + 1))
-    fit[: order + 1] = np.polynomial.legendre.legfit(place[kept], phase, order, w=np.abs(clean[kept]))
-    return fit, covered
+    fit[: order + 1] = np.polynomial.legendre.legfit(
+        scaled_time[fitted_pulses], phase, order, w=np.abs(clean[fitted_pulses])
+    )
+    return fit, coverage
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Refined:
-    """Polynomial of the phase, and what of the image it leaves over, of its norm."""
+    """Polynomial of the phase, and norm of the remainder over the norm of the image."""
 
     fit: Floats
     misfit: float
 
 
 class _Fitting:
-    """Fits of the phase's polynomial to some pixels of an image: of a large one they are enough."""
+    """Fits of the phase's polynomial to a selection of the pixels of an image, which is enough in a large image."""
 
     def __init__(
         self,
@@ -255,65 +261,65 @@ class _Fitting:
         images: Sequence[Complexes],
         walks: bool,
     ) -> None:
-        some = slice(None, None, -(-pixels.shape[0] * slow_time.size // CONTRIBUTIONS))
-        self.seen, clean = (one.reshape(-1)[some] for one in images)
-        self.few = _Pixels(collection, errors, centre, pixels[some])
-        self.slow_time, self.fits = slow_time, _WALKS if walks else 1
-        at_rest = self.few.contributions(slow_time).sum(axis=0)
+        selection = slice(None, None, -(-pixels.shape[0] * slow_time.size // CONTRIBUTIONS))
+        self.seen, clean = (image.reshape(-1)[selection] for image in images)
+        self.fitted_pixels = _Pixels(collection, errors, centre, pixels[selection])
+        self.slow_time, self.fits = slow_time, _WALK_ROUNDS if walks else 1
+        at_rest = self.fitted_pixels.contributions(slow_time).sum(axis=0)
         self.gain = complex(np.vdot(at_rest, clean) / np.vdot(at_rest, at_rest))
 
     def refined(self, fit: Floats) -> _Refined:
-        """Refine a polynomial, the range walk being that of the fit before."""
-        collection = self.few.collection
-        place = 2 * self.slow_time / collection.aperture_time
-        found = _Refined(np.pad(fit, (0, _ORDERS[0][1] + 1 - fit.size)), math.inf)
+        """Refine a polynomial in rounds, each with the range walk of the fit before."""
+        collection = self.fitted_pixels.collection
+        scaled_time = 2 * self.slow_time / collection.aperture_time
+        solution = _Refined(np.pad(fit, (0, _POLYNOMIAL_ORDERS[0][1] + 1 - fit.size)), math.inf)
         for _ in range(self.fits):
-            # What is left of the range error takes a pulse to other range cells too.
-            phase = np.polynomial.legendre.legval(place, [0.0, *found.fit[1:]])
-            left = -collection.wavelength / (2 * math.pi) * phase
-            single = self.few.contributions(self.slow_time, left)
-            found = _refined(found.fit, place, single.astype(np.complex128), self.seen, self.gain)
-        return found
+            # The remaining range error also moves a pulse to other range cells.
+            phase = np.polynomial.legendre.legval(scaled_time, [0.0, *solution.fit[1:]])
+            remaining_range = -collection.wavelength / (2 * math.pi) * phase
+            contribution = self.fitted_pixels.contributions(self.slow_time, remaining_range)
+            solution = _refined(solution.fit, scaled_time, contribution.astype(np.complex128), self.seen, self.gain)
+        return solution
 
 
-def _refined(fit: Floats, place: Floats, contribution: Complexes, seen: Complexes, gain: complex) -> _Refined:
-    """Fit the phase's polynomial to the pixels, by Gauss and Newton; a step that makes it worse is shortened."""
-    legendre = np.polynomial.legendre.legvander(place, fit.size - 1)
-    norm = float(np.linalg.norm(seen))
+def _refined(fit: Floats, scaled_time: Floats, contribution: Complexes, image: Complexes, gain: complex) -> _Refined:
+    """Fit the phase's polynomial to the pixels by Gauss-Newton steps; a step that does not improve is shortened."""
+    legendre = np.polynomial.legendre.legvander(scaled_time, fit.size - 1)
+    norm = float(np.linalg.norm(image))
 
-    def left_by(coefficients: Floats) -> tuple[Complexes, float, Complexes]:
-        pulses = gain * np.exp(1j * (legendre @ coefficients))
+    def remainder_of(trial: Floats) -> tuple[Complexes, float, Complexes]:
+        pulses = gain * np.exp(1j * (legendre @ trial))
         model = pulses @ contribution
-        # The constant phase is free: what it takes is known at once.
-        turn = np.angle(np.vdot(model, seen))
+        # The constant phase is free: its best value is known in closed form.
+        turn = np.angle(np.vdot(model, image))
         pulses, model = pulses * np.exp(1j * turn), model * np.exp(1j * turn)
-        amplitude = float(abs(np.vdot(model, seen)) / np.real(np.vdot(model, model)))
-        return seen - amplitude * model, amplitude, pulses
+        amplitude = float(abs(np.vdot(model, image)) / np.real(np.vdot(model, model)))
+        return image - amplitude * model, amplitude, pulses
 
-    found = fit.copy()
-    left, amplitude, pulses = left_by(found)
-    for _ in range(_REFINEMENTS):
+    coefficients = fit.copy()
+    remainder, amplitude, pulses = remainder_of(coefficients)
+    for _ in range(_MAX_REFINEMENT_STEPS):
         columns = contribution.T @ (1j * amplitude * pulses[:, None] * legendre)
-        both = np.concatenate((columns.real, columns.imag))
-        step = np.linalg.lstsq(both, np.concatenate((left.real, left.imag)), rcond=1e-6)[0]
-        for _ in range(_HALVINGS):
-            ahead = left_by(found + step)
-            if np.linalg.norm(ahead[0]) <= np.linalg.norm(left):
+        real_columns = np.concatenate((columns.real, columns.imag))
+        step = np.linalg.lstsq(real_columns, np.concatenate((remainder.real, remainder.imag)), rcond=1e-6)[0]
+        for _ in range(_MAX_HALVING_STEPS):
+            next_remainder = remainder_of(coefficients + step)
+            if np.linalg.norm(next_remainder[0]) <= np.linalg.norm(remainder):
                 break
             step = step / 2
         else:
             break
-        found = found + step
-        left, amplitude, pulses = ahead
-        if np.abs(step[1:]).max() < _SETTLED_RAD:
+        coefficients = coefficients + step
+        remainder, amplitude, pulses = next_remainder
+        if np.abs(step[1:]).max() < _REFINEMENT_TOLERANCE_RAD:
             break
-    return _Refined(found, float(np.linalg.norm(left)) / norm)
+    return _Refined(coefficients, float(np.linalg.norm(remainder)) / norm)
 
 
 # ---------------------------------------------------------------------- displacement
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """Displacement on the ground (east, north) [m], azimuth of the line of smear, 0 to π [rad].
+    """Displacement on the ground (east, north) [m], and azimuth of the line of smear, 0 to π [rad].
 
     `pixels` is the displacement along x′ and y′ of the image.
     """
@@ -326,24 +332,24 @@ class Shift:
 def measured_shift(chip: Chip, reference: Chip, reading: ApertureReading | None = None) -> Shift:
     """Displacement of a response against an error-free one on the same grid, and the line of its smear.
 
-    The displacement is where the image peaks. A response that is smeared so much that it has no one peak says it by a
-    `reading` of its aperture: by the slope of the phase along y′, and by the centre of gravity along x′ less what the
-    other parts of the phase move that by.
+    The displacement is the position of the peak. For a response smeared so much that it has no single peak, it
+    follows from a `reading` of its aperture: along y′ from the slope of the phase, along x′ from the centre of
+    gravity minus its offset by the other parts of the phase.
 
-    Each part of the aperture sees the point at a place of its own, as (26) to (28) of Rigling & Moses have it for
-    three parts. In the spectrum of the image that place is the gradient of the phase against an error-free response:
-    its spread is the smear. That holds for a smear far smaller than a resolution cell, where the outline of the
-    response shows nothing yet.
+    Each part of the aperture displaces the point differently, as in (26) to (28) of Rigling & Moses for three parts.
+    In the spectrum of the image the displacement is the gradient of the phase against an error-free response, and the
+    spread of the displacements is the smear. This also measures a smear far smaller than a resolution cell, which
+    does not yet show in the outline of the response.
 
     Raises
     ------
     ValueError
-        The spectra share no support: one of the two is not in the image.
+        The spectra share no support: one of the two responses is not in the image.
     """
-    spectra = [np.fft.fftshift(np.fft.fft2(one.image)) for one in (chip, reference)]
+    spectra = [np.fft.fftshift(np.fft.fft2(member.image)) for member in (chip, reference)]
     product = spectra[0] * np.conj(spectra[1])
     strength = np.abs(spectra[1])
-    inside = strength > _SUPPORT * strength.max()
+    inside = strength > _SPECTRUM_FRACTION * strength.max()
     inside[:-1, :-1] &= inside[1:, :-1] & inside[:-1, 1:]
     inside[-1], inside[:, -1] = False, False
     if not inside.any():
@@ -386,15 +392,15 @@ def refocused(
     centre: GroundVector,
     chip: Chip,
     algorithm: Callable[[Complexes], Focused],
-    half: int,
+    half_lines: int,
 ) -> Chip:
-    """Estimate one phase over the aperture on some lines of a chip and take it out of all.
+    """Estimate one phase over the aperture on the middle lines of a chip and take it out of all lines.
 
-    Along a line of equal range a pulse has the frequency that the measured paths give it. Over a long aperture, or
-    where range and Doppler gradients are nearly parallel, equal times take up unequal parts of that band: a quadratic
-    phase in time is none in frequency, and what a few per cent of the band hold of the aperture is lost to an
-    estimate. The lines' spectra are therefore read at equal times, focused there, and the phase is taken back to
-    their frequencies. So many lines on either side of the middle one are used.
+    Along a line of equal range, a pulse has a frequency by the measured paths. Over a long aperture, or where range
+    and Doppler gradients are nearly parallel, equal times take up unequal parts of the band: a quadratic phase in
+    time is not quadratic in frequency, and an estimate loses the part of the aperture that lies in a few per cent of
+    the band. The lines' spectra are therefore read at equal times and focused there, and the phase is transferred
+    back to their frequencies. The estimate uses `half_lines` lines on either side of the middle.
     """
     lines, columns = chip.image.shape
     slow_time = cell_centres(collection.aperture_time, max(64, round(columns / OVERSAMPLING)))
@@ -403,17 +409,17 @@ def refocused(
     if not (step > 0).all() and not (step < 0).all():
         raise ValueError("Doppler along the line does not change one way over the aperture: autofocus has no band")
     middle = lines // 2
-    used = chip.image[middle - half : middle + half + 1]
-    place = np.arange(columns) - columns // 2
-    aperture = np.empty((used.shape[0], slow_time.size), dtype=complex)
-    for start in range(0, slow_time.size, _TIMES):
-        part = slice(start, start + _TIMES)
-        aperture[:, part] = used @ np.exp(-2j * math.pi * np.outer(place, frequency[part]))
+    lines_used = chip.image[middle - half_lines : middle + half_lines + 1]
+    pixel = np.arange(columns) - columns // 2
+    aperture = np.empty((lines_used.shape[0], slow_time.size), dtype=complex)
+    for start in range(0, slow_time.size, _BLOCK_TIMES_COUNT):
+        block = slice(start, start + _BLOCK_TIMES_COUNT)
+        aperture[:, block] = lines_used @ np.exp(-2j * math.pi * np.outer(pixel, frequency[block]))
     aperture *= np.abs(step)
-    # As an image of its own, sampled like the chip: the aperture in the middle of a band.
+    # A separate image, sampled like the chip, with the aperture in the middle of a band.
     count = slow_time.size
     samples = math.ceil(OVERSAMPLING * count)
-    spectrum = np.zeros((used.shape[0], samples), dtype=complex)
+    spectrum = np.zeros((lines_used.shape[0], samples), dtype=complex)
     bins = (np.arange(count) - count // 2) % samples
     spectrum[:, bins] = aperture
     phase = algorithm(np.fft.fftshift(np.fft.ifft(spectrum, axis=1), axes=1)).phase[bins]
@@ -426,13 +432,13 @@ def refocused(
 def _frequency(
     collection: PointCollection, errors: Errors, centre: GroundVector, chip: Chip, slow_time: Floats
 ) -> Floats:
-    """Frequency of each pulse along the middle of a line, the carrier's taken out, (times,). [cycles/pixel]"""
+    """Frequency of each pulse at the middle of the middle line, minus the carrier, (times,). [cycles/pixel]"""
     line = chip.grid[chip.grid.shape[0] // 2]
     middle = line.shape[0] // 2
     slope = np.zeros(slow_time.size)
-    for one in collection.flight(errors.smooth(), slow_time).paths:
+    for path in collection.flight(errors.smooth(), slow_time).paths:
         for pixel, sign in ((line[middle + 1], 1), (line[middle - 1], -1)):
-            slope += sign * np.linalg.norm(pixel - one.measured, axis=1) / 2
+            slope += sign * np.linalg.norm(pixel - path.measured, axis=1) / 2
     lines = collection.range_lines(errors)
     carrier = (lines.carrier(line[middle + 1]) - lines.carrier(line[middle - 1])) / 2
     frequency: Floats = (slope - carrier) / collection.wavelength

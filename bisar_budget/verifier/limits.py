@@ -1,4 +1,4 @@
-"""Form images with each error set exactly at its limit, and measure whether the limit is true."""
+"""Form images with each error exactly at its limit, and measure whether the limit is true."""
 
 import math
 import time
@@ -39,14 +39,14 @@ from bisar_budget.verifier.spread_cases import (
 from bisar_budget.verifier.study import Responses, Study
 from bisar_budget.workers import MapBlocks, Progress, in_processes, unseen
 
-_FINE = 4  # interpolation of a cut, so that its nulls look like nulls
-_AROUND = 10  # resolution cells of a cut each way, beyond the smear
-_MAX_PIXELS = 96  # of a chip, each way
-_CUT_FLOOR_DB = -80.0  # a null is as deep as rounding leaves it; nobody sees more
-_LONG = 60.0  # s; far below it nothing is measured
-_SLOWEST = 1.0  # s that the smallest image takes on a slow and busy machine
-_LARGER = 8  # times the cells of the smallest image: 32 times its pixels and pulses
-_BESIDE = 1.25  # images at a limit and on both sides of it, over those at it
+_CUT_UPSAMPLING_FACTOR = 4  # of a cut, so that its nulls look like nulls
+_MARGIN_AROUND_SMEAR_CELLS = 10  # of a cut, on each side
+_MAX_CHIP_PX = 96  # pixels along each axis
+_CUT_FLOOR_DB = -80.0  # the depth of a null is rounding; a deeper floor shows no more
+_LONG_S = 60.0  # far below it, no image is timed
+_SLOWEST_IMAGE_S = 1.0  # of the smallest image on a slow and busy machine
+_LARGE_IMAGE_FACTOR = 8  # cells of the large image over the smallest: 32 times its pixels and pulses
+_NEIGHBOUR_FACTOR = 1.25  # images at a limit and on both sides of it, over images at it
 
 
 def verify_mission(
@@ -56,28 +56,29 @@ def verify_mission(
     progress: Progress = unseen,
     mapped: MapBlocks | None = None,
 ) -> VerifiedMission:
-    """Verify every limit of a mission whose row id matches a glob; the verdicts do not depend on the processes.
+    """Verify every limit of a mission whose row id matches a glob. The verdicts do not depend on the processes.
 
-    They are in the order of `check`, both platforms' vibration together among them. `progress` is told, after each
-    row, how many are done, and how many there are; `mapped` has others form the images instead of processes here.
+    The verdicts are in the order of `check`, including the vibration of both platforms together. After each row
+    `progress` is called with the number of finished rows and of all rows. `mapped` maps the rows to workers elsewhere
+    instead of to processes on this machine.
     """
-    mission = mission._replace(places={})  # the parser's marks cannot go to another process, and nobody asks here
-    known = cases(Study(mission), only)
-    wanted = list(known)
-    jobs = min(jobs, len(wanted))
+    mission = mission._replace(places={})  # the parser's marks cannot be sent to a process, and are not needed here
+    all_cases = cases(Study(mission), only)
+    row_ids = list(all_cases)
+    jobs = min(jobs, len(row_ids))
     if mapped is None and jobs > 1:
         mapped = in_processes(jobs)
-    found: Iterable[tuple[str, Verdict]] = ((row_id, known[row_id]()) for row_id in wanted)
+    verdicts: Iterable[tuple[str, Verdict]] = ((row_id, all_cases[row_id]()) for row_id in row_ids)
     if mapped is not None:
-        found = mapped(_verify_row, mission, wanted, f"{{}} of {printable(mission.name)}".format)
+        verdicts = mapped(_verify_row, mission, row_ids, f"{{}} of {printable(mission.name)}".format)
     rows = {}
-    for row_id, verdict in found:
+    for row_id, verdict in verdicts:
         rows[row_id] = verdict
-        progress(len(rows), len(wanted))
+        progress(len(rows), len(row_ids))
     return VerifiedMission(
         file=mission.file,
         name=mission.name,
-        rows=tuple(rows[row_id] for row_id in wanted),
+        rows=tuple(rows[row_id] for row_id in row_ids),
         conditions=", ".join(_conditions(mission)),
         changes=mission.changes,
     )
@@ -94,7 +95,7 @@ def cases(study: Study, only: str = "*") -> dict[str, Case]:
 
 
 def _warns_of_the_total(study: Study) -> bool:
-    """Whether each error stands alone, and all together exceed the total: only then the row exists."""
+    """Whether the row of the total exists: each error is judged alone, and all together exceed the total."""
     aggregates = Aggregates(Judging(1, study.mission.allocation.warn_above), study.analysis)
     rows = (row for model in study.models for row in aggregates.rows(model.name))
     with np.errstate(all="ignore"):
@@ -106,21 +107,21 @@ def _verify_row(mission: Mission, row_id: str) -> Verdict:
 
 
 def _conditions(mission: Mission) -> Iterator[str]:
-    """Say of what images the verdicts are, and which keys of the file have no part in them."""
+    """Describe the images of the verdicts, and the keys of the file that they ignore."""
     settings = mission.simulation or Simulation()
     yield f"one point, exact ranges, {settings.window} window"
     yield "no noise" if settings.noise is None else "no noise (simulation.noise is for `simulate`)"
-    given = mission.collection.pulses
-    yield "pulses as needed" + (f" (the {given} of collection.pulses must not alias)" if given else "")
+    pulses = mission.collection.pulses
+    yield "pulses as needed" + (f" (the {pulses} of collection.pulses must not alias)" if pulses else "")
 
 
-def _order(one: Subject) -> tuple[int, int]:
+def _order(vibration: Subject) -> tuple[int, int]:
     """Sort key of a platform's vibrations, in the order of `check`: lines, lines together, noise."""
-    return (("sinusoidal", "sinusoidal.sum", "wideband").index(one.axis), one.entry or 0)
+    return (("sinusoidal", "sinusoidal.sum", "wideband").index(vibration.axis), vibration.entry or 0)
 
 
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
-    """Sensors and clocks that have a limit, and what all noise spreads together."""
+    """Cases of sensors and clocks that have a limit, of tones, and of the power that all noise spreads."""
     for error in study.analysis.random:
         sizes = limits_of(study, error)
         if sizes and error.subject.kind == "other":
@@ -131,16 +132,16 @@ def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     if required is not None:
         for power in stated_powers(study.mission):
             yield power.subject.id, partial(phase_cases.stated, study, power.subject.id, required, "dB")
-    for of_tone, case in tone_cases(study):
-        yield of_tone.id, case
+    for tone, case in tone_cases(study):
+        yield tone.id, case
     if study.mission.requirements.pslr is not None:
         yield "mission.pslr", partial(verify_pslr, study)
     if study.mission.requirements.islr is not None:
         rows = RandomRows(Judging(1, study.mission.allocation.warn_above), study.analysis)
         with np.errstate(all="ignore"):
-            found = [row.judged.subject for row in rows.islr_rows(study.models[-1].name) if row.is_there[0]]
-        for of_owner in found:
-            yield of_owner.id, partial(verify_islr, study, of_owner)
+            subjects = [row.judged.subject for row in rows.islr_rows(study.models[-1].name) if row.is_there[0]]
+        for islr_subject in subjects:
+            yield islr_subject.id, partial(verify_islr, study, islr_subject)
 
 
 def _cases(study: Study) -> Iterator[tuple[str, Case]]:
@@ -154,12 +155,12 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
     for name in PLATFORMS:
         for index, line in enumerate(lines_of(mission, name)):
             if line.frequency * study.collection.aperture_time < SLOWEST_ECHO_CYCLES:
-                one = subject(name, "vibration", "sinusoidal", entry=index)
-                slow[one] = partial(phase_cases.slow_vibration, study, one)
+                vibration = subject(name, "vibration", "sinusoidal", entry=index)
+                slow[vibration] = partial(phase_cases.slow_vibration, study, vibration)
     swaying = slow | dict(vibration_cases(study))
     for owner in (*PLATFORMS, "mission"):
-        for one in sorted((one for one in swaying if one.owner == owner), key=_order):
-            yield one.id, swaying[one]
+        for vibration in sorted((vibration for vibration in swaying if vibration.owner == owner), key=_order):
+            yield vibration.id, swaying[vibration]
     yield from _of_instruments(study)
     requirements = mission.requirements
     if any(map(np.any, dispersed_legs(mission, mission.geometry).values())):
@@ -187,84 +188,86 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
 
 # ---------------------------------------------------------------------- how long it will take
 class _NotFormedError(ValueError):
-    """An image whose size is known, which is all that was asked."""
+    """Raised in place of an image, once its size is known."""
 
 
 class _Sizes(PointCollection):
-    """A collection that notes the size of every image it is asked for, and forms none."""
+    """A collection that notes the size of every requested image and forms no image."""
 
     def __init__(self, mission: Mission, study: Study) -> None:
         super().__init__(mission, study.geometry)
         self.asked: list[float] = []  # sizes, see `_size`
 
     def pair(
-        self, errors: Errors, place: tuple[float, float], cells: int = CELLS, range_cells: int = RANGE_CELLS
+        self, errors: Errors, ground_point: tuple[float, float], cells: int = CELLS, range_cells: int = RANGE_CELLS
     ) -> tuple[Chip, Chip]:
-        """Note two images."""
+        """Note the size of two images."""
         self._require_room(cells, range_cells)
         self.asked.append(_size(cells, range_cells))
         raise _NotFormedError("its size is known")
 
     def window(self, count: int) -> Floats:
-        """Draw no noise: that takes seconds, however large the images."""
+        """Refuse weights, so that no noise is drawn: that takes seconds for images of any size."""
         raise _NotFormedError(f"{count} weights are not needed")
 
     def chip(self, centre: tuple[float, float], errors: Errors, *, cells: int = CELLS, **_: object) -> Chip:
-        """Note one of two images of a single line."""
+        """Note the size of one of two images of a single line."""
         self._require_room(cells, 0)
         self.asked.append(_size(cells, 1))
         raise _NotFormedError("its size is known")
 
 
 def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float:
-    """About how long `verify_mission` will take; 0 where it is far below a minute. [s]
+    """Approximate time that `verify_mission` will take; 0 if it is far below a minute. [s]
 
-    What one pixel and pulse take depends on the machine, on what else runs on it, and on whether kernels are
-    compiled. So it is measured, on a small and a larger image of the mission itself, where the size leaves any doubt.
+    The time of a pixel and pulse depends on the machine, on its load, and on whether kernels are compiled. So it is
+    measured on a small and a larger image of the mission, unless the sizes of the images are clearly small.
     """
     mission = mission._replace(places={})
     study = Study(mission)
     study.collection = sizes = _Sizes(mission, study)
-    wanted = cases(study, only)
-    for case in wanted.values():
+    row_cases = cases(study, only)
+    for case in row_cases.values():
         with suppress(_NotFormedError):
             case()
-    asked = [max(1.0, size) for size in sizes.asked]
-    if _BESIDE * sum(asked) * _SLOWEST <= _LONG:
+    image_sizes = [max(1.0, size) for size in sizes.asked]
+    if _NEIGHBOUR_FACTOR * sum(image_sizes) * _SLOWEST_IMAGE_S <= _LONG_S:
         return 0.0
     study = Study(mission)
     try:
         study.collection.chip((0.0, 0.0), Errors(), cells=2)  # compiled, imported
-        smallest = _seconds(study, CELLS)
+        smallest_seconds = _seconds(study, CELLS)
     except ValueError:
-        return 0.0  # where there is none of these, there is hardly any image
+        return 0.0  # if these cannot be formed, hardly any image can
     try:
-        grows = max(0.0, _seconds(study, _LARGER * CELLS) - smallest) / (_size(_LARGER * CELLS, RANGE_CELLS) - 1)
+        seconds_per_size = max(0.0, _seconds(study, _LARGE_IMAGE_FACTOR * CELLS) - smallest_seconds) / (
+            _size(_LARGE_IMAGE_FACTOR * CELLS, RANGE_CELLS) - 1
+        )
     except ValueError:
-        grows = smallest  # no room for a larger one
-    seconds = _BESIDE * sum(smallest + grows * (size - 1) for size in asked)
-    return seconds / max(1, min(jobs, len(wanted)))
+        seconds_per_size = smallest_seconds  # no memory for a larger one
+    seconds = _NEIGHBOUR_FACTOR * sum(smallest_seconds + seconds_per_size * (size - 1) for size in image_sizes)
+    return seconds / max(1, min(jobs, len(row_cases)))
 
 
 def _size(cells: int, range_cells: int) -> float:
-    """Pixels times pulses of an image, over those of the smallest."""
+    """Pixels times pulses of an image, over the pixels times pulses of the smallest image."""
     return cells * range_cells * pulses_for(cells) / (CELLS * RANGE_CELLS * pulses_for(CELLS))
 
 
 def _seconds(study: Study, cells: int) -> float:
-    """Time that two images of no error and their reading take. [s]"""
-    errors, begun = Errors(), time.perf_counter()
+    """Time to form and read two images without error. [s]"""
+    errors, start_time = Errors(), time.perf_counter()
     effect = study.collection.effect(errors)
     chips = study.collection.pair(errors, effect.displacement, cells)
     study.read(Responses(errors, effect, study.spread(errors, effect), *chips))
-    return time.perf_counter() - begun
+    return time.perf_counter() - start_time
 
 
 # ---------------------------------------------------------------------- images that a report shows
 def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[ImageEvidence, ...]:
-    """Form the images of the rows that decide most about a verified mission; empty where no row has one.
+    """Form the images of the most decisive rows of a verified mission; empty if no row has an image.
 
-    The worst row comes first. Its findings have the verdicts of its images.
+    The worst row comes first. The findings have the verdicts on the images.
     """
     verdicts = rows_worth_showing(findings)
     if not verdicts:
@@ -275,16 +278,16 @@ def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[Im
 
 
 def _evidence(study: Study, file: str, subject: Subject, verdict: Verdict) -> ImageEvidence:
-    found = ImageEvidence(
+    evidence = ImageEvidence(
         file=file,
         verdict=verdict,
         look_azimuth_rad=study.geometry.look_azimuth,
         at_limit=_shown(study.at_limit(subject, verdict.boundary_error)),
     )
     if verdict.boundary_autofocus is None or verdict.measured_residual_qpe_rad is None:
-        return found
+        return evidence
     images = study.at_limit(subject, verdict.boundary_autofocus, ROOM[study.mission.autofocus.algorithm])
-    return found._replace(before_autofocus=_shown(images), after_autofocus=_shown(study.focused(images)))
+    return evidence._replace(before_autofocus=_shown(images), after_autofocus=_shown(study.focused(images)))
 
 
 def _shown(images: Responses) -> PointImage:
@@ -292,21 +295,21 @@ def _shown(images: Responses) -> PointImage:
 
 
 def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
-    """Reduce a chip to what is shown: as far as the response is smeared, and sidelobes."""
+    """Reduce a chip to the pixels that a report shows: the smeared response and its sidelobes."""
     spacing, middle = chip.spacing, chip.image.shape[1] // 2
-    reach = _AROUND + smear_cells / 2
+    reach = _MARGIN_AROUND_SMEAR_CELLS + smear_cells / 2
     half = min(math.ceil(reach * OVERSAMPLING), middle - 1)
-    stride = math.ceil(2 * half / _MAX_PIXELS)
+    stride = math.ceil(2 * half / _MAX_CHIP_PX)
     half -= half % stride
     lines = reference.cut, line_at(chip.image, row_of_peak(chip.image))
-    clean, cut = (np.abs(upsampled(line, _FINE)) for line in lines)
+    clean, cut = (np.abs(upsampled(line, _CUT_UPSAMPLING_FACTOR)) for line in lines)
     peak = float(clean.max())
-    fine = slice(_FINE * (middle - half), _FINE * (middle + half) + 1)
-    # A long smear fits into a chip by the brightest of each few samples.
+    cut_samples = slice(_CUT_UPSAMPLING_FACTOR * (middle - half), _CUT_UPSAMPLING_FACTOR * (middle + half) + 1)
+    # To fit a long smear, each pixel shows the brightest of `stride` samples.
     line = chip.image.shape[0] // 2
     patch = chip.image[max(0, line - half) : line + half, middle - half : middle + half]  # no farther along x′
-    shown = np.abs(patch).reshape(len(patch), -1, stride).max(axis=2)
-    grey = np.rint(255 * np.clip(1 - _decibel(shown, peak) / FLOOR_DB, 0, 1)).astype(np.uint8)
+    magnitude = np.abs(patch).reshape(len(patch), -1, stride).max(axis=2)
+    grey = np.rint(255 * np.clip(1 - _decibel(magnitude, peak) / FLOOR_DB, 0, 1)).astype(np.uint8)
     upright = grey.T[::-1]
     return PointImage(
         columns=upright.shape[1],
@@ -314,9 +317,9 @@ def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
         chip=upright.tobytes(),
         pixel_m=(spacing[0], spacing[1] * stride),
         thinned=stride,
-        step_m=spacing[1] / _FINE,
-        cut_db=_levels(cut[fine], peak),
-        error_free_db=_levels(clean[fine], peak),
+        step_m=spacing[1] / _CUT_UPSAMPLING_FACTOR,
+        cut_db=_levels(cut[cut_samples], peak),
+        error_free_db=_levels(clean[cut_samples], peak),
     )
 
 

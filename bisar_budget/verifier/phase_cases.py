@@ -1,4 +1,4 @@
-"""Verdicts on the limits of quadratic and cubic phase, on what autofocus makes of them, and on the location."""
+"""Verdicts on the limits of quadratic and cubic phase, with and without autofocus, and of the location."""
 
 import math
 from typing import Any
@@ -20,16 +20,16 @@ from bisar_budget.verifier import reasons
 from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading
 from bisar_budget.verifier.study import Responses, Sizes, Study
 
-TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
-INSIDE, BEYOND = 0.9, 1.1  # of the limit: through it the phase must grow with the error
-FOCUSED_CELLS, FOCUSED_RAD = 2 * CELLS, 12.0  # a phase up to which a response is read in so many cells
+TOLERANCE_FRACTION = 0.05  # of the budget, within which a limit is confirmed
+INSIDE_FRACTION, BEYOND_FACTOR = 0.9, 1.1  # of the limit; between these sizes the phase must grow with the error
+FOCUSED_CELLS, FOCUSED_RAD = 2 * CELLS, 12.0  # of a small patch, and the largest phase that is read in it
 _PEAK_CELLS = 3  # of range around the lines that autofocus reads: the peak is between two lines
-_SETTLED = 1e-6  # of the requirement of the location
-_BESIDE_CELLS = 64  # of smear; beyond, no images are formed on both sides of a limit
+_LOCATION_FRACTION = 1e-6  # of the requirement of the location, to which errors are scaled
+_MAX_SMEAR_CELLS = 64  # with a longer smear, no images are formed on both sides of a limit
 
 
 def quadratic(study: Study, source: ErrorSource) -> Verdict:
-    """Limit of one error."""
+    """Verdict on the limit of one error."""
     budget, gain = study.allocation.qpe_limit(source.owner), study.allocation.autofocus_gain
     boundary = study.boundary(source, budget)
     if boundary is None:
@@ -42,49 +42,51 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
     return verdict._replace(boundary_autofocus=farther, **refocused(study, [(source, farther)], budget))
 
 
-def slow_vibration(study: Study, of: Subject) -> Verdict:
-    """Limit of a vibration below one cycle per aperture: each of its axes alone, in its worst phase.
+def slow_vibration(study: Study, vibration: Subject) -> Verdict:
+    """Verdict on a vibration below one cycle per aperture: each of its axes alone, in its worst phase.
 
-    The axes of a vector are so large together that by exact ranges they reach the limit, as the phases add up.
+    The axes of a vector are scaled until the sum of their phases by exact ranges reaches the limit.
     """
-    name, entry, budget = of.owner, of.entry or 0, study.allocation.qpe_limit(of.owner)
-    mission, tone = study.mission, study.analysis.slow_tones[of.id]
+    name, entry, budget = vibration.owner, vibration.entry or 0, study.allocation.qpe_limit(vibration.owner)
+    mission, tone = study.mission, study.analysis.slow_tones[vibration.id]
     line, size = lines_of(mission, name)[entry], budget / float(tone.per_metre.judged(1.0)[0])
-    blank = study.blank(of.id, size * float(line.per_metre), unit_of_line(mission, name, entry), budget_rad=budget)
+    blank = study.blank(
+        vibration.id, size * float(line.per_metre), unit_of_line(mission, name, entry), budget_rad=budget
+    )
     lines = sinusoids_of(mission, name, entry)
     use = float(tone.declared.judged(1.0)[0]) / budget
     if not use or (len(lines) == 1 and lines[0].axis is None):
         lines, use = [PathSinusoid(size, line.frequency)], 1.0
     try:
-        worst = [_worst_phase(study, name, one._replace(amplitude=one.amplitude / use)) for one in lines]
+        worst = [_worst_phase(study, name, sine._replace(amplitude=sine.amplitude / use)) for sine in lines]
         images = [study.images(errors) for errors in worst]
-        readings = [study.read(one) for one in images]
+        readings = [study.read(image) for image in images]
     except ValueError as error:
         return _without_image(study, blank, error)
-    both = list(zip(images, readings, strict=True))
-    measured = [study.equal_loss(*one) for one in both]
+    readings_of_images = list(zip(images, readings, strict=True))
+    measured = [study.equal_loss(*pair) for pair in readings_of_images]
     largest = measured.index(max(measured))
-    phases = [predicted(one.effect) for one in images]
-    summed = {key: math.fsum(one[key] for one in phases) for key in phases[0] if key.endswith("_rad")}
+    phases = [predicted(image.effect) for image in images]
+    summed = {key: math.fsum(fields[key] for fields in phases) for key in phases[0] if key.endswith("_rad")}
     return blank._replace(
         **(phases[largest] | summed),
-        **_of_response(study, *both[largest]),
+        **_of_response(study, *readings_of_images[largest]),
         measured_qpe_rad=math.fsum(abs(reading.quadratic) for reading in readings),
         measured_equal_loss_qpe_rad=math.fsum(measured),
-        verdict=compare(math.fsum(measured) / budget - 1, TOLERANCE),
+        verdict=compare(math.fsum(measured) / budget - 1, TOLERANCE_FRACTION),
         reason=reasons.in_its_worst_phase(len(lines)),
     )
 
 
 def _worst_phase(study: Study, name: str, line: PathSinusoid) -> Errors:
-    """The vibration in the phase in which exact ranges lose most of the peak."""
-    turned = (line._replace(phase=2 * math.pi * step / TONE_PHASE_COUNT) for step in range(TONE_PHASE_COUNT))
-    every = [Errors().of(name, PathError(sinusoids=(one,))) for one in turned]
-    return max(every, key=lambda errors: study.collection.effect(errors).equal_loss)
+    """The vibration with the phase that loses most of the peak by exact ranges."""
+    lines = (line._replace(phase=2 * math.pi * step / TONE_PHASE_COUNT) for step in range(TONE_PHASE_COUNT))
+    candidates = [Errors().of(name, PathError(sinusoids=(shifted,))) for shifted in lines]
+    return max(candidates, key=lambda errors: study.collection.effect(errors).equal_loss)
 
 
 def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
-    """Limit of an error that no quadratic phase bounds: by the cubic phase, or by the location."""
+    """Verdict on an error that no quadratic phase limits: on its limit by the cubic phase or by the location."""
     allowed, binding = study.allowed(source)
     size = allowed or 0.0
     blank = study.blank(source.id, size, source.unit)
@@ -99,13 +101,13 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
         return blank._replace(
             budget_rad=requirements.cubic_phase_error,
             measured_cubic_rad=abs(reading.cubic),
-            verdict=compare(abs(reading.cubic) / requirements.cubic_phase_error - 1, TOLERANCE),
+            verdict=compare(abs(reading.cubic) / requirements.cubic_phase_error - 1, TOLERANCE_FRACTION),
             reason=reasons.bound_by_the_cubic_phase(),
         )
     shift = study.shift(images, reading)
     measured = images.effect.moved(shift.displacement)
     required = requirements.location_error or 0.0
-    verdict = compare(math.hypot(*measured) / required - 1, TOLERANCE)
+    verdict = compare(math.hypot(*measured) / required - 1, TOLERANCE_FRACTION)
     return blank._replace(
         measured_displacement_m=measured,
         verdict=verdict,
@@ -114,7 +116,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
 
 
 def total(study: Study, row_id: str, owner: str) -> Verdict:
-    """All declared errors of an owner at once, each with the sign that makes their phases add."""
+    """Verdict on all declared errors of an owner together, with the signs that make their phases add."""
     budget = study.allocation.qpe_limit(owner)
     blank = study.blank(row_id, budget, "rad", budget_rad=budget)
     if study.mission.allocation.combine != "sum":
@@ -126,32 +128,32 @@ def total(study: Study, row_id: str, owner: str) -> Verdict:
 
 
 def other(study: Study, source: ErrorSource) -> Verdict:
-    """Phase stated as such."""
+    """Verdict on an error stated as a phase, which has no image."""
     budget = study.allocation.qpe_limit(source.owner)
     return study.blank(source.id, budget, source.unit, budget_rad=budget, reason=reasons.phase_without_motion())
 
 
 def stated(study: Study, row_id: str, limit: float, unit: str) -> Verdict:
-    """Effect from elsewhere other than a quadratic phase."""
+    """Verdict on an effect from elsewhere other than a quadratic phase, which has no image."""
     return study.blank(row_id, limit, unit, reason=reasons.stated_by_its_effect())
 
 
 def dispersion(study: Study) -> Verdict:
-    """Phase that free electrons bend over the band: images are read over slow time."""
+    """Verdict on the phase of free electrons over the band, which images over slow time do not show."""
     budget = study.allocation.qpe_total
     blank = study.blank("propagation.dispersion", budget, "rad", budget_rad=budget)
     return blank._replace(reason=reasons.images_are_read_over_slow_time())
 
 
 def edge(study: Study) -> Verdict:
-    """Difference between two places of the scene; what images and exact ranges say of it is in the tests."""
+    """Verdict on the difference between two points of the scene, which only the tests compare with images."""
     budget = study.allocation.qpe_total
     blank = study.blank("mission.spatial_variance", budget, "rad", budget_rad=budget)
     return blank._replace(reason=reasons.images_are_of_the_centre())
 
 
 def cubic(study: Study, requirement: float) -> Verdict:
-    """All declared errors scaled together until the gating model's cubic phase reaches the requirement."""
+    """Verdict on all declared errors, scaled until the gating model's cubic phase reaches the requirement."""
     blank = study.blank("mission.cubic_phase_error", requirement, "rad", budget_rad=requirement)
     sizes = [(s, s.declared or 0.0) for s in study.declared]
     if not sizes:
@@ -168,25 +170,26 @@ def cubic(study: Study, requirement: float) -> Verdict:
     except ValueError as error:
         return _without_image(study, blank, error)
     measured = abs(reading.cubic)
-    verdict = compare(measured / requirement - 1, TOLERANCE)
+    verdict = compare(measured / requirement - 1, TOLERANCE_FRACTION)
     return blank._replace(**predicted(images.effect), measured_cubic_rad=measured, verdict=verdict)
 
 
 def pull_in(study: Study, n_pull: float) -> Verdict:
-    """A clock error of π·N_pull, which bends no geometry, refocused; no N_pull goes beyond the cap of range walk."""
+    """Verdict on autofocus of a clock error of π·N_pull, which leaves the geometry; range walk caps N_pull."""
     phase, budget, radar = math.pi * n_pull, study.allocation.qpe_total, study.mission.radar
     walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # λN/2 over c/B
     blank = study.blank("mission.autofocus_pull_in", phase, "rad", budget_rad=budget)
     clock = next(s for s in study.sources if s.id == "timing.quadratic")
-    found = refocused(study, [(clock, phase / abs(clock.effect.qpe))], budget, holds_hidden=False)
+    fields = refocused(study, [(clock, phase / abs(clock.effect.qpe))], budget, holds_hidden=False)
     reason = reasons.range_walk(walk, range_walk_cap(study.mission))
-    return blank._replace(boundary_autofocus=phase, **found, verdict=found["verdict_autofocus"], reason=reason)
+    return blank._replace(boundary_autofocus=phase, **fields, verdict=fields["verdict_autofocus"], reason=reason)
 
 
 def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool = True) -> dict[str, Any]:
-    """Form the image at the limit with autofocus and refocus it; hold what is left to the plain budget.
+    """Refocus the image at the limit with autofocus, and compare the remaining phase with the plain budget.
 
-    What band and turn hide counts, unless how far autofocus pulls in is asked alone: rows hold it by themselves.
+    The phase hidden by the band and by turns is included if `holds_hidden`. It is not when only the pull-in range is
+    verified: separate rows judge it.
     """
     try:
         errors = study.together(sizes, study.worse_sign(sizes))
@@ -198,23 +201,23 @@ def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool =
         across = math.ceil(2 * study.shared_lines(spread) / (OVERSAMPLING * spread.finer)) + _PEAK_CELLS
         focused = study.focused(study.images(errors, min(RANGE_CELLS, across), room))
         residual = abs(_read_focused(study, focused).quadratic)
-        hidden = focused.effect.hidden if holds_hidden else 0.0  # autofocus corrects nothing of it
-        left = math.hypot(residual, hidden)
-        peaks = [highest(one.image) for one in (focused.reference, focused.chip)]
+        hidden = focused.effect.hidden if holds_hidden else 0.0  # autofocus does not correct it
+        remaining_phase = math.hypot(residual, hidden)
+        peaks = [highest(chip.image) for chip in (focused.reference, focused.chip)]
         loss = 20 * math.log10(peaks[0] / peaks[1])
     except ValueError as error:
         return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reasons.no_image_formed(str(error))}
-    is_met = left <= budget * (1 + TOLERANCE)
+    is_met = remaining_phase <= budget * (1 + TOLERANCE_FRACTION)
     return {
         "measured_residual_qpe_rad": residual,
         "refocused_loss_db": loss,
         "verdict_autofocus": "confirmed" if is_met else "optimistic",
-        "reason_autofocus": None if is_met else reasons.autofocus_leaves(left, budget),
+        "reason_autofocus": None if is_met else reasons.autofocus_leaves(remaining_phase, budget),
     }
 
 
 def _read_focused(study: Study, focused: Responses) -> ApertureReading:
-    """Phase that autofocus left: where little, it is read from the middle of a large patch, else from all of it."""
+    """Remaining phase after autofocus: read from the middle of a large patch if it is small, else from all of it."""
     small, large = (
         focused._replace(chip=focused.chip.within(cells), reference=focused.reference.within(cells))
         for cells in (FOCUSED_CELLS, MAX_CELLS)
@@ -239,21 +242,21 @@ def predicted(effect: ExactEffect) -> dict[str, Any]:
 
 
 def _without_image(study: Study, blank: Verdict, error: ValueError) -> Verdict:
-    """Say why a limit has no image; one of the published model that leaves no point of the ground is no limit."""
+    """Verdict without an image. A limit of the published model with no ground point is optimistic."""
     if isinstance(error, NoGroundPointError) and not study.is_full:
         return blank._replace(verdict="optimistic", reason=reasons.no_image_at_the_limit())
     return blank._replace(reason=reasons.no_image_formed(str(error)))
 
 
 def compare(excess: float, tolerance: float) -> str:
-    """Say what an excess over the budget means for the limit."""
+    """Verdict on a limit whose phase exceeds the budget by a fraction."""
     if abs(excess) <= tolerance:
         return "confirmed"
     return "optimistic" if excess > 0 else "conservative"
 
 
 def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
-    """Displacement of errors together by (25); None where it has none."""
+    """Displacement of errors together by (25); None if (25) has no solution."""
     published = study.analysis.published  # (25)
     moves = [published.displacement(source.effect, scale * size) for source, size in sizes]
     if any(move is None for move in moves):
@@ -262,7 +265,7 @@ def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVe
 
 
 def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
-    """Form the images of errors at the limit and on both sides, and hold the phase of equal loss to the budget."""
+    """Form the images of errors at the limit and on both sides, and compare the equal-loss phase with the budget."""
     budget = blank.budget_rad or 0.0
     by_table = abs(math.fsum(s.effect.qpe * size for s, size in sizes))
     blank = blank._replace(published_qpe_rad=by_table)
@@ -273,8 +276,10 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
     except ValueError as error:
         return _without_image(study, blank, error)
     measured = study.equal_loss(images, reading)
-    is_small = images.spread.smear <= _BESIDE_CELLS
-    inside, beyond = (_phase(study, sizes, factor * scale) if is_small else None for factor in (INSIDE, BEYOND))
+    is_small = images.spread.smear <= _MAX_SMEAR_CELLS
+    inside, beyond = (
+        _phase(study, sizes, factor * scale) if is_small else None for factor in (INSIDE_FRACTION, BEYOND_FACTOR)
+    )
     verdict, remark = _through_the_limit(inside, measured, beyond, budget)
     unusual = reasons.smear_leaves_the_patch(reading.coverage) if reading.coverage < 0.9 else NOTHING
     return blank._replace(
@@ -297,28 +302,32 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
 def _through_the_limit(
     inside: float | None, measured: float, beyond: float | None, budget: float
 ) -> tuple[str, Note | None]:
-    """Verdict on a phase at a limit, measured inside and beyond it where images are formed, and what is unusual.
+    """Verdict on a phase at a limit, with the phases inside and beyond it if images are formed, and a note.
 
-    A limit promises that no smaller error has more phase. Where the phase falls towards it, the larger one counts,
-    and none is near enough to the budget to be confirmed. Beyond the limit a phase may fall: that is said.
+    A limit promises that no smaller error has more phase. If the phase falls towards the limit, the larger phase
+    counts, and the limit is not confirmed. Beyond the limit a phase may fall, which the note reports.
     """
-    verdict = compare(measured / budget - 1, TOLERANCE)
+    verdict = compare(measured / budget - 1, TOLERANCE_FRACTION)
     falls_inside = inside is not None and inside >= measured
     if inside is not None and falls_inside:
         verdict = compare(inside / budget - 1, 0.0)
     if not falls_inside and (beyond is None or beyond > measured):
         return verdict, None
-    places = ((inside, f" at {INSIDE:g} of the limit"), (measured, " at it"), (beyond, f" at {BEYOND:g}"))
-    return verdict, reasons.phase_does_not_grow([(phase, where) for phase, where in places if phase is not None])
+    sizes = (
+        (inside, f" at {INSIDE_FRACTION:g} of the limit"),
+        (measured, " at it"),
+        (beyond, f" at {BEYOND_FACTOR:g}"),
+    )
+    return verdict, reasons.phase_does_not_grow([(phase, position) for phase, position in sizes if phase is not None])
 
 
 def _of_response(study: Study, images: Responses, reading: ApertureReading) -> dict[str, Any]:
-    """Measures of the response; those that a long smear or a bent patch leaves without value are missing."""
-    chip, reference, found = images.chip, images.reference, dict[str, Any]()
+    """Measures of the response, without those that a long smear or a bent patch makes undefined."""
+    chip, reference, measures = images.chip, images.reference, dict[str, Any]()
     try:
         shift = study.shift(images, reading)
-        found["measured_displacement_m"] = images.effect.moved(shift.displacement)
-        found["measured_smear_azimuth_rad"] = shift.smear_azimuth
+        measures["measured_displacement_m"] = images.effect.moved(shift.displacement)
+        measures["measured_smear_azimuth_rad"] = shift.smear_azimuth
     except ValueError:
         pass
     try:
@@ -326,8 +335,8 @@ def _of_response(study: Study, images: Responses, reading: ApertureReading) -> d
         line = line_at(chip.image, row_of_peak(chip.image))
         response = impulse_response(line, chip.spacing[1], mask_m=clean.mask_m)
     except ValueError:
-        return found
-    return found | {
+        return measures
+    return measures | {
         "irw_ratio": response.irw_m / clean.irw_m,
         "peak_loss_db": 20 * math.log10(clean.peak / response.peak),
         "pslr_db": response.pslr_db,
@@ -336,7 +345,7 @@ def _of_response(study: Study, images: Responses, reading: ApertureReading) -> d
 
 
 def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
-    """Quadratic phase of equal loss that the image of errors shows; None where there is no image. [rad]"""
+    """Quadratic phase of equal loss that the image of errors shows; None without an image. [rad]"""
     try:
         images = study.images(study.together(sizes, scale), READ_CELLS)
         return study.equal_loss(images, study.read(images))
@@ -347,29 +356,31 @@ def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
 def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float) -> float:
     """Scale at which exact ranges give the cubic phase, from a first guess.
 
-    A `ValueError` says that none was found: the phase goes past the requirement where the point has no image, or
-    never reaches it.
+    Raises
+    ------
+    ValueError
+        No scale found: the phase passes the requirement where the point has no image, or never reaches it.
     """
     low, high = 0.0, math.inf  # scales with less phase, and with more or without a point
     for _ in range(60):
         try:
-            found = abs(study.effect(sizes, scale).cubic)
+            cubic_phase = abs(study.effect(sizes, scale).cubic)
         except ValueError:
-            found = math.inf
-        if abs(found / requirement - 1) < 1e-4:
+            cubic_phase = math.inf
+        if abs(cubic_phase / requirement - 1) < 1e-4:
             return scale
-        low, high = (scale, high) if found < requirement else (low, min(high, scale))
-        ahead = scale * min(4.0, max(0.25, requirement / found)) if 0 < found < math.inf else low
-        scale = ahead if low < ahead < high else (low + high) / 2 if high < math.inf else 2 * scale
+        low, high = (scale, high) if cubic_phase < requirement else (low, min(high, scale))
+        next_scale = scale * min(4.0, max(0.25, requirement / cubic_phase)) if 0 < cubic_phase < math.inf else low
+        scale = next_scale if low < next_scale < high else (low + high) / 2 if high < math.inf else 2 * scale
     raise ValueError("no scale of the declared errors has this cubic phase")
 
 
 # ---------------------------------------------------------------------- location
 def location(study: Study, requirement: float) -> Verdict:
-    """All declared errors scaled together until the gating model has them move the image by the requirement.
+    """Verdict on all declared errors, scaled until the gating model moves the image by the requirement.
 
-    Confirmed if the image, and by (25) each error alone by exact ranges, is where the gating model puts it, to 5 % of
-    the requirement. A displacement that only is shorter is conservative; one that goes elsewhere is not.
+    Confirmed if the image agrees with the gating model to 5 % of the requirement. For (25), each error alone must
+    also agree with exact ranges. A displacement that is only shorter is conservative; a different direction is not.
     """
     blank = study.blank("mission.location_error", requirement, "m")
     sizes = [(s, s.declared or 0.0) for s in study.declared]
@@ -382,36 +393,36 @@ def location(study: Study, requirement: float) -> Verdict:
             degeneracy = study.analysis.published.degeneracy
             why = reasons.displacement_degenerates(degeneracy) if degeneracy else reasons.errors_move_nothing(rule)
             return blank._replace(reason=why)
-        by_25 = published_displacement(study, sizes, scale)
-        said = study.effect(sizes, scale).displacement if study.is_full else by_25
+        published = published_displacement(study, sizes, scale)
+        expected = study.effect(sizes, scale).displacement if study.is_full else published
         images = study.images(study.together(sizes, scale))
         effect = images.effect
         shift = study.shift(images, study.read(images))
     except ValueError as error:
         return blank._replace(reason=reasons.no_image_formed(str(error)))
-    assert said is not None
+    assert expected is not None
     measured = effect.moved(shift.displacement)
-    seen = [("all of them together", said, measured)]
+    comparisons = [("all of them together", expected, measured)]
     if not study.is_full:
-        # Together, errors may hide each other: the sign each is declared with is not the sign it will fly with.
+        # Together, errors may hide each other: an error may fly with a sign other than the declared one.
         for source, size in sizes:
-            alone = published_displacement(study, [(source, size)], scale)
-            if alone is not None:
+            expected_alone = published_displacement(study, [(source, size)], scale)
+            if expected_alone is not None:
                 exact = study.effect([(source, size)], scale).displacement
-                seen.append((f"{source.id} alone", alone, exact))
-    room = TOLERANCE * requirement
+                comparisons.append((f"{source.id} alone", expected_alone, exact))
+    tolerance = TOLERANCE_FRACTION * requirement
     verdict = "confirmed"
-    for _, by_rule, is_at in seen:
-        if math.dist(by_rule, is_at) > room:
-            is_harmless = not study.is_full and verdict != "optimistic" and _is_shorter(by_rule, is_at)
+    for _, rule_position, exact_position in comparisons:
+        if math.dist(rule_position, exact_position) > tolerance:
+            is_harmless = not study.is_full and verdict != "optimistic" and _is_shorter(rule_position, exact_position)
             verdict = "conservative" if is_harmless else "optimistic"
-    reason = reasons.places_differ(rule, *_along_and_across(study, said, measured))
+    reason = reasons.places_differ(rule, *_along_and_across(study, expected, measured))
     if verdict != "confirmed":
-        who, by_rule, is_at = max(seen, key=lambda one: math.dist(*one[1:]))
-        reason = reason.then(reasons.rule_misplaces(who, rule, by_rule, is_at))
+        who, rule_position, exact_position = max(comparisons, key=lambda comparison: math.dist(*comparison[1:]))
+        reason = reason.then(reasons.rule_misplaces(who, rule, rule_position, exact_position))
     return blank._replace(
         **predicted(effect),
-        displacement_published_m=by_25,
+        displacement_published_m=published,
         displacement_full_m=effect.displacement,
         measured_displacement_m=measured,
         verdict=verdict,
@@ -420,10 +431,10 @@ def location(study: Study, requirement: float) -> Verdict:
 
 
 def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float | None:
-    """Scale at which the gating model moves the image by the requirement; None where it moves nothing."""
+    """Scale at which the gating model moves the image by the requirement; None if errors do not move it."""
     if not study.is_full:
-        place = published_displacement(study, sizes, 1.0)
-        length = math.hypot(*place) if place else 0.0
+        displacement = published_displacement(study, sizes, 1.0)
+        length = math.hypot(*displacement) if displacement else 0.0
         return requirement / length if length else None
     full = study.analysis.full
     moves = [full.displacement(source.full, size) or (0.0, 0.0) for source, size in sizes]
@@ -432,10 +443,10 @@ def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float 
         return None
     scale = requirement / length
     for _ in range(20):
-        found = math.hypot(*study.effect(sizes, scale).displacement)
-        if not found or abs(found / requirement - 1) < _SETTLED:
+        distance = math.hypot(*study.effect(sizes, scale).displacement)
+        if not distance or abs(distance / requirement - 1) < _LOCATION_FRACTION:
             break
-        scale *= min(2.0, max(0.5, requirement / found))
+        scale *= min(2.0, max(0.5, requirement / distance))
     return scale
 
 
@@ -447,15 +458,15 @@ def _along_and_across(study: Study, a: GroundVector, b: GroundVector) -> GroundV
     return abs(east * cosine + north * sine), abs(north * cosine - east * sine)
 
 
-def _is_shorter(said: GroundVector, is_at: GroundVector) -> bool:
-    """Whether a displacement is so much shorter than the one said that no sum of such errors is longer.
+def _is_shorter(expected: GroundVector, actual: GroundVector) -> bool:
+    """Whether a displacement is so much shorter than expected that no sum of such errors is longer than expected.
 
-    Of all signs of several displacements, the longest sum is at least 2/π of the sum of their lengths: so much of
-    what lies beside their lines is made up for by what is missing along them.
+    The longest sum of several displacements over all signs is at least 2/π of the sum of their lengths. So a missing
+    length along the lines compensates components across them in this ratio.
     """
-    length = math.hypot(*said)
+    length = math.hypot(*expected)
     if not length:
         return False
-    along = abs(is_at[0] * said[0] + is_at[1] * said[1]) / length**2
-    beside = abs(is_at[0] * said[1] - is_at[1] * said[0]) / length**2
-    return along + math.pi / 2 * beside <= 1
+    along = abs(actual[0] * expected[0] + actual[1] * expected[1]) / length**2
+    across = abs(actual[0] * expected[1] - actual[1] * expected[0]) / length**2
+    return along + math.pi / 2 * across <= 1

@@ -159,8 +159,8 @@ def rule_misplaces(who: str, rule: str, by_rule: Sequence[float], is_at: Sequenc
     )
 
 
-def _placed(place: Sequence[float]) -> str:
-    east, north = (format_quantity(part + 0.0, "m", 4) for part in place)
+def _placed(displacement: Sequence[float]) -> str:
+    east, north = (format_quantity(coordinate + 0.0, "m", 4) for coordinate in displacement)
     return f"{east} east, {north} north"
 
 

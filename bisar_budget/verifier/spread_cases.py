@@ -1,10 +1,10 @@
-"""Verdicts on the limits of what echoes and spreads: vibration, sensors and clocks.
+"""Verdicts on the limits of errors that make echoes or spread power: vibration, sensors and clocks.
 
-A sigma speaks of many flights. Whole time series go through exact ranges for it, and images of some of them say
-whether a response shows the phase that exact ranges find. What spreads is measured in images of as many draws as it
-takes to say whether a limit is true: lines across range, each the transform of the aperture under its window. Their
-mainlobe is what lies within the first nulls of the error-free response, their sidelobes are all the rest of one
-repeat interval, so that by Parseval only the mainlobe has to be transformed. Energies are means over the draws.
+A sigma is for many flights. It is measured with full time series through exact ranges, and images of a few of them
+show whether a response has the phase by exact ranges. Spread power is measured in images of as many draws as the
+verdict needs: lines across range, each the transform of the aperture under its window. The mainlobe lies within the
+first nulls of the error-free response, and the sidelobes are the rest of one repeat interval, so that by Parseval
+only the mainlobe is transformed. Energies are means over the draws.
 """
 
 import math
@@ -42,7 +42,7 @@ from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, ImagePoints, apert
 from bisar_budget.simulator.collection import CELLS, PointCollection
 from bisar_budget.simulator.impulse_response import upsampled
 from bisar_budget.simulator.phase_history import (
-    SMOOTH,
+    SMOOTH_ORDER,
     Course,
     Errors,
     Floats,
@@ -65,37 +65,39 @@ from bisar_budget.simulator.realisations import (
     zenith_delays,
 )
 from bisar_budget.verifier import reasons
-from bisar_budget.verifier.phase_cases import TOLERANCE, compare
+from bisar_budget.verifier.phase_cases import TOLERANCE_FRACTION, compare
 from bisar_budget.verifier.study import Study
 
 TOLERANCE_DB = 0.5
-UNDECLARED_CYCLES = 10  # of a vibration per aperture, where the file gives no frequency
+UNDECLARED_CYCLES = 10  # per aperture of a vibration, if the file gives no frequency
 
-_FINE_CUT = 8  # interpolation of a cut before its peak is read
-_SEEN_WALK = 0.3  # range cells, from which a smear is said
-_COMMON_RUNS = 32
+_ECHO_UPSAMPLING_FACTOR = 8  # of a cut before its peak is read
+_MIN_WALK_CELLS = 0.3  # range cells of smear from which a reason mentions it
+_COMMON_DRAWS = 32  # of a vibration that both platforms share
 
-_DRAWS, _CLOCK_DRAWS = 4000, 1000  # know a sigma to 1.1 %, and to 2.2 %
-_SYNCHRONIZED_DRAWS = 400  # whose fast tones are drawn too, because they are folded
-_TURNS = 100  # of a tone per aperture, beyond which it has no quadratic phase to speak of
-_OCTAVES = 16  # times the lowest frequency of a vibration, beyond which it adds less than 3 % to a phase
-_PER_TURN, _MOST_MOMENTS = 8, 1 << 17  # steps of a turn of a fast tone, and in all
-_SURE_SIGMA = 3.0  # standard errors of a sigma
-_IMAGES = 6
-_FINE = 513  # moments of a time series in an image
-_AT_ONCE = 250  # draws in memory
-_ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
+_SIGMA_DRAWS, _CLOCK_DRAWS = 4000, 1000  # give a sigma to 1.1 %, and to 2.2 %
+_SYNCHRONIZED_DRAWS = 400  # in which fast tones are drawn too, because they are folded
+_MAX_TONE_CYCLES = 100  # per aperture; a faster tone has a negligible quadratic phase
+_SHAKE_FREQUENCY_FACTOR = 16  # over the lowest frequency of a vibration; above it, less than 3 % of a phase is added
+_STEPS_PER_CYCLE, _MAX_TONE_STEPS = 8, 1 << 17  # of a fast tone, and in all
+_MARGIN_SIGMA = 3.0  # standard errors of a sigma
+_IMAGE_DRAWS = 6  # time series of which images are formed
+_SERIES_SAMPLES = 513  # of a time series in an image
+_BLOCK_DRAWS = 250  # in memory at once
+_CUBIC_ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
 
-_MOMENTS = 1024  # of an aperture whose spread power is measured; the mask holds two of so many cells of white noise
-_FIRST, _MOST = 64, 8192  # draws
-_AT_MOST = 256  # of them in memory
-_NORMAL_95 = 1.96  # standard errors on either side of a mean
-_SURE = 3.3  # of them within one verdict, 99.9 %: another seed must not draw another verdict
-_KNOWN_DB = 0.25  # half of an interval at most: one that is drawn too early may lie anywhere
-_FOLLOWED = (*MOVING, "propagation")  # kinds whose histories go through exact ranges as they are
-_NODES = 32  # of the mainlobe's integral
-_STEPS = 64  # in a cell, by which the first null is sought: the response is 0 there, and so is what a step holds
-_TINY = 1e-300
+_ISLR_SAMPLES = (
+    1024  # of an aperture whose spread power is measured; the mask holds two of these cells of white noise
+)
+_FIRST_ISLR_DRAWS, _MAX_ISLR_DRAWS = 64, 8192
+_BLOCK_ISLR_DRAWS = 256  # in memory at once
+_INTERVAL_95_SIGMA = 1.96  # standard errors on either side of a mean
+_DECISION_SIGMA = 3.3  # standard errors within one verdict, 99.9 %: another seed must not give another verdict
+_MAX_HALF_INTERVAL_DB = 0.25  # of a decided verdict: a wider interval, of few draws, may be off
+_FOLLOWED = (*MOVING, "propagation")  # kinds whose histories go directly through exact ranges
+_MAINLOBE_NODES = 32  # of the mainlobe's integral
+_STEPS_PER_CELL = 64  # of the search for the first null, where the response and thus the energy of a step is 0
+_MIN_ENERGY_FRACTION = 1e-300  # keeps logarithms finite
 
 Case = Callable[[], Verdict]
 
@@ -104,9 +106,10 @@ Case = Callable[[], Verdict]
 def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
     """Give the subject of each vibration limit, one platform alone and both together, and the call that verifies it.
 
-    What comes out for the published limits at equal shares: a sinusoid of one platform makes echoes 9 dB inside the
-    requirement, both in phase 3 dB inside; noise-like vibration of both, independent, exceeds the requirement by
-    0.44 dB with a uniform window. By the full model's limits both in phase fill it, and so does noise.
+    With the published limits at equal shares, echoes of a sinusoid of one platform are 9 dB below the requirement,
+    and echoes of both in phase are 3 dB below it; independent noise-like vibration of both exceeds the requirement by
+    0.44 dB with a uniform window. With the full model's limits, both in phase meet the requirement exactly, and so
+    does noise.
     """
     mission, T = study.mission, study.collection.aperture_time
     pslr, islr = mission.requirements.pslr, mission.requirements.islr
@@ -117,42 +120,49 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
     lines = {name: lines_of(mission, name) for name in PLATFORMS}
 
     def blank(
-        of: Subject, limits: Mapping[str, float], requirement_db: float | None, per_metre: float = 1.0
+        row_subject: Subject, limits: Mapping[str, float], requirement_db: float | None, per_metre: float = 1.0
     ) -> Verdict:
-        # Both together: the larger of two limits stands for the row.
-        unit = unit_of_line(mission, of.owner, of.entry or 0) if of.axis == "sinusoidal" and len(limits) == 1 else "m"
-        return study.blank(of.id, max(limits.values()) * per_metre, unit, requirement_db=requirement_db)
+        # The row of both platforms together has the larger of two limits.
+        unit = (
+            unit_of_line(mission, row_subject.owner, row_subject.entry or 0)
+            if row_subject.axis == "sinusoidal" and len(limits) == 1
+            else "m"
+        )
+        return study.blank(row_subject.id, max(limits.values()) * per_metre, unit, requirement_db=requirement_db)
 
     for name in PLATFORMS:
         for index, (_, frequency, per_metre) in enumerate(lines[name] or [Line(0.0, None)]):
             cycles = UNDECLARED_CYCLES if frequency is None else frequency * T
             if cycles < SLOWEST_ECHO_CYCLES or not tone:
-                continue  # a phase, which `phase_cases` looks at; or nothing holds it
-            one, alone = subject(name, "vibration", "sinusoidal", entry=index), {name: tone[name]}
-            unseen = blank(one, alone, pslr, per_metre)
+                continue  # a phase, verified by `phase_cases`; or no requirement limits it
+            vibration, alone = subject(name, "vibration", "sinusoidal", entry=index), {name: tone[name]}
+            unseen = blank(vibration, alone, pslr, per_metre)
             if pslr is not None:
-                yield one, partial(_sinusoidal, study, unseen, alone, frequency)
+                yield vibration, partial(_sinusoidal, study, unseen, alone, frequency)
             else:
-                yield one, partial(_spread_tone, study, unseen, name, tone[name], cycles)
+                yield vibration, partial(_spread_tone, study, unseen, name, tone[name], cycles)
         if pslr is not None:
             for index, members in enumerate(near_lines([line.frequency * T for line in lines[name]])):
-                one = subject(name, "vibration", "sinusoidal.sum", entry=index)
+                vibration = subject(name, "vibration", "sinusoidal.sum", entry=index)
                 near = [lines[name][member] for member in members]
-                yield one, partial(_near, study, blank(one, {name: tone[name]}, pslr), name, tone[name], near)
+                yield (
+                    vibration,
+                    partial(_near, study, blank(vibration, {name: tone[name]}, pslr), name, tone[name], near),
+                )
         if islr is not None:
-            one, alone = subject(name, "vibration", "wideband"), {name: rms[name]}
-            yield one, partial(_wideband, study, blank(one, alone, islr), alone)
+            vibration, alone = subject(name, "vibration", "wideband"), {name: rms[name]}
+            yield vibration, partial(_wideband, study, blank(vibration, alone, islr), alone)
     if pslr is not None:
         frequency = next((line.frequency for name in PLATFORMS for line in lines[name]), None)
-        both = subject("mission", "vibration", "sinusoidal")
-        yield both, partial(_sinusoidal, study, blank(both, tone, pslr), tone, frequency)
+        both_platforms = subject("mission", "vibration", "sinusoidal")
+        yield both_platforms, partial(_sinusoidal, study, blank(both_platforms, tone, pslr), tone, frequency)
     if islr is not None:
-        both = subject("mission", "vibration", "wideband")
-        yield both, partial(_wideband, study, blank(both, rms, islr), rms)
+        both_platforms = subject("mission", "vibration", "wideband")
+        yield both_platforms, partial(_wideband, study, blank(both_platforms, rms, islr), rms)
 
 
 def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], declared: float | None) -> Verdict:
-    """Measure the paired echo on the difference from the error-free image, which its sidelobes would bury."""
+    """Measure the paired echo on the difference from the error-free image, whose sidelobes would hide it."""
     frequency = UNDECLARED_CYCLES / study.collection.aperture_time if declared is None else declared
     sinusoids = {name: (PathSinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
     who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
@@ -160,7 +170,7 @@ def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], decla
 
 
 def _near(study: Study, blank: Verdict, name: str, limit: float, lines: Sequence[Line]) -> Verdict:
-    """Lines near each other, in their declared ratio and their worst phases, scaled to their limit together."""
+    """Verdict on lines near each other, in their declared ratio and worst phases, scaled to their common limit."""
     cycles = [line.frequency * study.collection.aperture_time for line in lines]
     worst = worst_phases([line.amplitude for line in lines], cycles)
     if not worst.amplitude:
@@ -181,87 +191,91 @@ def echo(
     *,
     is_assumed: bool = False,
 ) -> Verdict:
-    """Measure the paired echoes of sinusoids against the requirement of a verdict that is yet blank."""
+    """Measure the paired echoes of sinusoids and compare them with the requirement of a blank verdict."""
     collection = study.collection
-    every = [sinusoid.frequency * collection.aperture_time for those in sinusoids.values() for sinusoid in those]
-    slowest, cycles = min(every), max(every)
+    cycles_of_all = [
+        sinusoid.frequency * collection.aperture_time
+        for platform_sinusoids in sinusoids.values()
+        for sinusoid in platform_sinusoids
+    ]
+    slowest, cycles = min(cycles_of_all), max(cycles_of_all)
     if slowest < 3:
         return blank._replace(reason=reasons.echoes_on_the_peak(slowest))
     cells = 2 * math.ceil(min(cycles, 1e6)) + CELLS
     errors = Errors()
-    for name, those in sinusoids.items():
-        errors = errors.of(name, PathError(sinusoids=those))
+    for name, platform_sinusoids in sinusoids.items():
+        errors = errors.of(name, PathError(sinusoids=platform_sinusoids))
     try:
         clean = collection.chip((0.0, 0.0), Errors(), cells=cells).cut
         echo = collection.chip((0.0, 0.0), errors, cells=cells).cut - clean
     except ValueError as error:
         return blank._replace(reason=reasons.no_image_of_a_vibration(cycles, str(error)))
-    # An echo keeps its range while a scatterer at its place would walk by one wavelength per cycle.
+    # An echo keeps its range, while a scatterer at its position would walk by one wavelength per cycle.
     walk = cycles * collection.radar.bandwidth / collection.radar.center_frequency
-    peaks = [float(np.abs(upsampled(cut, _FINE_CUT)).max()) for cut in (echo, clean)]
+    peaks = [float(np.abs(upsampled(cut, _ECHO_UPSAMPLING_FACTOR)).max()) for cut in (echo, clean)]
     level = 20 * math.log10(peaks[0] / peaks[1])
     return blank._replace(
         measured_db=level,
         verdict=compare(level - (blank.requirement_db or 0.0), TOLERANCE_DB),
-        reason=reasons.echoes_measured(who, cycles, walk if walk > _SEEN_WALK else None, is_assumed),
+        reason=reasons.echoes_measured(who, cycles, walk if walk > _MIN_WALK_CELLS else None, is_assumed),
     )
 
 
 def _wideband(study: Study, blank: Verdict, limits: Mapping[str, float]) -> Verdict:
-    """Measure the ISLR that white vibration adds, over all of the repeat interval, on as many draws as it takes."""
+    """Measure the ISLR that white vibration adds over the repeat interval, with as many draws as needed."""
     collection, seed = study.collection, (study.mission.simulation or Simulation()).seed
-    slow_time = cell_centres(collection.aperture_time, _MOMENTS)
+    slow_time = cell_centres(collection.aperture_time, _ISLR_SAMPLES)
     clean = collection.flight(Errors(), slow_time).paths
     errors = Errors()
     for name, rms in limits.items():
         errors = errors.of(name, PathError(wideband_rms=rms))
 
     def phases(rng: np.random.Generator, draws: int, *, is_common: bool) -> Floats:
-        found = np.empty((draws, slow_time.size))
-        for one in found:
+        phase_draws = np.empty((draws, slow_time.size))
+        for phase in phase_draws:
             flown = collection.flight(errors, slow_time, rng).paths
             shifts = [
-                np.linalg.norm(now.measured, axis=1) - np.linalg.norm(before.measured, axis=1)
-                for now, before in zip(flown, clean, strict=True)
+                np.linalg.norm(flown_path.measured, axis=1) - np.linalg.norm(clean_path.measured, axis=1)
+                for flown_path, clean_path in zip(flown, clean, strict=True)
             ]
-            if collection.has_direct_path:  # of each platform alone
+            if collection.has_direct_path:  # each platform's part alone
                 shifts[0] -= SPEED_OF_LIGHT * direct_path_error((flown[0], clean[1]))
                 shifts[1] -= SPEED_OF_LIGHT * direct_path_error((clean[0], flown[1]))
             if is_common:  # the second platform makes the first one's motion, at its own limit
                 first, second = limits.values()
                 shifts[1] = shifts[0] * second / first
-            one[:] = 2 * math.pi / collection.wavelength * (shifts[0] + shifts[1])
-        return found
+            phase[:] = 2 * math.pi / collection.wavelength * (shifts[0] + shifts[1])
+        return phase_draws
 
-    rest_on = reasons.power_of_one_platform()
+    basis = reasons.power_of_one_platform()
     if len(limits) == 2:
-        mainlobe = Mainlobe(collection.window(_MOMENTS))
-        common = phases(np.random.default_rng([seed, 1]), _COMMON_RUNS, is_common=True)
-        rest_on = reasons.power_of_both_platforms(mainlobe.added_db(float(mainlobe.lost(common).mean())))
+        mainlobe = Mainlobe(collection.window(_ISLR_SAMPLES))
+        common = phases(np.random.default_rng([seed, 1]), _COMMON_DRAWS, is_common=True)
+        basis = reasons.power_of_both_platforms(mainlobe.added_db(float(mainlobe.lost(common).mean())))
     draw = partial(phases, np.random.default_rng(seed), is_common=False)
-    return measured_power(collection, blank, draw, rest_on)
+    return measured_power(collection, blank, draw, basis)
 
 
 def measured_power(
-    collection: PointCollection, blank: Verdict, draw: Callable[[int], Floats], rest_on: Note
+    collection: PointCollection, blank: Verdict, draw: Callable[[int], Floats], basis: Note
 ) -> Verdict:
-    """Verdict on the ISLR that phases add, (draws, _MOMENTS), against the requirement of one that is yet blank."""
+    """Verdict on the ISLR that phases (draws, _ISLR_SAMPLES) add, against the requirement of a blank verdict."""
     required = blank.requirement_db or 0.0
-    found = added_islr(collection.window(_MOMENTS), draw, required)
-    verdict, interval = found.verdict(required), (found.low, found.high)
+    added = added_islr(collection.window(_ISLR_SAMPLES), draw, required)
+    verdict, interval = added.verdict(required), (added.low, added.high)
     drawn = reasons.draws_decide if verdict != "not_evaluated" else reasons.draws_do_not_decide
     return blank._replace(
-        measured_db=found.level,
-        measured_db_error=found.error,
+        measured_db=added.level,
+        measured_db_error=added.error,
         measured_db_interval=interval,
         verdict=verdict,
-        reason=rest_on.then(drawn(found.draws, *interval)),
+        reason=basis.then(drawn(added.draws, *interval)),
     )
 
 
 # ---------------------------------------------------------------------- sensors and clocks
 def limits_of(study: Study, error: RandomError) -> dict[str, float]:
-    """Size at which each requirement that an error touches is reached, autofocus left out; empty: none limits it."""
+    """Sizes at which an error reaches its requirements, without autofocus; empty if no requirement limits it."""
     model = _model(study, error)
     effect = held_effect(study.mission, error.effect(model), error.coverage(study.mission))
     sizes = map(float, sizes_at(effect, limits_for(study.mission, study.allocation, error.owner, model)))
@@ -269,25 +283,29 @@ def limits_of(study: Study, error: RandomError) -> dict[str, float]:
 
 
 def _model(study: Study, error: RandomError) -> str:
-    """The gating model by which an error does more."""
-    return max((one.name for one in study.models), key=lambda name: max(error.effect(name)[:2]))
+    """The gating model by which an error has the larger effect."""
+    return max((model.name for model in study.models), key=lambda name: max(error.effect(name)[:2]))
 
 
 def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
     """Give the subject of each oscillator's tone that has a limit, and the call that verifies it.
 
-    In an image it is the motion of its platform that makes the same phase.
+    In an image the tone is the motion of its platform with the same phase.
     """
     mission, wavelength = study.mission, study.collection.wavelength
     metric, limits = tone_limits(mission, study.allocation)
-    needed = mission.requirements.pslr if metric == "pslr" else None
+    required_pslr = mission.requirements.pslr if metric == "pslr" else None
     sizes = {name: limit.by(study.model) for name, limit in limits.items()}
 
-    def case(of: Subject, stated: float, unit: str, frequency: float) -> tuple[Subject, Case]:
-        blank, size = study.blank(of.id, stated, unit, requirement_db=needed), sizes[of.owner]
+    def case(row_subject: Subject, limit: float, unit: str, frequency: float) -> tuple[Subject, Case]:
+        blank, size = study.blank(row_subject.id, limit, unit, requirement_db=required_pslr), sizes[row_subject.owner]
         if metric == "islr":
-            return of, partial(_spread_tone, study, blank, of.owner, size, frequency * study.collection.aperture_time)
-        return of, partial(echo, study, blank, {of.owner: (PathSinusoid(size, frequency),)}, "the tone alone")
+            return row_subject, partial(
+                _spread_tone, study, blank, row_subject.owner, size, frequency * study.collection.aperture_time
+            )
+        return row_subject, partial(
+            echo, study, blank, {row_subject.owner: (PathSinusoid(size, frequency),)}, "the tone alone"
+        )
 
     for spur in spurs_of(mission):
         if spur.name in sizes:
@@ -300,32 +318,32 @@ def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
 
 
 def _spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cycles: float) -> Verdict:
-    """A tone where ISLR holds it, at its limit: a motion [m] of so many cycles per aperture."""
+    """Verdict on a tone at its limit by ISLR: a motion [m] of `cycles` cycles per aperture."""
     phase = 2 * math.pi * amplitude / study.collection.wavelength
     return _power(study, blank, [], owner, echoes=[(phase / math.sqrt(2), cycles)])
 
 
 def verify_pslr(study: Study) -> Verdict:
-    """The tones that make the highest echo, in their worst phases, scaled together to what is required."""
+    """Verdict on the tones of the highest echo, in their worst phases, scaled together to the requirement."""
     required = study.mission.requirements.pslr or 0.0
     row_id = subject("mission", "pslr").id
     blank = study.blank(row_id, required, "dB", requirement_db=required)
-    found = tones(study.mission)
-    highest = highest_echo(found)
+    declared_tones = tones(study.mission)
+    highest = highest_echo(declared_tones)
     if highest is None or not highest.phase:
         return blank._replace(reason=reasons.no_tone_declared())
     scale = echo_phase(10 ** (required / 20)) / highest.phase * study.collection.wavelength / (2 * math.pi)
     sinusoids: dict[str, tuple[PathSinusoid, ...]] = {}
-    for one in [one for one, is_in in zip(found, highest.is_of, strict=True) if is_in]:
-        turned = 0.0 if np.sinc(highest.cycles - one.cycles) >= 0 else math.pi
-        turned += 0.0 if one.in_quadrature is None else math.pi / 2
-        tone = PathSinusoid(scale * one.phase, one.cycles / study.collection.aperture_time, turned)
-        sinusoids[one.subject.owner] = (*sinusoids.get(one.subject.owner, ()), tone)
+    for member in [tone for tone, is_in in zip(declared_tones, highest.is_of, strict=True) if is_in]:
+        phase = 0.0 if np.sinc(highest.cycles - member.cycles) >= 0 else math.pi
+        phase += 0.0 if member.in_quadrature is None else math.pi / 2
+        tone = PathSinusoid(scale * member.phase, member.cycles / study.collection.aperture_time, phase)
+        sinusoids[member.subject.owner] = (*sinusoids.get(member.subject.owner, ()), tone)
     return echo(study, blank, sinusoids, "the tones together in their worst phases")
 
 
 def verify_random(study: Study, error: RandomError) -> Verdict:
-    """Limit of one figure: the smallest of what its requirements allow, autofocus left out."""
+    """Verdict on the limit of one figure: the smallest allowable by its requirements, without autofocus."""
     sizes = limits_of(study, error)
     binding = min(sizes, key=lambda name: sizes[name])
     size = sizes[binding]
@@ -333,37 +351,37 @@ def verify_random(study: Study, error: RandomError) -> Verdict:
     blank = study.blank(error.id, 20 * math.log10(size) if error.unit == "dB" else size, error.unit)
     if binding == ISLR:
         is_taken = study.mission.requirements.cubic_phase_error is not None
-        return _power(study, blank, [at_limit], error.owner, order=_ORDER if is_taken else _ORDER - 1)
+        return _power(study, blank, [at_limit], error.owner, order=_CUBIC_ORDER if is_taken else _CUBIC_ORDER - 1)
     if binding == LOCATION:
         return _place(study, blank, at_limit, _stream(study, error.id))
     return _phase(study, blank, at_limit, binding, _stream(study, error.id))
 
 
 def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: np.random.Generator) -> Verdict:
-    """Sigma of quadratic or cubic phase at the limit, coverage factor included, against the budget."""
+    """Verdict on the sigma of quadratic or cubic phase at the limit, times the coverage factor, by the budget."""
     is_cubic = binding == CUBIC
     required = study.mission.requirements.cubic_phase_error
     budget = (required or 0.0) if is_cubic else study.allocation.qpe_limit(error.owner)
     factor = study.mission.allocation.coverage_factor
     sigma, draws = _sigma(study, error, rng, is_cubic)
     predicted = factor * sigma
-    drawn, seen = [], []
+    exact_phases, image_phases = [], []
     try:
         for errors in _series(study, error, rng):
             images = study.images(errors)
             effect, reading = images.effect, study.read(images)
-            drawn.append(effect.cubic if is_cubic else effect.quadratic)
-            seen.append(reading.cubic if is_cubic else reading.quadratic)
+            exact_phases.append(effect.cubic if is_cubic else effect.quadratic)
+            image_phases.append(reading.cubic if is_cubic else reading.quadratic)
     except ValueError as fault:
         return blank._replace(budget_rad=budget, reason=reasons.no_image_of_a_time_series(str(fault)))
-    # How much of a phase images show: readings over exact ranges, the large ones counting more.
-    shown = float(np.dot(drawn, seen) / np.dot(drawn, drawn))
-    measured = predicted * shown
-    tolerance = TOLERANCE + _SURE_SIGMA / math.sqrt(2 * draws)
+    # Phases in images over phases by exact ranges; large ones have more weight.
+    image_ratio = float(np.dot(exact_phases, image_phases) / np.dot(exact_phases, exact_phases))
+    measured = predicted * image_ratio
+    tolerance = TOLERANCE_FRACTION + _MARGIN_SIGMA / math.sqrt(2 * draws)
     verdict = blank._replace(
         budget_rad=budget,
         verdict=compare(measured / budget - 1, tolerance),
-        reason=reasons.sigma_of_time_series(draws, factor, _IMAGES, "cubic phase" if is_cubic else ""),
+        reason=reasons.sigma_of_time_series(draws, factor, _IMAGE_DRAWS, "cubic phase" if is_cubic else ""),
     )
     if is_cubic:
         return verdict._replace(measured_cubic_rad=measured, predicted_cubic_rad=predicted)
@@ -371,136 +389,148 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
 
 
 def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Generator) -> Verdict:
-    """Sigma of the displacement at the limit, coverage factor included, against the requirement."""
+    """Verdict on the sigma of the displacement at the limit, times the coverage factor, by the requirement."""
     required = study.mission.requirements.location_error or 0.0
-    factor, draws = study.mission.allocation.coverage_factor, _DRAWS
+    factor, draws = study.mission.allocation.coverage_factor, _SIGMA_DRAWS
     if error.subject.kind in _FOLLOWED:
-        found = _drawn_effects(study, error, rng)
+        effects = _effects_of_draws(study, error, rng)
     else:
         fit, draws = _fits(study, error, rng)
-        if error.subject.kind == "synchronization":  # a constant phase moves nothing
+        if error.subject.kind == "synchronization":  # a constant phase does not displace a point
             fit[0] = 0.0
         half = study.collection.aperture_time / 2
         phases = np.polynomial.legendre.legval(aperture_nodes(study.collection.aperture_time) / half, fit)
         metres = np.asarray(phases * study.collection.wavelength / (2 * math.pi), float)
-        found = study.exact_effects({"clock": metres})
-    east, north = (factor * math.sqrt(np.nanmean(np.square(one))) for one in (found.east, found.north))
-    drawn, seen = list[float](), list[float]()
+        effects = study.exact_effects({"clock": metres})
+    east, north = (
+        factor * math.sqrt(np.nanmean(np.square(component))) for component in (effects.east, effects.north)
+    )
+    exact_displacements, image_displacements = list[float](), list[float]()
     try:
         for errors in _series(study, error, rng):
             images = study.images(errors)
             shift = study.shift(images, study.read(images))
-            drawn += images.effect.displacement
-            seen += images.effect.moved(shift.displacement)
+            exact_displacements += images.effect.displacement
+            image_displacements += images.effect.moved(shift.displacement)
     except ValueError as fault:
         return blank._replace(reason=reasons.no_image_of_a_time_series(str(fault)))
-    shown = float(np.dot(drawn, seen) / np.dot(drawn, drawn))
-    tolerance = TOLERANCE + _SURE_SIGMA / math.sqrt(2 * draws)
+    image_ratio = float(
+        np.dot(exact_displacements, image_displacements) / np.dot(exact_displacements, exact_displacements)
+    )
+    tolerance = TOLERANCE_FRACTION + _MARGIN_SIGMA / math.sqrt(2 * draws)
     return blank._replace(
         displacement_m=(east, north),
-        measured_displacement_m=(east * shown, north * shown),
-        verdict=compare(math.hypot(east, north) * shown / required - 1, tolerance),
-        reason=reasons.sigma_of_time_series(draws, factor, _IMAGES, "displacement"),
+        measured_displacement_m=(east * image_ratio, north * image_ratio),
+        verdict=compare(math.hypot(east, north) * image_ratio / required - 1, tolerance),
+        reason=reasons.sigma_of_time_series(draws, factor, _IMAGE_DRAWS, "displacement"),
     )
 
 
 def _stream(study: Study, row_id: str) -> np.random.Generator:
-    """Draws of a row, its own whatever else is verified."""
+    """Random numbers of a row, independent of the other verified rows."""
     return np.random.default_rng([(study.mission.simulation or Simulation()).seed, *row_id.encode()])
 
 
 def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
     """Standard deviation of a phase over many time series, and their number. [rad]"""
     if error.subject.kind in _FOLLOWED:
-        found = _drawn_effects(study, error, rng)
-        return float(np.nanstd(found.cubic if is_cubic else found.quadratic)), _DRAWS
+        effects = _effects_of_draws(study, error, rng)
+        return float(np.nanstd(effects.cubic if is_cubic else effects.quadratic)), _SIGMA_DRAWS
     fit, draws = _fits(study, error, rng)
     return float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2])), draws
 
 
-def _drawn_effects(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
+def _effects_of_draws(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
     """Effects of many histories of a sensor or the air, by exact ranges, (draws,)."""
     moments = aperture_nodes(study.collection.aperture_time)
-    if error.subject.kind in CORRELATED:  # not smooth between the nodes, as what is integrated is
+    if error.subject.kind in CORRELATED:  # not smooth between the nodes, unlike integrated noise
         return study.exact_effects(_smooth_noise(study, error, rng))
     if error.subject.kind != "propagation":
-        return study.exact_effects(position_courses(study.mission, error, moments, _DRAWS, rng))
+        return study.exact_effects(position_courses(study.mission, error, moments, _SIGMA_DRAWS, rng))
     group = group_delays(study.mission, error, moments, _delays_at_nodes(study, error, rng))
     mean = (group @ nodes(FINE_NODE_COUNT).fit[0])[:, None]
     return study.exact_effects({"clock": seen_course(group, mean, error.subject.axis)})
 
 
-def _left_at_the_point(study: Study, error: RandomError, times: Floats, group: Floats) -> Floats:
-    """Range error that group delays (draws, times) leave where they move a point to. [m]"""
+def _remaining_range_error(study: Study, error: RandomError, times: Floats, group: Floats) -> Floats:
+    """Range error of group delays (draws, times) that remains at the displaced point. [m]"""
     half, geometry = study.collection.aperture_time / 2, study.geometry
     mean = group.mean(axis=1, keepdims=True)
-    seen = seen_course(group, mean, error.subject.axis)
-    at_nodes = seen @ _smooth_at_nodes(2 * half, times).T
-    found = study.exact_effects({"clock": at_nodes})
+    range_error = seen_course(group, mean, error.subject.axis)
+    at_nodes = range_error @ _smooth_at_nodes(2 * half, times).T
+    effects = study.exact_effects({"clock": at_nodes})
     for path in geometry.both:
         position = np.stack(np.broadcast_arrays(*path.place(times)))
         sight = position / np.linalg.norm(position, axis=0)
-        seen = seen + np.multiply.outer(found.east, sight[0]) + np.multiply.outer(found.north, sight[1])
-    return np.asarray(seen)
+        range_error = (
+            range_error + np.multiply.outer(effects.east, sight[0]) + np.multiply.outer(effects.north, sight[1])
+        )
+    return np.asarray(range_error)
 
 
 def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[Floats, int]:
     """Legendre coefficients of time series of a clock's phase, (4, draws) [rad], and the number of draws."""
     mission, T = study.mission, study.collection.aperture_time
-    draws, highest, count = _CLOCK_DRAWS, _TURNS / T, 257
+    draws, highest, count = _CLOCK_DRAWS, _MAX_TONE_CYCLES / T, 257
     if mission.synchronization is not None and mission.synchronization.interval is not None:
         draws = _SYNCHRONIZED_DRAWS
-    if fastest_shake(mission, error):  # which may begin far beyond what else has a quadratic phase
-        draws, highest = _SYNCHRONIZED_DRAWS, max(highest, _OCTAVES * slowest_shake(mission, error))
+    if fastest_shake(mission, error):  # which may begin at far higher frequencies than other quadratic phases
+        draws, highest = _SYNCHRONIZED_DRAWS, max(highest, _SHAKE_FREQUENCY_FACTOR * slowest_shake(mission, error))
         highest = min(highest, fastest_shake(mission, error))
-        count = 1 + fast_steps(min(_MOST_MOMENTS, max(count - 1, math.ceil(_PER_TURN * highest * T))))
-    times, found = _moments(study, count), list[Floats]()
-    together = max(1, _AT_ONCE * _FINE // count)
-    for first in range(0, draws, together):
-        some = min(together, draws - first)
-        phases = phase_courses(mission, error, times, some, rng, highest)
-        found.append(np.asarray(np.polynomial.legendre.legfit(2 * times / T, phases.T, _ORDER), float))
-    return np.concatenate(found, axis=1), draws
+        count = 1 + fast_steps(min(_MAX_TONE_STEPS, max(count - 1, math.ceil(_STEPS_PER_CYCLE * highest * T))))
+    times, coefficients = _moments(study, count), list[Floats]()
+    block_draws = max(1, _BLOCK_DRAWS * _SERIES_SAMPLES // count)
+    for start in range(0, draws, block_draws):
+        draw_count = min(block_draws, draws - start)
+        phases = phase_courses(mission, error, times, draw_count, rng, highest)
+        coefficients.append(np.asarray(np.polynomial.legendre.legfit(2 * times / T, phases.T, _CUBIC_ORDER), float))
+    return np.concatenate(coefficients, axis=1), draws
 
 
 def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
-    """Delays at the zenith at the nodes of exact ranges in sigmas of what is declared, (draws, nodes)."""
+    """Delays at the zenith at the nodes of exact ranges, in declared sigmas, (draws, nodes)."""
     T, correlation_time = study.collection.aperture_time, correlation_time_of(study.mission, error.owner)
     if correlation_time is None:
-        return zenith_delays(study.mission, error, aperture_nodes(T), _DRAWS, rng)
-    times = _moments(study, _FINE)
+        return zenith_delays(study.mission, error, aperture_nodes(T), _SIGMA_DRAWS, rng)
+    times = _moments(study, _SERIES_SAMPLES)
     smooth = _smooth_at_nodes(T, times).T * math.sqrt(_power_of_samples(times, correlation_time))
-    drawn = [zenith_delays(study.mission, error, times, _AT_ONCE, rng) @ smooth for _ in range(_DRAWS // _AT_ONCE)]
+    drawn = [
+        zenith_delays(study.mission, error, times, _BLOCK_DRAWS, rng) @ smooth
+        for _ in range(_SIGMA_DRAWS // _BLOCK_DRAWS)
+    ]
     return np.concatenate(drawn)
 
 
 def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
-    """Correlated noise at the nodes of exact ranges, (draws, nodes, 3) each, without what they cannot tell. [m]"""
-    T, time = study.collection.aperture_time, process_of(study.mission, error).correlation_time
-    times = _moments(study, _FINE)
+    """Smooth part of correlated noise at the nodes of exact ranges, (draws, nodes, 3) for each platform. [m]"""
+    T, correlation_time = study.collection.aperture_time, process_of(study.mission, error).correlation_time
+    times = _moments(study, _SERIES_SAMPLES)
     at_nodes = _smooth_at_nodes(T, times)
-    drawn = [
-        {name: at_nodes @ one for name, one in position_courses(study.mission, error, times, _AT_ONCE, rng).items()}
-        for _ in range(_DRAWS // _AT_ONCE)
+    blocks = [
+        {
+            name: at_nodes @ course
+            for name, course in position_courses(study.mission, error, times, _BLOCK_DRAWS, rng).items()
+        }
+        for _ in range(_SIGMA_DRAWS // _BLOCK_DRAWS)
     ]
-    scale = math.sqrt(_power_of_samples(times, time))
-    return {name: np.concatenate([one[name] for one in drawn]) * scale for name in drawn[0]}
+    scale = math.sqrt(_power_of_samples(times, correlation_time))
+    return {name: np.concatenate([block[name] for block in blocks]) * scale for name in blocks[0]}
 
 
 def _smooth_at_nodes(aperture_time: float, times: Floats) -> Floats:
-    """Takes courses at times to the nodes of exact ranges, (nodes, times), by what is smooth of them.
+    """Matrix from courses at times to their smooth parts at the nodes of exact ranges, (nodes, times).
 
-    At the nodes alone noise of a short correlation time would pass for a larger phase.
+    Samples at the nodes alone would take noise of a short correlation time for a larger phase.
     """
     legendre = np.polynomial.legendre
-    fit = np.linalg.pinv(legendre.legvander(2 * times / aperture_time, SMOOTH))
-    return np.asarray(legendre.legvander(2 * aperture_nodes(aperture_time) / aperture_time, SMOOTH) @ fit)
+    fit = np.linalg.pinv(legendre.legvander(2 * times / aperture_time, SMOOTH_ORDER))
+    return np.asarray(legendre.legvander(2 * aperture_nodes(aperture_time) / aperture_time, SMOOTH_ORDER) @ fit)
 
 
 def _power_of_samples(times: Floats, correlation_time: float) -> float:
     """Power of correlated noise at low frequencies over that of its samples.
 
-    Samples a step Δ apart have more than the noise: Δ·coth(Δ/2τ_c), not 2τ_c.
+    Samples a step Δ apart have more power than the noise: Δ·coth(Δ/2τ_c) instead of 2τ_c.
     """
     step = float(times[1] - times[0])
     return 2 * correlation_time / step * math.tanh(step / (2 * correlation_time))
@@ -513,50 +543,52 @@ def _moments(study: Study, count: int) -> Floats:
 
 
 def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[Errors]:
-    """A few time series as errors of an image, up to the cubic phase: what is left spreads, and would hide it."""
-    times = _moments(study, _FINE)
+    """A few time series as errors of an image, up to the cubic phase: faster phases spread and would hide it."""
+    times = _moments(study, _SERIES_SAMPLES)
     if error.subject.kind in MOVING:
-        found = [Errors()] * _IMAGES
-        for name, courses in position_courses(study.mission, error, times, _IMAGES, rng).items():
-            smooth = (PathError(course=Course(times, one).smooth(_ORDER)) for one in courses)
-            found = [one.of(name, error_of_path) for one, error_of_path in zip(found, smooth, strict=True)]
-        return found
+        errors_of_images = [Errors()] * _IMAGE_DRAWS
+        for name, courses in position_courses(study.mission, error, times, _IMAGE_DRAWS, rng).items():
+            smooth = (PathError(course=Course(times, course).smooth(_CUBIC_ORDER)) for course in courses)
+            errors_of_images = [
+                errors.of(name, path_error) for errors, path_error in zip(errors_of_images, smooth, strict=True)
+            ]
+        return errors_of_images
     if error.subject.kind == "propagation":
-        at_zenith = zenith_delays(study.mission, error, times, _IMAGES, rng)
+        at_zenith = zenith_delays(study.mission, error, times, _IMAGE_DRAWS, rng)
         if correlation_time_of(study.mission, error.owner) is not None:
-            at_zenith = Course(times, at_zenith.T).smooth(_ORDER).values.T
+            at_zenith = Course(times, at_zenith.T).smooth(_CUBIC_ORDER).values.T
         groups = group_delays(study.mission, error, times, at_zenith)
         if error.subject.axis == CONTENT:
-            return [Errors(electrons=electrons_at_1_hz(study.mission, times, one)) for one in groups]
-        return [Errors(clock_course=Course(times, one / SPEED_OF_LIGHT)) for one in groups]
-    phases = phase_courses(study.mission, error, times, _IMAGES, rng)
-    delays = [clock_seconds(one, study.collection.wavelength) for one in phases]
-    return [Errors(clock_course=Course(times, one).smooth(_ORDER)) for one in delays]
+            return [Errors(electrons=electrons_at_1_hz(study.mission, times, course)) for course in groups]
+        return [Errors(clock_course=Course(times, course / SPEED_OF_LIGHT)) for course in groups]
+    phases = phase_courses(study.mission, error, times, _IMAGE_DRAWS, rng)
+    delays = [clock_seconds(course, study.collection.wavelength) for course in phases]
+    return [Errors(clock_course=Course(times, course).smooth(_CUBIC_ORDER)) for course in delays]
 
 
 # ---------------------------------------------------------------------- what spreads
-def verify_islr(study: Study, of: Subject) -> Verdict:
-    """Everything that spreads, scaled together to the limit of a row's owner."""
+def verify_islr(study: Study, row_subject: Subject) -> Verdict:
+    """Verdict on all errors that spread power, scaled together to the limit of a row's owner."""
     mission, model = study.mission, study.models[-1].name
-    limit = spread_limit(mission, study.allocation, of.owner, model) or 0.0
+    limit = spread_limit(mission, study.allocation, row_subject.owner, model) or 0.0
     level = islr_db(limit**2, model, mainlobe_energy(mission))
-    blank = study.blank(of.id, level, "dB")
-    powers = declared_powers(study.analysis, of.owner, model)
-    total = math.fsum(one.variance for one in powers)
+    blank = study.blank(row_subject.id, level, "dB")
+    powers = declared_powers(study.analysis, row_subject.owner, model)
+    total = math.fsum(power.variance for power in powers)
     if not total:
         return blank._replace(reason=reasons.no_spread_declared())
     scale = limit / math.sqrt(total)
-    # A direct path cancels some.
-    rms = {one.row_id: scale * math.sqrt(one.variance) for one in powers if one.variance}
+    # A direct path cancels part of the power.
+    rms = {power.row_id: scale * math.sqrt(power.variance) for power in powers if power.variance}
     members = [
         error._replace(declared=scale * (error.declared or 0.0)) for error in study.analysis.random if error.id in rms
     ]
     cubic = rms.pop(subject("mission", CUBIC).id, 0.0)
-    cycles = {one.subject.id: one.cycles for one in tones(mission)}
+    cycles = {tone.subject.id: tone.cycles for tone in tones(mission)}
     echoes = [(rms[row_id], turns) for row_id, turns in cycles.items() if row_id in rms]
-    known = {error.id for error in members} | cycles.keys()
-    white = math.sqrt(math.fsum(size**2 for row_id, size in rms.items() if row_id not in known))
-    return _power(study, blank, members, of.owner, white, echoes, cubic)
+    shown_ids = {error.id for error in members} | cycles.keys()
+    white = math.sqrt(math.fsum(size**2 for row_id, size in rms.items() if row_id not in shown_ids))
+    return _power(study, blank, members, row_subject.owner, white, echoes, cubic)
 
 
 def _power(
@@ -567,50 +599,53 @@ def _power(
     white: float = 0.0,
     echoes: Sequence[tuple[float, float]] = (),
     cubic: float = 0.0,
-    order: int = _ORDER,
+    order: int = _CUBIC_ORDER,
 ) -> Verdict:
-    """ISLR that time series at a limit add to an image, against what an owner may add to it.
+    """Verdict on the ISLR that time series at a limit add to an image, against the ISLR that an owner may add.
 
-    Beside the errors of sensors and clocks there may be white noise, tones, each with its cycles per aperture, and a
-    cubic phase; of each the rms over the aperture [rad]. Phases up to an order are taken out of the time series.
+    `members` are errors of sensors and clocks. `white` noise, `echoes` (tones with their cycles per aperture) and a
+    `cubic` phase are added, each by its RMS over the aperture [rad]. Phases up to `order` are taken out of the time
+    series.
     """
     mission, collection = study.mission, study.collection
     rng = _stream(study, blank.id)
-    # Each moment stands for a step: what is faster is noise from step to step.
-    times = cell_centres(collection.aperture_time, _MOMENTS)
-    place = 2 * times / collection.aperture_time
-    legendre = np.polynomial.legendre.legvander(place, _ORDER)
+    # Each moment represents a step; faster phases are noise between steps.
+    times = cell_centres(collection.aperture_time, _ISLR_SAMPLES)
+    scaled_time = 2 * times / collection.aperture_time
+    legendre = np.polynomial.legendre.legvander(scaled_time, _CUBIC_ORDER)
     fitted = legendre[:, : order + 1] @ np.linalg.pinv(legendre[:, : order + 1])
 
-    def left(draws: int) -> Floats:
-        """Phases without what moves and defocuses the response."""
+    def draw_phases(draws: int) -> Floats:
+        """Draw phases without the orders that move and defocus the response."""
         phases = white * rng.standard_normal((draws, times.size))
         for error in members:
             if error.subject.kind in MOVING:
-                for name, moved in position_courses(mission, error, times, draws, rng).items():
-                    phases += 2 * math.pi / collection.wavelength * moved @ np.array(sight_of(mission, name))
+                for name, courses in position_courses(mission, error, times, draws, rng).items():
+                    phases += 2 * math.pi / collection.wavelength * courses @ np.array(sight_of(mission, name))
             elif error.subject.kind == "propagation":
                 group = delay_courses(mission, error, times, draws, rng)
-                phases += 2 * math.pi / collection.wavelength * _left_at_the_point(study, error, times, group)
+                phases += 2 * math.pi / collection.wavelength * _remaining_range_error(study, error, times, group)
             else:
                 phases += phase_courses(mission, error, times, draws, rng)
         phases = phases - phases @ fitted
         for rms, cycles in echoes:
-            turned = 2 * math.pi * rng.random((draws, 1))
-            phases += math.sqrt(2) * rms * np.cos(math.pi * cycles * place + turned)
+            starts = 2 * math.pi * rng.random((draws, 1))
+            phases += math.sqrt(2) * rms * np.cos(math.pi * cycles * scaled_time + starts)
         if cubic:  # of P₃, whose mean square over the aperture is a seventh
             phases += math.sqrt(7) * cubic * rng.standard_normal((draws, 1)) * legendre[:, 3]
         return phases
 
-    allowed = spread_limit(mission, study.allocation, owner, "full") or 0.0  # what an image may show
+    allowed = spread_limit(mission, study.allocation, owner, "full") or 0.0  # ISLR that an image may show
     required = float(islr_of(mission, allowed**2)) if allowed else 0.0
-    return measured_power(collection, blank._replace(requirement_db=required), left, reasons.power_of_time_series())
+    return measured_power(
+        collection, blank._replace(requirement_db=required), draw_phases, reasons.power_of_time_series()
+    )
 
 
 # ---------------------------------------------------------------------- ISLR that noise adds
 @dataclass(frozen=True, slots=True)
 class AddedIslr:
-    """ISLR that noise adds, the ends of its interval at 95 %, and of how many draws it is the mean. [dB]"""
+    """ISLR that noise adds, the ends of its interval at 95 % [dB], and the number of draws of the mean."""
 
     level: float
     low: float
@@ -620,15 +655,15 @@ class AddedIslr:
     @property
     def error(self) -> float:
         """Standard error. [dB]"""
-        return (self.high - self.low) / (2 * _NORMAL_95)
+        return (self.high - self.low) / (2 * _INTERVAL_95_SIGMA)
 
     def verdict(self, required_db: float) -> str:
-        """Verdict on a limit that was to add an ISLR; `not_evaluated` where the mean may have another one.
+        """Verdict on a limit with a required ISLR; `not_evaluated` if more draws may change the verdict.
 
-        After all draws, on the border of what is confirmed and what is conservative, it is `conservative`: no limit
-        there adds too much.
+        On the border of confirmed and conservative, the verdict after all draws is `conservative`: such a limit does
+        not add too much.
         """
-        excess, doubt = self.level - required_db, _SURE * self.error
+        excess, doubt = self.level - required_db, _DECISION_SIGMA * self.error
         low, high = excess - doubt, excess + doubt
         if low > TOLERANCE_DB:
             return "optimistic"
@@ -636,7 +671,7 @@ class AddedIslr:
             return "conservative"
         if low >= -TOLERANCE_DB and high <= TOLERANCE_DB:
             return "confirmed"
-        return "conservative" if self.draws >= _MOST and high < 0 else "not_evaluated"
+        return "conservative" if self.draws >= _MAX_ISLR_DRAWS and high < 0 else "not_evaluated"
 
 
 class Mainlobe:
@@ -649,51 +684,51 @@ class Mainlobe:
     """
 
     def __init__(self, weights: Floats) -> None:
-        place = cell_centres(1.0, weights.size)
-        response = np.abs(np.fft.rfft(weights, weights.size * _STEPS))
-        null = int(np.argmax(np.diff(response) > 0)) / _STEPS
-        nodes, self._steps = np.polynomial.legendre.leggauss(_NODES)
-        waves = np.exp(-2j * math.pi * np.outer(place, null * nodes))
+        positions = cell_centres(1.0, weights.size)
+        response = np.abs(np.fft.rfft(weights, weights.size * _STEPS_PER_CELL))
+        null = int(np.argmax(np.diff(response) > 0)) / _STEPS_PER_CELL
+        nodes, self._steps = np.polynomial.legendre.leggauss(_MAINLOBE_NODES)
+        waves = np.exp(-2j * math.pi * np.outer(positions, null * nodes))
         self._waves = waves * weights[:, None] / weights.size
         self._clean = self._waves.sum(axis=0).real
         self._steps = self._steps * null / np.mean(weights**2)
         self.energy = float(self._clean**2 @ self._steps)
 
     def lost(self, phases: Floats) -> Floats:
-        """Energy that phases (draws, moments) take out of it, over all energy of an image, (draws,)."""
+        """Energy that phases (draws, moments) take from the mainlobe, over the energy of the image, (draws,)."""
         # exp(jφ) - 1 without rounding: a limit of -100 dB is an energy of 1e-10.
         change = (-2 * np.sin(phases / 2) ** 2 + 1j * np.sin(phases)) @ self._waves
-        found: Floats = -(2 * self._clean * change.real + np.abs(change) ** 2) @ self._steps
-        return found
+        energy_loss: Floats = -(2 * self._clean * change.real + np.abs(change) ** 2) @ self._steps
+        return energy_loss
 
     def added_db(self, lost: float) -> float:
-        """ISLR that goes with a mean energy lost. [dB]"""
-        left = max(self.energy - lost, _TINY)
-        return 10 * math.log10(max(lost, _TINY) / (self.energy * left))
+        """ISLR of a mean energy lost from the mainlobe. [dB]"""
+        remaining_energy = max(self.energy - lost, _MIN_ENERGY_FRACTION)
+        return 10 * math.log10(max(lost, _MIN_ENERGY_FRACTION) / (self.energy * remaining_energy))
 
 
 def added_islr(weights: Floats, draw: Callable[[int], Floats], required_db: float) -> AddedIslr:
-    """Draw phases until their interval has one verdict against what is required, or there are too many.
+    """Draw phases until their interval allows only one verdict on the required ISLR, or up to the limit of draws.
 
     Parameters
     ----------
     weights : (moments,) ndarray
         Window over the aperture.
     draw : callable
-        Gives so many phases, (draws, moments). [rad]
+        Takes a number of draws and returns phases, (draws, moments). [rad]
     required_db : float
         ISLR that may be added.
     """
     mainlobe = Mainlobe(weights)
     lost: Floats = np.empty(0)
     while True:
-        count = min(_AT_MOST, max(_FIRST, lost.size))
+        count = min(_BLOCK_ISLR_DRAWS, max(_FIRST_ISLR_DRAWS, lost.size))
         lost = np.concatenate((lost, mainlobe.lost(draw(count))))
-        if lost.size < _FIRST or lost.size & (lost.size - 1):  # each look is at twice as many as the one before
+        if lost.size < _FIRST_ISLR_DRAWS or lost.size & (lost.size - 1):  # evaluate only after each doubling
             continue
         mean, error = float(lost.mean()), float(lost.std(ddof=1)) / math.sqrt(lost.size)
-        level, low, high = (mainlobe.added_db(mean + sign * _NORMAL_95 * error) for sign in (0, -1, 1))
-        found = AddedIslr(level, low, high, lost.size)
-        is_known = found.high - found.low <= 2 * _KNOWN_DB
-        if lost.size >= _MOST or (is_known and found.verdict(required_db) != "not_evaluated"):
-            return found
+        level, low, high = (mainlobe.added_db(mean + sign * _INTERVAL_95_SIGMA * error) for sign in (0, -1, 1))
+        added = AddedIslr(level, low, high, lost.size)
+        is_narrow = added.high - added.low <= 2 * _MAX_HALF_INTERVAL_DB
+        if lost.size >= _MAX_ISLR_DRAWS or (is_narrow and added.verdict(required_db) != "not_evaluated"):
+            return added

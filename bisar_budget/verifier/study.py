@@ -1,4 +1,4 @@
-"""One mission as `verify` looks at it: its errors put into images, at a limit or at any size."""
+"""One mission as `verify` examines it: images of its errors, at a limit or at any size."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -35,21 +35,21 @@ from bisar_budget.verifier.aperture_reading import (
     refocused,
 )
 
-Sizes = Sequence[tuple[ErrorSource, float]]  # errors and how large each is, signed
-_SHARED_RAD = 0.5  # of phase by which lines on which one phase is estimated may differ
-_SCALED, _SCALINGS = 1e-4, 40  # of a budget; steps at most
-_HIDDEN = 0.1  # of the equal-loss phase: less than that is hidden, and a phase is measured better than a loss
-_ONE_PEAK = math.log(2)  # variance of a phase that takes half the peak's power [rad²]
-_SUMMED = 256  # pulses, and frequencies, of a direct sum
-_ROUND_CELLS = 6  # around the middle line, that tell moments apart which look alike along it
-_SLOWEST = 0.02  # of the fastest turn of Doppler: slower, a part of the aperture is not followed
+Sizes = Sequence[tuple[ErrorSource, float]]  # errors and their signed sizes
+_MAX_DIFFERENCE_RAD = 0.5  # of the phase between lines on which one phase is estimated
+_SCALING_FRACTION, _MAX_SCALING_STEPS = 1e-4, 40  # of a budget, to which errors are scaled
+_HIDDEN_FRACTION = 0.1  # of the equal-loss phase; if less is hidden, the phase is measured better than a loss
+_SINGLE_PEAK_RAD2 = math.log(2)  # variance of a phase that takes half the peak's power
+_DIRECT_SUM_SAMPLES = 256  # pulses, and frequencies, of a direct sum
+_ROUND_CELLS = 6  # around the middle line; they distinguish moments that look alike along the line
+_MIN_DOPPLER_RATE_FRACTION = 0.02  # of the highest rate of Doppler; slower parts of the aperture are not followed
 
 
 class Spread(NamedTuple):
     """Resolution cells over which a response is smeared along its line, and over which it walks in range.
 
-    Where Doppler turns back (`is_round`) it spreads all ways, and both are the same. A range cell has `finer` times
-    as many pixels as one across.
+    Where Doppler turns back (`is_round`), it spreads in all directions, and both numbers are equal. A range cell has
+    `finer` times as many pixels as a cross-range cell.
     """
 
     smear: int
@@ -59,7 +59,7 @@ class Spread(NamedTuple):
 
 
 class Responses(NamedTuple):
-    """Images of a point with errors, around the place they move it to, and of one without error at that place."""
+    """Image of a point with errors, around its displaced position, and of a point without error at that position."""
 
     errors: Errors
     effect: ExactEffect
@@ -69,7 +69,7 @@ class Responses(NamedTuple):
 
 
 class Study:
-    """One mission with what its rows share."""
+    """One mission, with the analysis and the collection that its rows share."""
 
     def __init__(self, mission: Mission, analysis: Analysis | None = None) -> None:
         self.mission, self.analysis = mission, analysis or Analysis(mission)
@@ -78,18 +78,18 @@ class Study:
         self.allocation = self.analysis.allocation
         self.collection = PointCollection(mission, self.geometry)
 
-    def blank(self, row_id: str, limit: float, unit: str, **known: Any) -> Verdict:
+    def blank(self, row_id: str, limit: float, unit: str, **fields: Any) -> Verdict:
         """Verdict on a limit of the gating model before its image is formed."""
-        return Verdict(id=row_id, model=self.model, boundary_error=limit, unit=unit, **known)
+        return Verdict(id=row_id, model=self.model, boundary_error=limit, unit=unit, **fields)
 
     @property
     def is_full(self) -> bool:
-        """Whether exact ranges say where the image goes and what its cubic phase is; else Table I and (25)."""
+        """Whether displacement and cubic phase are by exact ranges; else they are by Table I and (25)."""
         return self.model != "published"
 
     @property
     def models(self) -> tuple[Model, ...]:
-        """Models that gate: under `strictest` both."""
+        """Models that gate; under `strictest` both."""
         return tuple(getattr(self.analysis, name) for name in self.analysis.gates)
 
     @property
@@ -103,7 +103,7 @@ class Study:
 
     @cached_property
     def unfocused_models(self) -> tuple[Model, ...]:
-        """Models that gate, of the mission without autofocus: the phases that they judge have no gain in them."""
+        """Models that gate, of the mission without autofocus: their phases do not include its gain."""
         if self.allocation.autofocus_gain == 1:
             return self.models
         unfocused = self.mission._replace(autofocus=self.mission.autofocus._replace(n_pull=None))
@@ -111,38 +111,38 @@ class Study:
         return tuple(getattr(analysis, name) for name in analysis.gates)
 
     def boundary(self, source: ErrorSource, limit: float, *, is_focused: bool = False) -> float | None:
-        """Smallest size at which a gating model has an error reach a quadratic phase [rad]; None without one.
+        """Smallest size at which an error reaches a quadratic phase [rad] by a gating model; None if it never does.
 
-        With autofocus the limit has its gain in it.
+        If `is_focused`, the limit includes the gain of autofocus.
         """
         models = self.models if is_focused else self.unfocused_models
         sizes = (model.allowable(source, QUADRATIC, limit) for model in models)
         return min((size for size in sizes if size is not None), default=None)
 
     def allowed(self, source: ErrorSource) -> tuple[float | None, str | None]:
-        """Allowable of an error's row by all requirements, autofocus included, and which one binds."""
+        """Allowable of an error's row by all requirements, autofocus included, and the requirement that binds."""
         limit = self.allocation.qpe_allowed(source.owner)
         needs = self.mission.requirements
         limits = (limit, needs.cubic_phase_error, needs.location_error)
-        found = [model.allowed(source, limits) for model in self.models]
-        return min(found, key=lambda one: math.inf if one[0] is None else one[0])
+        allowables = [model.allowed(source, limits) for model in self.models]
+        return min(allowables, key=lambda allowable: math.inf if allowable[0] is None else allowable[0])
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
-        """Return one error of a given size and nothing else."""
+        """Return the errors of an image with one error of a size."""
         if source.clock is not None:
             return Errors(clock=tuple(size * term for term in source.clock))
-        kind, found = source.subject.kind, Errors()
+        kind, errors = source.subject.kind, Errors()
         if kind == "terrain":  # a higher scene: both platforms measured too high
             kind = "position"
-        for place in source.platforms:
-            stated: Any = size
+        for platform_index in source.platforms:
+            components: Any = size
             if not source.is_time_tag:
-                stated = tuple(size * component for component in source.direction_of(place))
-            found = found.of(PLATFORMS[place], PathError(**{kind: stated}))
-        return found
+                components = tuple(size * component for component in source.direction_of(platform_index))
+            errors = errors.of(PLATFORMS[platform_index], PathError(**{kind: components}))
+        return errors
 
     def together(self, sizes: Sizes, scale: float = 1.0) -> Errors:
-        """Several errors at once, each `scale` times its size."""
+        """Sum of several errors, each `scale` times its size."""
         return superposed(self.errors(source, scale * size) for source, size in sizes)
 
     def effect(self, sizes: Sizes, scale: float = 1.0) -> ExactEffect:
@@ -150,40 +150,40 @@ class Study:
         return self.collection.effect(self.together(sizes, scale))
 
     def exact_effects(self, courses: Mapping[str, Floats]) -> ImagePoints:
-        """Effects of many histories: of position errors of platforms, (draws, nodes, 3), or of the clock's. [m]
+        """Effects of many error histories: of platforms, (draws, nodes, 3), or of the clock, (draws, nodes). [m]
 
-        They are by the name of what has them. That of the clock is a range error, (draws, nodes). The nodes are those
-        of `aperture_nodes`.
+        Histories are by the name of the platform, or "clock", whose history is a range error. The nodes are
+        `aperture_nodes`.
         """
         exact = exact_ranges(self.mission, self.geometry, FINE_NODE_COUNT)
-        moved = {name: np.ascontiguousarray(one.T) for name, one in courses.items()}
-        shifts = [moved.get(name, STILL) for name in PLATFORMS]
+        courses_by_draw = {name: np.ascontiguousarray(course.T) for name, course in courses.items()}
+        shifts = [courses_by_draw.get(name, STILL) for name in PLATFORMS]
         draws = len(next(iter(courses.values())))
-        clock = moved.get("clock", np.zeros((FINE_NODE_COUNT, draws)))
+        clock = courses_by_draw.get("clock", np.zeros((FINE_NODE_COUNT, draws)))
         return followed(exact, clock, shifts, np.zeros(draws, dtype=int))
 
     def worse_sign(self, sizes: Sizes) -> float:
-        """The sign whose quadratic phase of equal loss is larger, 1 or -1: a limit has two signs.
+        """The sign of the errors with the larger quadratic phase of equal loss, 1 or -1.
 
         Raises
         ------
         ValueError
-            With neither sign any ground point has the range history.
+            No ground point has the range history with either sign.
         """
         phases = {}
         for sign in (1.0, -1.0):
             try:
                 phases[sign] = self.effect(sizes, sign).equal_loss
             except ValueError as error:
-                none = error
+                last_error = error
         if not phases:
-            raise none
+            raise last_error
         return max(phases, key=lambda sign: phases[sign])
 
     def summed(self, members: Sequence[ErrorSource], budget: float) -> list[tuple[ErrorSource, float]]:
-        """Declared errors scaled until their phases by the gating model, of the worse sign each, sum to a budget.
+        """Declared errors scaled until their phases by the gating model, each of its worse sign, sum to a budget.
 
-        Signs are those that make the phases add; empty where there is no phase.
+        The signs make the phases add. Empty if there is no phase.
         """
         model = self.models[-1]
 
@@ -194,10 +194,10 @@ class Study:
         if not total:
             return []
         scale = 1.0
-        for _ in range(_SCALINGS):
+        for _ in range(_MAX_SCALING_STEPS):
             if not math.isfinite(total):
                 scale /= 2
-            elif abs(total / budget - 1) < _SCALED:
+            elif abs(total / budget - 1) < _SCALING_FRACTION:
                 break
             else:
                 scale *= min(4.0, max(0.25, budget / total))
@@ -209,20 +209,20 @@ class Study:
         ]
 
     def _worst(self, model: Model, source: ErrorSource, size: float) -> float:
-        """Quadratic phase of equal loss, of the worse sign of an error, signed like that of a small one. [rad]"""
-        found = model.does(source, size)
-        return math.copysign(found.equal_loss, found.qpe) if math.isfinite(found.qpe) else math.inf
+        """Quadratic phase of equal loss of an error of its worse sign, with the sign of a small error's. [rad]"""
+        effect = model.does(source, size)
+        return math.copysign(effect.equal_loss, effect.qpe) if math.isfinite(effect.qpe) else math.inf
 
-    def at_limit(self, of: Subject, limit: float, room: float = 1.0) -> Responses:
-        """Images at a limit of a row of quadratic phase, as its verdict reads them."""
-        source = next((s for s in self.sources if s.subject == of), None)
-        sizes = [(source, limit)] if source is not None else self.summed(self.members(of.owner), limit)
+    def at_limit(self, subject: Subject, limit: float, room: float = 1.0) -> Responses:
+        """Images at a limit of a row of quadratic phase, as read for its verdict."""
+        source = next((s for s in self.sources if s.subject == subject), None)
+        sizes = [(source, limit)] if source is not None else self.summed(self.members(subject.owner), limit)
         return self.images(self.together(sizes, self.worse_sign(sizes)), room=room)
 
     def images(self, errors: Errors, range_cells: int = RANGE_CELLS, room: float = 1.0) -> Responses:
         """Images of errors, large enough for the smear.
 
-        `room` is how often the smear must fit: autofocus gives out in less than it needs.
+        `room` is the least width of the patch over the smear: in a narrower patch autofocus fails.
 
         Raises
         ------
@@ -251,46 +251,48 @@ class Study:
         )
 
     def equal_loss(self, images: Responses, reading: ApertureReading) -> float:
-        """Quadratic phase of as much loss of the peak as an image shows, its cubic phase and rest aside. [rad]
+        """Quadratic phase with the loss of the peak that an image shows, without its cubic phase and rest. [rad]
 
-        Where little is hidden the phase over the aperture says it best, else the loss of the peak does. That is
-        compared with what a direct sum by exact ranges loses under the same window, for a loss is the variance of
-        the phase to second order only, and of another one under each window. Beyond some 3 dB an image has no one
-        peak: then what exact ranges say is hidden is added to the measured phase.
+        If little is hidden, the phase over the aperture is the best measure, else the loss of the peak is. The loss
+        is compared with the loss of a direct sum by exact ranges under the same window, because a loss is the
+        variance of the phase only to second order, and depends on the window. Beyond some 3 dB an image has no single
+        peak: then the hidden phase by exact ranges is added to the measured phase.
         """
         effect = images.effect
-        variance, others = _phase_variances(effect)
-        if effect.hidden <= _HIDDEN * effect.equal_loss or variance + others > _ONE_PEAK:
+        variance, other_variance = _phase_variances(effect)
+        if effect.hidden <= _HIDDEN_FRACTION * effect.equal_loss or variance + other_variance > _SINGLE_PEAK_RAD2:
             return math.hypot(reading.quadratic, effect.hidden)
-        with_error, without = (highest(one.image) for one in (images.chip, images.reference))
+        with_error, without = (highest(chip.image) for chip in (images.chip, images.reference))
         loss = 2 * math.log(without / with_error)
-        measured = loss * (variance + others) / self._expected_loss(images) - others
+        measured = loss * (variance + other_variance) / self._expected_loss(images) - other_variance
         return QUADRATIC_OF_VARIANCE * math.sqrt(max(measured, 0.0))
 
     def shift(self, images: Responses, reading: ApertureReading) -> Shift:
-        """Displacement of a response from where exact ranges put it, and the line of its smear.
+        """Displacement of a response from its position by exact ranges, and the line of its smear.
 
-        It is where the image peaks, up to some 3 dB of loss, and always where Doppler turns back: there no slope over
-        the aperture says where a response lies along a line.
+        The response lies at the peak of the image up to some 3 dB of loss, and always if Doppler turns back: then no
+        slope over the aperture locates a response along a line.
         """
-        variance, others = _phase_variances(images.effect)
-        has_line = variance + others > _ONE_PEAK and not images.spread.is_round
+        variance, other_variance = _phase_variances(images.effect)
+        has_line = variance + other_variance > _SINGLE_PEAK_RAD2 and not images.spread.is_round
         return measured_shift(images.chip, images.reference, reading if has_line else None)
 
     def _expected_loss(self, images: Responses) -> float:
-        """Minus the logarithm of the peak's power by exact ranges, under the window: a direct sum over the pulses."""
+        """Minus the logarithm of the peak's power under the window, by a direct sum of exact ranges over pulses."""
         collection = self.collection
-        times = cell_centres(collection.aperture_time, _SUMMED)
-        left = collection.flight(images.errors.slow(), times).range_error((0.0, 0.0), images.effect.displacement)
-        frequency = collection.radar.center_frequency + cell_centres(collection.radar.bandwidth, _SUMMED)
-        weights = collection.window(_SUMMED)
-        phases = np.exp(2j * math.pi / SPEED_OF_LIGHT * np.outer(left, frequency))
+        times = cell_centres(collection.aperture_time, _DIRECT_SUM_SAMPLES)
+        remaining_range = collection.flight(images.errors.slow(), times).range_error(
+            (0.0, 0.0), images.effect.displacement
+        )
+        frequency = collection.radar.center_frequency + cell_centres(collection.radar.bandwidth, _DIRECT_SUM_SAMPLES)
+        weights = collection.window(_DIRECT_SUM_SAMPLES)
+        phases = np.exp(2j * math.pi / SPEED_OF_LIGHT * np.outer(remaining_range, frequency))
         return -2 * math.log(abs(weights @ phases @ weights) / weights.sum() ** 2)
 
     def focused(self, images: Responses) -> Responses:
-        """Refocus a response by the mission's algorithm, its phase estimated on lines that share it.
+        """Refocus a response by the mission's algorithm, with the phase estimated on lines that share it.
 
-        Where range cells are long, lines beside the response show it with a quadratic phase of their own.
+        Where range cells are long, lines beside the response show it with a different quadratic phase.
         """
         algorithm = ALGORITHMS[self.mission.autofocus.algorithm]
         lines = images.chip.image.shape[0]
@@ -299,46 +301,51 @@ class Study:
         return images._replace(chip=refocused(self.collection, images.errors, centre, images.chip, algorithm, half))
 
     def shared_lines(self, spread: Spread) -> int:
-        """Lines on either side of the middle one that share its quadratic phase, or that the response walks over."""
+        """Number of lines on either side of the middle that share its quadratic phase or hold the response."""
         exact = self.analysis.exact
         (a, c, east, _), (b, d, north, _) = (gradient[:, 0] for gradient in exact.gradient)
         # A metre of range along equal Doppler leads by (d, −c) over the determinant.
         area, bends = abs(a * d - b * c), abs(float(exact.k[0]) * (d * east - c * north))
         per_line = bends * self.collection.range_cell / (OVERSAMPLING * spread.finer)
-        shared = int(min(_SHARED_RAD * area / per_line if per_line else 1e6, 1e6))
+        shared = int(min(_MAX_DIFFERENCE_RAD * area / per_line if per_line else 1e6, 1e6))
         return max(shared, round(spread.walk * OVERSAMPLING * spread.finer / 2))
 
     def spread(self, errors: Errors, effect: ExactEffect) -> Spread:
-        """Where an error puts the parts of a response, by the range error that it leaves over the aperture.
+        """Spread of a response by an error, from the range error that remains over the aperture.
 
-        A part lies along the line of equal range where the Doppler that is left is that of the place. Where Doppler
-        turns slowly, in part of a long aperture or with nearly parallel gradients, a small slope is a long way.
+        A part of the aperture puts the response at the point of the line of equal range that has the remaining
+        Doppler. Where Doppler changes slowly, in part of a long aperture or with nearly parallel gradients, a small
+        slope is a long distance.
         """
         half = self.collection.aperture_time / 2
         time = np.linspace(-half, half, 257)
         point = np.array([*effect.displacement, 0.0])
         flight = self.collection.flight(errors.smooth(), time)
-        left = flight.range_error((0.0, 0.0), effect.displacement)
-        slopes = -look_sum(*(one.measured - point for one in flight.paths))[:, :2]
+        remaining_range = flight.range_error((0.0, 0.0), effect.displacement)
+        slopes = -look_sum(*(path.measured - point for path in flight.paths))[:, :2]
         lines = self.collection.range_lines(errors)
         cells = lines.cells(effect.displacement, self.mission.radar)
-        if lines.turns_back:  # each moment sees the point at a place of its own, along the turn of the line of sight
+        if lines.turns_back:  # each moment displaces the point along the turn of the line of sight
             turn = np.hypot(*np.gradient(slopes, time, axis=0).T)
-            reach = 2 * math.ceil(min(float(np.abs(np.gradient(left, time) / turn).max()) / min(cells), 1e6))
+            reach = 2 * math.ceil(
+                min(float(np.abs(np.gradient(remaining_range, time) / turn).max()) / min(cells), 1e6)
+            )
             return Spread(reach, reach, is_round=True)
         by_range = slopes[time.size // 2]
         doppler = slopes @ (np.array([by_range[1], -by_range[0]]) / np.hypot(*by_range))
         rate = np.gradient(doppler, time)
-        least = _SLOWEST * np.abs(rate).max()
-        places = np.gradient(left, time) / np.where(np.abs(rate) < least, np.copysign(least, rate), rate)
-        walk = left - places * (doppler - doppler[time.size // 2])
+        min_rate = _MIN_DOPPLER_RATE_FRACTION * np.abs(rate).max()
+        positions = np.gradient(remaining_range, time) / np.where(
+            np.abs(rate) < min_rate, np.copysign(min_rate, rate), rate
+        )
+        walk = remaining_range - positions * (doppler - doppler[time.size // 2])
         return Spread(
-            2 * math.ceil(min(float(np.abs(places).max()) / cells[1], 1e6)),
+            2 * math.ceil(min(float(np.abs(positions).max()) / cells[1], 1e6)),
             2 * math.ceil(min(float(np.abs(walk).max()) / self.collection.range_cell - 0.25, 64)),
             finer=cells[0] / lines.sampled(effect.displacement, self.mission.radar)[0],
         )
 
 
 def _phase_variances(effect: ExactEffect) -> tuple[float, float]:
-    """Variance of a quadratic phase of equal loss, and that of the cubic phase and the rest. [rad²]"""
+    """Variance of the quadratic phase of equal loss, and variance of the cubic phase and the rest. [rad²]"""
     return (effect.equal_loss / QUADRATIC_OF_VARIANCE) ** 2, 4 / 175 * effect.cubic**2 + effect.rest**2

@@ -276,7 +276,7 @@ def few_of_them(patch: pytest.MonkeyPatch) -> None:
     """
     patch.setattr(point_module, "_MIN_PULSES", 64)
     patch.setattr(point_module, "_SCENE_PIXELS", 96 * 96)
-    patch.setattr(image_formation, "_BLOCK", image_formation._BLOCK // 16)
+    patch.setattr(image_formation, "_BLOCK_TERMS_COUNT", image_formation._BLOCK_TERMS_COUNT // 16)
     patch.setattr(former, "_DIRECT_BYTES", former._DIRECT_BYTES / 16)
 
 

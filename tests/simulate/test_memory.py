@@ -110,7 +110,7 @@ class TestFarField:
     def test_points_too_far_apart_are_summed_as_printed(self, history, monkeypatch) -> None:
         pytest.importorskip("finufft")
         points = far_apart(1e6)
-        monkeypatch.setattr(far_field, "_LARGEST_GRID", 1)
+        monkeypatch.setattr(far_field, "_MAX_GRID_SAMPLES", 1)
         assert np.array_equal(far_field_filter(history, points), far_field_filter(history, points, "direct"))
 
 
@@ -184,7 +184,7 @@ class TestTime:
 
     def test_a_long_one_grows_with_its_rows(self, monkeypatch) -> None:
         """Measured are images of two sizes; the rest is counted."""
-        monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST_IMAGE_S", 1e3)
         monkeypatch.setattr("bisar_budget.verifier.limits._seconds", lambda study, cells: 10.0)
         mission = load_mission(str(SECTION_V))
         rows = rows_to_verify(mission)
@@ -195,7 +195,7 @@ class TestTime:
 
     def test_a_larger_image_takes_what_a_larger_one_took(self, monkeypatch) -> None:
         """A small image takes more for its size than a large one: 97 s were foreseen as 216 s."""
-        monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST_IMAGE_S", 1e3)
         mission, seconds = load_mission(str(SECTION_V)), {}
         for large in (10.0, 320.0):
             took = {48: 10.0, 8 * 48: large}
@@ -204,13 +204,13 @@ class TestTime:
         assert seconds[10.0] < seconds[320.0]
 
     def test_the_smallest_pair_is_measured(self, monkeypatch) -> None:
-        monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST_IMAGE_S", 1e3)
         assert 0 < seconds_to_verify(load_mission(str(SECTION_V)), "timing.quadratic") < 60
 
     @pytest.mark.parametrize("command", ["verify", "simulate"])
     def test_the_command_says_so_and_what_to_change(self, run, monkeypatch, command) -> None:
         monkeypatch.setattr("bisar_budget.front.progress.LONG", 1e-9)
-        monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST_IMAGE_S", 1e3)
         result = run(command, SECTION_V, *(["--only", "timing.quadratic"] if command == "verify" else []))
         (line,) = [line for line in result.stderr.splitlines() if line.startswith("Forming the images of ")]
         assert re.search(r"will take about [\d.]+ (s|minutes); ", line)
