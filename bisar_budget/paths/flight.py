@@ -555,7 +555,7 @@ def slow_times(
     aperture_time_s : float
         Length of the aperture. [s]
     name : str
-        What messages call the file.
+        The file in messages.
 
     Returns
     -------

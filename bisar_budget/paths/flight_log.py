@@ -1,16 +1,16 @@
-"""Logs of flights as CSV: a header that names quantity and unit of each column, then a place in each line.
+"""Logs of flights as CSV: a header that names quantity and unit of each column, then a fix in each line.
 
     # comment
     time [s], latitude [deg], longitude [deg], height [m]
     0.00, 48.086600, 11.279700, 3000.0
 
-Time is `time [s]`, counted from anywhere, or stamps of ISO 8601: `utc` with a Z at the end, `gpst` or `tai` without.
-`time [UTC]` is the same as `utc`, and a `time` without a unit is in the scale that the mission file says. Places are
-`latitude`, `longitude` and `height` above the ellipsoid of WGS-84 or `altitude` above mean sea level, or Earth-fixed
-`x`, `y`, `z`, or `east`, `north`, `up` of the scene's centre. `geoid_separation` makes a height of an altitude.
-`sigma_east`, `sigma_north`, `sigma_up`, or what other programs call them, are one-sigma errors of a place; a cell of
-them without a number above 0 says nothing. Other columns are not read. Cells are parted by commas, semicolons or
-tabs. Exporters have headers of their own, see below.
+Time is `time [s]`, counted from any start, or stamps of ISO 8601: `utc` with a Z at the end, `gpst` or `tai` without.
+`time [UTC]` is the same as `utc`, and a `time` without a unit is in the scale of the mission file. The coordinates of
+a fix are `latitude`, `longitude` and `height` above the ellipsoid of WGS-84 or `altitude` above mean sea level, or
+Earth-fixed `x`, `y`, `z`, or `east`, `north`, `up` of the scene's centre. `geoid_separation` turns an altitude into a
+height. `sigma_east`, `sigma_north`, `sigma_up` are one-sigma errors of a fix. Their names in other programs are
+accepted too. A cell of such a column without a number above 0 is an unknown error. All further columns are ignored.
+Cells are separated by commas, semicolons or tabs. Exporters have their own headers, see below.
 """
 
 import csv
@@ -30,7 +30,7 @@ from bisar_budget.paths.earth import Floats, Geodetic, axes_at, earth_fixed_plac
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, GPS_EPOCH, SCALES, WEEK, Instant, parse_instant
 from bisar_budget.paths.log_places import (
-    NOTHING_SAID,
+    NO_KEYS,
     LogKeys,
     LogRecords,
     counted,
@@ -47,23 +47,25 @@ from bisar_budget.paths.log_places import (
     usable_log,
 )
 
-LARGEST = 200_000_000  # bytes; four hours at 200 Hz
-_CHUNK = 1 << 16  # lines that are text and numbers at once
-_FARTHEST_M = 1e9  # of a place; beyond the Moon
-_LATEST_S = 1e11  # of a time; 3000 years, so that Unix time is one
-_DEEPEST_M = 6.2e6  # m from the Earth's centre; the poles are at 6.357e6
-_RIGHT_ANGLE = math.pi / 2 * (1 + 1e-12)  # 90 deg, rounded
+MAX_CSV_BYTES = 200_000_000  # bytes; four hours at 200 Hz
+_CHUNK_LINES = 1 << 16  # lines that are in memory as text and as numbers at the same time
+_MAX_COORDINATE_M = 1e9  # beyond the Moon
+_MAX_TIME_S = 1e11  # 3000 years, so that Unix time is accepted
+_MIN_RADIUS_M = 6.2e6  # from the Earth's centre; the poles are at 6.357e6
+_MAX_GEOID_SEPARATION_M = 200.0
+_MAX_LATITUDE_RAD = math.pi / 2 * (1 + 1e-12)  # 90 deg, rounded
 _GEODETIC = ("latitude", "longitude", "height")
-_KINDS = (_GEODETIC, ("x", "y", "z"), ("east", "north", "up"))
-_STAMPS = {"utc": "utc", "gpst": "gps", "gps": "gps", "tai": "tai"}  # names of columns, or units of a time
-_SPARE = ("altitude", "geoid_separation")
-_LEVEL = ("horizontal_accuracy", "vertical_accuracy")
-_SIGMAS = tuple(tuple(f"sigma_{axis}" for axis in kind) for kind in (_KINDS[2], _KINDS[1]))
-_ACCURACY = (*_LEVEL, *_SIGMAS[0], *_SIGMAS[1])
-# Names of such columns: `sde` of RTKLIB, `std_lat`, `height_sigma`; `hAcc` of u-blox, `eph` of PX4.
-_SIGMA = r"(?:sigma|σ|sd|std|stdev|stddev|std_dev|accuracy)"
-_ALONG = r"(east|north|up|e|n|u|longitude|latitude|height|altitude|lon|lat|alt|x|y|z)"
-_SIGMA_NAME = re.compile(f"{_SIGMA}_?{_ALONG}|{_ALONG}_{_SIGMA}").fullmatch
+_EARTH_FIXED, _LOCAL = ("x", "y", "z"), ("east", "north", "up")
+_COORDINATES = (_GEODETIC, _EARTH_FIXED, _LOCAL)
+_SCALE_OF_STAMP = {"utc": "utc", "gpst": "gps", "gps": "gps", "tai": "tai"}  # names of columns, or units of a time
+_HEIGHT_COLUMNS = ("altitude", "geoid_separation")
+_LEVEL_ACCURACIES = ("horizontal_accuracy", "vertical_accuracy")
+_SIGMA_COLUMNS = tuple(tuple(f"sigma_{axis}" for axis in kind) for kind in (_LOCAL, _EARTH_FIXED))
+_ACCURACY_COLUMNS = (*_LEVEL_ACCURACIES, *_SIGMA_COLUMNS[0], *_SIGMA_COLUMNS[1])
+# Names of columns of accuracy: `sde` of RTKLIB, `std_lat`, `height_sigma`; `hAcc` of u-blox, `eph` of PX4.
+_SIGMA_WORD = r"(?:sigma|σ|sd|std|stdev|stddev|std_dev|accuracy)"
+_AXIS_WORD = r"(east|north|up|e|n|u|longitude|latitude|height|altitude|lon|lat|alt|x|y|z)"
+_SIGMA_NAME = re.compile(f"{_SIGMA_WORD}_?{_AXIS_WORD}|{_AXIS_WORD}_{_SIGMA_WORD}").fullmatch
 _LEVEL_NAMES = {
     "horizontal_accuracy": ("horizontal_accuracy", "accuracy_horizontal", "hacc", "h_acc", "eph", "accuracy"),
     "vertical_accuracy": (
@@ -77,7 +79,7 @@ _LEVEL_NAMES = {
         "accuracy_height",
     ),
 }
-_AXES = {
+_AXIS_OF_WORD = {
     "e": "east",
     "lon": "east",
     "longitude": "east",
@@ -90,36 +92,48 @@ _AXES = {
     "height": "up",
 }
 _DIMENSIONS = {"latitude": units.ANGLE, "longitude": units.ANGLE, "time": units.TIME}
-_HEADER = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?")
+_HEADER_CELL = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?")
 _QUOTED = re.compile('"').search
-_IN_NUMBERS = b"0123456789+-.eE \t"
-_SECOND = r"(?:[0-5]\d(?:[.,]\d{1,12})?|60(?:[.,]0{1,12})?)"  # 60.00 is what 59.996 is rounded to
-_ZONED = re.compile(_SECOND + r"(?:Z|\+00:?00)", re.ASCII).fullmatch
-_BARE = re.compile(_SECOND, re.ASCII).fullmatch
-_EITHER = re.compile(_SECOND + r"(?:Z|\+00:?00)?", re.ASCII).fullmatch
-_DATUM = re.compile(r"#\W*(?:geodetic )?(?:datum|crs|reference (?:frame|system))\s*[:=]\s*(\S.*)", re.IGNORECASE)
-_LEAST_SEARCHED = 64  # rows that are looked at one by one
-_EXAMPLE = "2026-06-01T05:20:31.250Z"
-_CLOCKS_APART_S = 1.0  # of an exporter's two clocks, beyond the second to which one is written
+_NUMBER_BYTES = b"0123456789+-.eE \t"
+_SECOND = r"(?:[0-5]\d(?:[.,]\d{1,12})?|60(?:[.,]0{1,12})?)"  # 59.996 is rounded to 60.00
+_SECOND_WITH_ZONE = re.compile(_SECOND + r"(?:Z|\+00:?00)", re.ASCII).fullmatch
+_SECOND_WITHOUT_ZONE = re.compile(_SECOND, re.ASCII).fullmatch
+_SECOND_WITH_OR_WITHOUT_ZONE = re.compile(_SECOND + r"(?:Z|\+00:?00)?", re.ASCII).fullmatch
+_DATUM_COMMENT = re.compile(
+    r"#\W*(?:geodetic )?(?:datum|crs|reference (?:frame|system))\s*[:=]\s*(\S.*)", re.IGNORECASE
+)
+_MIN_HALVED_ROWS = 64  # rows with a fault are halved down to this count, and then read one by one
+_STAMP_EXAMPLE = "2026-06-01T05:20:31.250Z"
+_MAX_CLOCK_DRIFT_S = 1.0  # between an exporter's two clocks, in addition to the whole second of the coarse clock
 
 
-class _Column(NamedTuple):
-    """A column that is read: its name, unit as written, factor to SI and place in a row. An instant has no unit.
+@dataclass(frozen=True)
+class _Column:
+    """A column that is read: its name, unit as written, factor to SI and index in a row. An instant has no unit.
 
-    Names of exporters' columns are those of plain logs, and `altitude` above mean sea level, `unix` since 1970 in
-    UTC, GPS `week`, kind of `fix`, number of the `receiver`.
+    Columns of exporters have the names of plain logs, and `unix` since 1970 in UTC, GPS `week`, kind of `fix`, number
+    of the `receiver`.
     """
 
     name: str
     unit: str = ""
     scale: float = 1.0
-    place: int = -1
+    index: int = -1
 
 
 class _Vendor(NamedTuple):
-    """Whose columns: words for reports, names that tell it, and what columns mean; names are in small letters.
+    """An exporter of logs, with all names of columns in small letters.
 
-    `least_fix` is the kind of fix from which a place has a height.
+    Attributes
+    ----------
+    words : str
+        The exporter in reports.
+    signs : frozenset of str
+        Names of columns that identify the exporter.
+    columns : mapping
+        The column that is read, by the exporter's name of it.
+    least_fix : int
+        Smallest number of the kind of fix that has a height.
     """
 
     words: str
@@ -130,10 +144,28 @@ class _Vendor(NamedTuple):
 
 @dataclass(frozen=True)
 class _Header:
-    """Line of the header, what parts its cells and how many there are, and the columns that are read.
+    """The header of a log, and the columns that are read.
 
-    `numbers` are columns of numbers, `accuracy` those of errors, whose cells may be empty. `stamp` is one of instants
-    of a `scale`, which need a zone, have none or either.
+    Attributes
+    ----------
+    line : int
+        Line of the header, from 1.
+    delimiter : str
+        Character between cells.
+    width : int
+        Number of cells in a row.
+    numbers : tuple of _Column
+        Columns of numbers.
+    stamp : _Column, optional
+        Column of instants.
+    scale : str
+        Scale of the instants.
+    zone : callable
+        Matches the seconds and the zone of a stamp: a zone is needed, forbidden or optional.
+    vendor : _Vendor, optional
+        The exporter.
+    accuracy : tuple of _Column
+        Columns of one-sigma errors, whose cells may be empty.
     """
 
     line: int
@@ -142,7 +174,7 @@ class _Header:
     numbers: tuple[_Column, ...]
     stamp: _Column | None = None
     scale: str = "utc"
-    zone: Callable[[str], object] = _ZONED
+    zone: Callable[[str], object] = _SECOND_WITH_ZONE
     vendor: _Vendor | None = None
     accuracy: tuple[_Column, ...] = ()
 
@@ -158,17 +190,24 @@ class _Header:
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the three coordinates."""
-        return next((kind for kind in _KINDS if kind[1] in self.names), _GEODETIC)
+        return next((kind for kind in _COORDINATES if kind[1] in self.names), _GEODETIC)
 
-    def place(self, name: str) -> int | None:
-        """Place of a column in a table; None where there is none."""
+    def index_of(self, name: str) -> int | None:
+        """Index of a column in a table; None without the column."""
         return self.names.index(name) if name in self.names else None
 
 
 class _Table(NamedTuple):
-    """Lines (n,) of rows, their numbers (n, columns) in units of the file, and their instants.
+    """Rows of a log.
 
-    An instant is whole minutes since MJD 0 and the seconds after, [s]; NaN where an exporter leaves it out.
+    Attributes
+    ----------
+    lines : (n,)
+        Lines of the rows in the file.
+    numbers : (n, columns)
+        Numbers in units of the file.
+    minutes, seconds : (n,)
+        Instant as whole minutes since MJD 0 and the seconds after; NaN in rows without an instant. [s]
     """
 
     lines: NDArray[np.int64]
@@ -178,59 +217,59 @@ class _Table(NamedTuple):
 
 
 def is_csv(data: bytes) -> bool:
-    """Whether the first line that says something names columns of places."""
+    """Whether the first line that is neither blank nor a comment names columns of coordinates."""
     head = data[:100_000].decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    line = next(filter(_is_said, _dataflash_as_csv(head)), "")
-    cells = line.split(max(",;\t", key=line.count))
+    header = next(filter(_has_content, _dataflash_as_csv(head)), "")
+    cells = header.split(max(",;\t", key=header.count))
     names = {_name_of(cell)[0] for cell in cells}
-    return _vendor_of(cells) is not None or any(names.issuperset(kind[:2]) for kind in _KINDS)
+    return _vendor_of(cells) is not None or any(names.issuperset(kind[:2]) for kind in _COORDINATES)
 
 
-def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
-    """Read a log of a flight, UTF-8 of at most `LARGEST` bytes, as every reader of `LOG_FORMATS` does.
+def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
+    """Read a log of a flight, UTF-8 of at most `MAX_CSV_BYTES` bytes, as every reader of `LOG_FORMATS` does.
 
-    Geodetic places become Earth-fixed ones. Instants become seconds after the first of them.
+    Geodetic coordinates become Earth-fixed coordinates. Instants become seconds after the first instant.
     """
     lines = _dataflash_as_csv(_text(data, name).split("\n"))
     header = _header(lines, name, keys)
     _hold_to_datum(lines[: header.line], name)
-    found = _all_rows(lines, header, name)
-    table, without_fix = _with_fix(found.table, header, keys, name)
-    records = LogRecords(name, len(table.lines), table.lines, found.broken)
+    rows = _all_rows(lines, header, name)
+    table, without_fix = _with_fix(rows.table, header, keys, name)
+    records = LogRecords(name, len(table.lines), table.lines, rows.broken)
     times, start, clock_words = _times(table, header, records)
-    places = _places(table, header, records, keys)
+    coordinates = _coordinates(table, header, records, keys)
     words = header.vendor.words if header.vendor else f"CSV of {', '.join(header.axes)}"
     words += "" if keys.instance is None else f", instance {keys.instance}"
-    is_earth_fixed = header.axes != _KINDS[2]
+    is_earth_fixed = header.axes != _LOCAL
     log = usable_log(
         records,
         words,
         times,
         start,
         header.scale,
-        lambda kept: _earth_fixed(places[:, kept], header),
+        lambda kept: _earth_fixed(coordinates[:, kept], header),
         clock_words=clock_words,
         is_earth_fixed=is_earth_fixed,
-        sigmas=_sigmas(table, header, places),
-        geodetic=tuple(places) if header.axes == _GEODETIC else None,
+        sigmas=_sigmas(table, header, coordinates),
+        geodetic=tuple(coordinates) if header.axes == _GEODETIC else None,
     )
-    without_fix += found.empty
-    said = f", {counted(without_fix, 'row')} without a fix left out" if without_fix else ""
-    return replace(log, words=log.words + said)
+    without_fix += rows.empty
+    without_fix_words = f", {counted(without_fix, 'row')} without a fix left out" if without_fix else ""
+    return replace(log, words=log.words + without_fix_words)
 
 
 def _with_fix(table: _Table, header: _Header, keys: LogKeys, name: str) -> tuple[_Table, int]:
-    """The rows of an exporter that have a place, of the receiver that is chosen; and how many have none.
+    """The rows of the chosen receiver that have a fix, and the number of rows without a fix.
 
-    Rows of several receivers are refused where the mission file does not choose one of them.
+    A log of several receivers is refused unless the mission file chooses a receiver.
     """
-    receiver = header.place("receiver")
+    receiver = header.index_of("receiver")
     if keys.instance is not None and receiver is None:
         raise PathFileError(f"{name}: has no column that numbers receivers", key="instance")
     if header.vendor is None:
         return table, 0
     numbers = table.numbers
-    fix, unix = header.place("fix"), header.place("unix")
+    fix, unix = header.index_of("fix"), header.index_of("unix")
     latitude, longitude = (header.names.index(axis) for axis in _GEODETIC[:2])
     has_place = (numbers[:, latitude] != 0) | (numbers[:, longitude] != 0)
     if fix is not None:
@@ -248,9 +287,9 @@ def _with_fix(table: _Table, header: _Header, keys: LogKeys, name: str) -> tuple
 
 
 def _hold_to_datum(lines: Sequence[str], name: str) -> None:
-    """Refuse places of another datum than WGS-84, which a comment before the header says."""
+    """Refuse a log with a comment before the header that names another datum than WGS-84."""
     for number, line in enumerate(lines, 1):
-        match = _DATUM.match(line.strip())
+        match = _DATUM_COMMENT.match(line.strip())
         if match is not None and not is_wgs84(match[1]):
             raise PathFileError(
                 f"{name}:{number}: has places of the datum {shown(match[1])}",
@@ -259,21 +298,21 @@ def _hold_to_datum(lines: Sequence[str], name: str) -> None:
 
 
 def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats, Instant | None, str]:
-    """Times [s], day and seconds of the scale from which they count, and how well that is known."""
-    own = header.place("time")
+    """Times [s], the instant from which they count, and the words for the accuracy of that instant."""
+    time_index = header.index_of("time")
     counted_s = np.zeros(len(table.lines))
-    if own is not None:
-        column, raw = header.numbers[own], table.numbers[:, own]
+    if time_index is not None:
+        column, raw = header.numbers[time_index], table.numbers[:, time_index]
         with np.errstate(over="ignore"):
             counted_s = raw * column.scale
         records.leave_out(
-            np.abs(counted_s) > _LATEST_S, lambda i: f"time {raw[i]:.10g} {column.unit} is beyond {_LATEST_S:g} s"
+            np.abs(counted_s) > _MAX_TIME_S, lambda i: f"time {raw[i]:.10g} {column.unit} is beyond {_MAX_TIME_S:g} s"
         )
-    unix, week = header.place("unix"), header.place("week")
+    unix, week = header.index_of("unix"), header.index_of("week")
     if unix is not None:
         raw = table.numbers[:, unix]
         scale = header.numbers[unix].scale
-        records.leave_out(raw * scale > _LATEST_S, lambda i: f"time {raw[i]:.10g} us is beyond {_LATEST_S:g} s")
+        records.leave_out(raw * scale > _MAX_TIME_S, lambda i: f"time {raw[i]:.10g} us is beyond {_MAX_TIME_S:g} s")
         first = raw[records.first]
         return (raw - first) * scale, unix_instant(int(first)), ""
     if week is not None:
@@ -288,31 +327,31 @@ def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats,
     if header.stamp is None:
         return counted_s, None, ""
     minutes, seconds = table.minutes, table.seconds
-    if own is not None:
+    if time_index is not None:
         return _by_two_clocks(counted_s, minutes + seconds, records)
     start = Instant(0, 0.0).after(float(minutes[0])).after(float(seconds[0]))
     return (minutes - minutes[0]) + (seconds - seconds[0]), start, ""
 
 
 def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> tuple[Floats, Instant, str]:
-    """Times of a clock that counts fractions, in UTC by another that writes whole seconds.
+    """Times of a clock that counts fractions of seconds, in UTC by a clock that writes whole seconds.
 
-    An instant is cut to its second: the start is at or behind every instant less its time, and less than a second
-    behind. Between the latest and the earliest such bound it is taken in the middle.
+    An instant is cut to its second. So each instant less its time bounds the start: the start is at the bound or less
+    than a second after it. The start is taken in the middle of the interval that all bounds allow.
     """
-    is_said = np.isfinite(instants) & records.is_usable
-    if not is_said.any():
+    has_instant = np.isfinite(instants) & records.is_usable
+    if not has_instant.any():
         raise PathFileError(f"{records.name}: has no instant of UTC")
-    apart = instants - counted_s
-    usual = float(np.median(apart[is_said]))
-    off = np.abs(apart - usual)
+    offsets = instants - counted_s
+    median_offset = float(np.median(offsets[has_instant]))
+    deviations = np.abs(offsets - median_offset)
     records.leave_out(
-        is_said & (off > 1.0 + _CLOCKS_APART_S),
-        lambda i: f"its clocks, time(millisecond) and datetime(utc), drift apart by {off[i]:.3g} s",
+        has_instant & (deviations > 1.0 + _MAX_CLOCK_DRIFT_S),
+        lambda i: f"its clocks, time(millisecond) and datetime(utc), drift apart by {deviations[i]:.3g} s",
     )
-    behind = apart[is_said & records.is_usable]
-    earliest, latest = float(behind.max()), float(behind.min()) + 1.0
-    if earliest - latest > _CLOCKS_APART_S:
+    bounds = offsets[has_instant & records.is_usable]
+    earliest, latest = float(bounds.max()), float(bounds.min()) + 1.0
+    if earliest - latest > _MAX_CLOCK_DRIFT_S:
         raise PathFileError(
             f"{records.name}: its clocks, time(millisecond) and datetime(utc), drift apart by "
             f"{earliest - latest:.3g} s",
@@ -322,97 +361,106 @@ def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> 
     return counted_s - counted_s[0], start, f", UTC to {abs(latest - earliest) / 2:.2g} s by whole seconds"
 
 
-def _places(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) -> Floats:
-    """Coordinates (3, n) of the header's axes, a height above the ellipsoid; those that cannot be are left out."""
-    kind = header.axes
-    is_geodetic = kind == _GEODETIC
-    is_above_sea = is_geodetic and "height" not in header.names
-    own = kind if not is_above_sea else (*_GEODETIC[:2], "altitude")
-    found = []
-    for axis in own:
-        at = header.names.index(axis)
-        column, raw = header.numbers[at], table.numbers[:, at]
+def _coordinates(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) -> Floats:
+    """Coordinates (3, n) along the header's axes, heights above the ellipsoid. [rad, m]
+
+    Records with impossible coordinates are left out.
+    """
+    axes = header.axes
+    is_geodetic = axes == _GEODETIC
+    is_above_sea_level = is_geodetic and "height" not in header.names
+    columns = axes if not is_above_sea_level else (*_GEODETIC[:2], "altitude")
+    coordinates = []
+    for axis in columns:
+        index = header.names.index(axis)
+        column, raw = header.numbers[index], table.numbers[:, index]
         with np.errstate(over="ignore"):
             values = raw * column.scale
-        limit = {"latitude": _RIGHT_ANGLE, "longitude": 2 * math.pi * (1 + 1e-12)}.get(axis, _FARTHEST_M)
-        at_most = {"latitude": "90 deg", "longitude": "360 deg"}.get(axis, f"{_FARTHEST_M:g} m")
+        limit = {"latitude": _MAX_LATITUDE_RAD, "longitude": 2 * math.pi * (1 + 1e-12)}.get(axis, _MAX_COORDINATE_M)
+        limit_words = {"latitude": "90 deg", "longitude": "360 deg"}.get(axis, f"{_MAX_COORDINATE_M:g} m")
         records.leave_out(
             np.abs(values) > limit,
-            lambda i, raw=raw, column=column, at_most=at_most: (  # type: ignore[misc]
-                f"{column.name} {raw[i]:.10g} {column.unit} is beyond {at_most}"
+            lambda i, raw=raw, column=column, limit_words=limit_words: (  # type: ignore[misc]
+                f"{column.name} {raw[i]:.10g} {column.unit} is beyond {limit_words}"
             ),
         )
-        found.append(values)
-    if not is_above_sea:
+        coordinates.append(values)
+    if not is_above_sea_level:
         hold_to_ellipsoid(
-            keys, records.name, "has heights above the ellipsoid" if is_geodetic else f"has {', '.join(kind)}"
+            keys, records.name, "has heights above the ellipsoid" if is_geodetic else f"has {', '.join(axes)}"
         )
     else:
-        at_separation = header.place("geoid_separation")
+        separation_index = header.index_of("geoid_separation")
         separations = None
-        if at_separation is not None:
-            column, raw = header.numbers[at_separation], table.numbers[:, at_separation]
+        if separation_index is not None:
+            column, raw = header.numbers[separation_index], table.numbers[:, separation_index]
             separations = raw * column.scale
             records.leave_out(
-                np.abs(separations) > 200, lambda i: f"geoid_separation {raw[i]:.10g} {column.unit} is beyond 200 m"
+                np.abs(separations) > _MAX_GEOID_SEPARATION_M,
+                lambda i: f"geoid_separation {raw[i]:.10g} {column.unit} is beyond {_MAX_GEOID_SEPARATION_M:g} m",
             )
-        found[2] = from_sea_level(found[2], separations, keys, records.name)
-    if kind == _KINDS[1]:
-        radius = np.sqrt(sum(axis**2 for axis in found))
+        coordinates[2] = from_sea_level(coordinates[2], separations, keys, records.name)
+    if axes == _EARTH_FIXED:
+        radius = np.sqrt(sum(axis**2 for axis in coordinates))
         records.leave_out(
-            radius < _DEEPEST_M,
+            radius < _MIN_RADIUS_M,
             lambda i: (
                 f"x, y, z are {radius[i] / 1e3:.4g} km from the Earth's centre; Earth-fixed coordinates are wanted, "
                 "places of the scene are named east, north, up"
             ),
         )
-    return np.array(found)
+    return np.array(coordinates)
 
 
 def _earth_fixed(coordinates: Floats, header: _Header) -> Floats:
-    """Places (n, 3) from coordinates (3, n): Earth-fixed, or those of the scene. [m]"""
+    """Positions (n, 3) from coordinates (3, n): Earth-fixed, or in the axes of the scene. [m]"""
     return earth_fixed_places(*coordinates) if header.axes == _GEODETIC else np.ascontiguousarray(coordinates.T)
 
 
-def _sigmas(table: _Table, header: _Header, places: Floats) -> Floats | None:
-    """One-sigma errors (n, 3) east, north, up of places (3, n), NaN where none is stated; None without any. [m]"""
+def _sigmas(table: _Table, header: _Header, coordinates: Floats) -> Floats | None:
+    """One-sigma errors (n, 3) east, north, up at coordinates (3, n). [m]
+
+    An error that the log does not state is NaN; None if the log states no error at all.
+    """
     figures = {
         column.name: table.numbers[:, header.names.index(column.name)] * column.scale for column in header.accuracy
     }
-    local, fixed = (
+    local_sigmas, earth_fixed_sigmas = (
         np.column_stack([figures[name] for name in names]) if figures.keys() >= set(names) else None
-        for names in _SIGMAS
+        for names in _SIGMA_COLUMNS
     )
-    if local is not None:
-        return known_sigmas(local)
-    if fixed is None:
-        return level_sigmas(*(figures.get(name) for name in _LEVEL))
+    if local_sigmas is not None:
+        return known_sigmas(local_sigmas)
+    if earth_fixed_sigmas is None:
+        return level_sigmas(*(figures.get(name) for name in _LEVEL_ACCURACIES))
     if header.axes == _GEODETIC:
-        latitude, longitude = places[:2]
+        latitude, longitude = coordinates[:2]
     else:
-        latitude, longitude, _ = geodetic_places(places.T)
-    where: Any = (latitude, longitude, np.zeros_like(latitude))
-    axes: Floats = np.moveaxis(np.array(axes_at(Geodetic(*where)).axes), -1, 0)
-    known = np.where(np.all(fixed > 0, axis=1, keepdims=True), fixed, np.nan)
-    return known_sigmas(np.sqrt(np.einsum("nij,nj->ni", axes**2, known**2)))
+        latitude, longitude, _ = geodetic_places(coordinates.T)
+    points: Any = (latitude, longitude, np.zeros_like(latitude))
+    axes: Floats = np.moveaxis(np.array(axes_at(Geodetic(*points)).axes), -1, 0)
+    usable_sigmas = np.where(np.all(earth_fixed_sigmas > 0, axis=1, keepdims=True), earth_fixed_sigmas, np.nan)
+    return known_sigmas(np.sqrt(np.einsum("nij,nj->ni", axes**2, usable_sigmas**2)))
 
 
 def _text(data: bytes, name: str) -> str:
     """Text of the file, with a line feed at the end of each line."""
-    hold_to_bytes(data, LARGEST, name)
+    hold_to_bytes(data, MAX_CSV_BYTES, name)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise PathFileError(f"{name}:1: is in UTF-16; save it in UTF-8")
-    zero = data.find(b"\0")
-    if zero >= 0:
-        raise PathFileError(f"{name}:{_line_of(data, zero)}: has a zero byte; CSV is text in UTF-8, not in UTF-16")
+    zero_index = data.find(b"\0")
+    if zero_index >= 0:
+        raise PathFileError(
+            f"{name}:{_line_of(data, zero_index)}: has a zero byte; CSV is text in UTF-8, not in UTF-16"
+        )
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        at = error.start
+        offset = error.start
         # The codec that skips the mark counts from behind it.
-        at += 3 if data.startswith(b"\xef\xbb\xbf") and error.object != data else 0
-        said = f"has the byte 0x{data[at]:02x}, which is not UTF-8; save it in UTF-8"
-        raise PathFileError(f"{name}:{_line_of(data, at)}: {said}") from None
+        offset += 3 if data.startswith(b"\xef\xbb\xbf") and error.object != data else 0
+        problem = f"has the byte 0x{data[offset]:02x}, which is not UTF-8; save it in UTF-8"
+        raise PathFileError(f"{name}:{_line_of(data, offset)}: {problem}") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -421,22 +469,22 @@ def _line_of(data: bytes, byte: int) -> int:
     return before.count(b"\n") + before.count(b"\r") + 1
 
 
-def _is_said(line: str) -> bool:
+def _has_content(line: str) -> bool:
     """Whether a line is neither blank nor a comment."""
     text = line.lstrip()
     return bool(text) and text[0] != "#"
 
 
 def _name_of(cell: str) -> tuple[str, str | None]:
-    """Name of a column in small letters, as far as a bracket, and the unit in square ones."""
+    """Name of a column in small letters, up to a bracket, and the unit in square brackets."""
     cell = cell.strip()
-    match = _HEADER.fullmatch(cell)
+    match = _HEADER_CELL.fullmatch(cell)
     name = (match[1] if match else re.split(r"[\[(]", cell)[0]).strip().strip('"').lower()
     return name.replace(" ", "_"), match[2].strip() if match and match[2] is not None else None
 
 
 def _accuracy_of(column: str) -> str | None:
-    """The error that a column states, by its name; None of other columns."""
+    """The kind of one-sigma error that a column states, by the name of the column; None for all other columns."""
     for level, names in _LEVEL_NAMES.items():
         if column in names:
             return level
@@ -444,147 +492,161 @@ def _accuracy_of(column: str) -> str | None:
     if match is None:
         return None
     axis = match[1] or match[2]
-    return f"sigma_{_AXES.get(axis, axis)}"
+    return f"sigma_{_AXIS_OF_WORD.get(axis, axis)}"
 
 
 def _accuracy_columns(
-    cells: Sequence[str], kind: Sequence[str], refuse: Callable[[str], NoReturn]
+    cells: Sequence[str], axes: Sequence[str], refuse: Callable[[str], NoReturn]
 ) -> tuple[_Column, ...]:
-    """Columns of the errors of places of a kind."""
-    found: dict[str, _Column] = {}
+    """Columns of one-sigma errors of fixes that have these axes."""
+    columns: dict[str, _Column] = {}
     for index, cell in enumerate(cells):
         column, unit = _name_of(cell)
         name = _accuracy_of(column)
         if name is None:
             continue
-        if name in found:
+        if name in columns:
             refuse(f"has two columns of {name}")
         in_brackets = re.search(r"\(([^()]*)\)", cell)
-        found[name] = _measured(column, index, unit or (in_brackets[1] if in_brackets else None), refuse)._replace(
-            name=name
+        columns[name] = replace(
+            _measured(column, index, unit or (in_brackets[1] if in_brackets else None), refuse), name=name
         )
-    for names in _SIGMAS:
-        missing = [name for name in names if name not in found]
+    for names in _SIGMA_COLUMNS:
+        missing = [name for name in names if name not in columns]
         if 0 < len(missing) < len(names):
-            has = next(name for name in names if name in found)
-            refuse(f"has {has} and no {missing[0]}; write all of {', '.join(names)}")
-    if kind == _KINDS[2] and _SIGMAS[1][0] in found:
-        refuse(f"has {_SIGMAS[1][0]} beside east; write {', '.join(_SIGMAS[0])}")
-    return tuple(found.values())
+            present = next(name for name in names if name in columns)
+            refuse(f"has {present} and no {missing[0]}; write all of {', '.join(names)}")
+    if axes == _LOCAL and _SIGMA_COLUMNS[1][0] in columns:
+        refuse(f"has {_SIGMA_COLUMNS[1][0]} beside east; write {', '.join(_SIGMA_COLUMNS[0])}")
+    return tuple(columns.values())
 
 
 def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
-    """Columns that the first line names."""
-    at = next((n for n, line in enumerate(lines) if _is_said(line)), None)
-    if at is None:
+    """The header, from the first line that is neither blank nor a comment."""
+    header_index = next((n for n, line in enumerate(lines) if _has_content(line)), None)
+    if header_index is None:
         raise PathFileError(f"{name}:1: is empty; its first line names columns, like 'time [s], x [m], y [m], z [m]'")
 
-    def refuse(says: str) -> NoReturn:
-        raise PathFileError(f"{name}:{at + 1}: {says}")
+    def refuse(problem: str) -> NoReturn:
+        raise PathFileError(f"{name}:{header_index + 1}: {problem}")
 
-    delimiter = max(",;\t", key=lines[at].count)
-    cells = _cells(lines[at], delimiter)
+    delimiter = max(",;\t", key=lines[header_index].count)
+    cells = _cells(lines[header_index], delimiter)
     if isinstance(cells, str):
         refuse(cells)
     vendor = _vendor_of(cells)
     if vendor is not None:
-        return _vendor_header(vendor, cells, delimiter, at + 1, f"{name}:{at + 1}", keys)
-    found: dict[str, tuple[int, str | None]] = {}
+        return _vendor_header(vendor, cells, delimiter, header_index + 1, f"{name}:{header_index + 1}", keys)
+    columns: dict[str, tuple[int, str | None]] = {}
     for index, cell in enumerate(cells):
         column, unit = _name_of(cell)
-        if column not in ("time", *_STAMPS, *_SPARE, *(axis for kind in _KINDS for axis in kind)):
+        if column not in (
+            "time",
+            *_SCALE_OF_STAMP,
+            *_HEIGHT_COLUMNS,
+            *(axis for axis_names in _COORDINATES for axis in axis_names),
+        ):
             continue
-        if column in found:
+        if column in columns:
             refuse(f"has two columns {column}")
-        found[column] = (index, unit)
-    kinds = [kind for kind in _KINDS if any(axis in found for axis in kind)]
-    if not kinds:
+        columns[column] = (index, unit)
+    present = [axis_names for axis_names in _COORDINATES if any(axis in columns for axis in axis_names)]
+    if not present:
         refuse("names no place; the first line names columns, like 'latitude [deg]', 'x [m]' or 'east [m]'")
-    if len(kinds) > 1:
-        one, other = (next(axis for axis in kind if axis in found) for kind in kinds[:2])
-        refuse(f"mixes {one} with {other}; places are {', or '.join(', '.join(kind) for kind in _KINDS)}")
-    kind = kinds[0]
-    if kind == _GEODETIC and "altitude" in found:
-        if "height" in found:
+    if len(present) > 1:
+        axis_name, mixed_axis_name = (
+            next(axis for axis in axis_names if axis in columns) for axis_names in present[:2]
+        )
+        accepted = ", or ".join(map(", ".join, _COORDINATES))
+        refuse(f"mixes {axis_name} with {mixed_axis_name}; places are {accepted}")
+    axis_names = present[0]
+    if axis_names == _GEODETIC and "altitude" in columns:
+        if "height" in columns:
             refuse("has both height and altitude; keep one")
-        kind = (*_GEODETIC[:2], "altitude")
-    missing = [axis for axis in kind if axis not in found]
+        axis_names = (*_GEODETIC[:2], "altitude")
+    missing = [axis for axis in axis_names if axis not in columns]
     if missing:
         refuse(f"has no column {missing[0]}")
-    times = [column for column in ("time", *_STAMPS) if column in found]
-    if len(times) > 1:
-        refuse(f"has both {times[0]} and {times[1]}; keep one")
-    if not times:
+    time_columns = [column for column in ("time", *_SCALE_OF_STAMP) if column in columns]
+    if len(time_columns) > 1:
+        refuse(f"has both {time_columns[0]} and {time_columns[1]}; keep one")
+    if not time_columns:
         refuse("has no column of time; write 'time [s]' or 'utc'")
-    axes = [_measured(axis, *found[axis], refuse) for axis in kind]
-    alike = axes[:2] if kind[0] == "latitude" else axes
-    other_unit = next((axis for axis in alike if axis.scale != alike[0].scale), None)
-    if other_unit:
-        refuse(f"mixes units: {alike[0].name} [{alike[0].unit}] and {other_unit.name} [{other_unit.unit}]")
-    if kind[-1] == "altitude" and "geoid_separation" in found:
-        axes.append(_measured("geoid_separation", *found["geoid_separation"], refuse))
-    elif kind[-1] == "altitude" and keys.geoid_separation is None:
-        raise needs_separation(
-            f"{name}:{at + 1}: altitude counts from mean sea level, and there is no column geoid_separation; "
-            "a height counts from the ellipsoid of WGS-84"
+    coordinates = [_measured(axis, *columns[axis], refuse) for axis in axis_names]
+    same_unit_columns = coordinates[:2] if axis_names[0] == "latitude" else coordinates
+    mismatch = next((axis for axis in same_unit_columns if axis.scale != same_unit_columns[0].scale), None)
+    if mismatch:
+        refuse(
+            f"mixes units: {same_unit_columns[0].name} [{same_unit_columns[0].unit}] and "
+            f"{mismatch.name} [{mismatch.unit}]"
         )
-    accuracy = _accuracy_columns(cells, kind, refuse)
-    index, unit = found[times[0]]
-    scale = _STAMPS.get(times[0]) or _STAMPS.get((unit or "").lower())
-    if times[0] in _STAMPS and unit and _STAMPS.get(unit.lower()) != scale:
-        refuse(f"{times[0]} has the unit {shown(unit)!r}; stamps like {_example(str(scale))} need none")
-    zone = _ZONED if scale == "utc" else _BARE
+    if axis_names[-1] == "altitude" and "geoid_separation" in columns:
+        coordinates.append(_measured("geoid_separation", *columns["geoid_separation"], refuse))
+    elif axis_names[-1] == "altitude" and keys.geoid_separation is None:
+        raise needs_separation(
+            f"{name}:{header_index + 1}: altitude counts from mean sea level, and there is no column "
+            "geoid_separation; a height counts from the ellipsoid of WGS-84"
+        )
+    accuracy = _accuracy_columns(cells, axis_names, refuse)
+    index, unit = columns[time_columns[0]]
+    scale = _SCALE_OF_STAMP.get(time_columns[0]) or _SCALE_OF_STAMP.get((unit or "").lower())
+    if time_columns[0] in _SCALE_OF_STAMP and unit and _SCALE_OF_STAMP.get(unit.lower()) != scale:
+        refuse(f"{time_columns[0]} has the unit {shown(unit)!r}; stamps like {_example(str(scale))} need none")
+    zone = _SECOND_WITH_ZONE if scale == "utc" else _SECOND_WITHOUT_ZONE
     if scale is None and not unit and keys.time_scale is not None:
-        scale, zone = keys.time_scale, _EITHER if keys.time_scale == "utc" else _BARE
+        scale, zone = (
+            keys.time_scale,
+            _SECOND_WITH_OR_WITHOUT_ZONE if keys.time_scale == "utc" else _SECOND_WITHOUT_ZONE,
+        )
     if scale is None:
         time = _measured("time", index, unit, refuse)
         if keys.time_scale is not None:
             refuse(f"time counts in {time.unit}; trajectory.time_scale says of instants in which scale they are")
-        return _Header(at + 1, delimiter, len(cells), (time, *axes), accuracy=accuracy)
-    hold_to_scale(scale, keys, f"{name}:{at + 1}")
-    stamp = _Column(times[0], place=index)
-    return _Header(at + 1, delimiter, len(cells), tuple(axes), stamp, scale, zone, accuracy=accuracy)
+        return _Header(header_index + 1, delimiter, len(cells), (time, *coordinates), accuracy=accuracy)
+    hold_to_scale(scale, keys, f"{name}:{header_index + 1}")
+    stamp = _Column(time_columns[0], index=index)
+    return _Header(header_index + 1, delimiter, len(cells), tuple(coordinates), stamp, scale, zone, accuracy=accuracy)
 
 
 def _vendor_header(
-    vendor: _Vendor, cells: Sequence[str], delimiter: str, line: int, where: str, keys: LogKeys
+    vendor: _Vendor, cells: Sequence[str], delimiter: str, line: int, location: str, keys: LogKeys
 ) -> _Header:
-    """Columns that an exporter names."""
+    """The header of an exporter's log."""
     columns: dict[str, _Column] = {}
     for index, cell in enumerate(cells):
-        known = vendor.columns.get(cell.strip().lower())
-        if known is not None:
-            columns.setdefault(known.name, known._replace(place=index))
+        meaning = vendor.columns.get(cell.strip().lower())
+        if meaning is not None:
+            columns.setdefault(meaning.name, replace(meaning, index=index))
     if "height" not in columns and "altitude" not in columns:
         raise PathFileError(
-            f"{where}: {vendor.words} has no height above the sea or the ellipsoid; one above take-off is no place"
+            f"{location}: {vendor.words} has no height above the sea or the ellipsoid; one above take-off is no place"
         )
     if "height" in columns:
         columns.pop("altitude", None)
     stamp = columns.pop("utc", None)
     scale = "gps" if "week" in columns else "utc"
     if stamp is not None or not columns.keys().isdisjoint(("unix", "week")):
-        hold_to_scale(scale, keys, where)
+        hold_to_scale(scale, keys, location)
     elif keys.time_scale is not None:
-        raise PathFileError(f"{where}: time counts since the start of the autopilot, and is in no scale")
-    accuracy = tuple(columns.pop(name) for name in _ACCURACY if name in columns)
+        raise PathFileError(f"{location}: time counts since the start of the autopilot, and is in no scale")
+    accuracy = tuple(columns.pop(name) for name in _ACCURACY_COLUMNS if name in columns)
     numbers = tuple(columns.values())
-    return _Header(line, delimiter, len(cells), numbers, stamp, scale, _EITHER, vendor, accuracy)
+    return _Header(line, delimiter, len(cells), numbers, stamp, scale, _SECOND_WITH_OR_WITHOUT_ZONE, vendor, accuracy)
 
 
 def _example(scale: str) -> str:
-    return _EXAMPLE if scale == "utc" else _EXAMPLE[:-1]
+    return _STAMP_EXAMPLE if scale == "utc" else _STAMP_EXAMPLE[:-1]
 
 
 def _measured(name: str, index: int, unit: str | None, refuse: Callable[[str], NoReturn]) -> _Column:
-    """A column of numbers, whose unit is known and of the right dimension."""
+    """A column of numbers. A column without a unit, or with a unit of the wrong dimension, is refused."""
     dimension = _DIMENSIONS.get(name, units.LENGTH)
     example = {units.ANGLE: f"{name} [deg]", units.TIME: "time [s]', 'time [UTC]' or 'time [GPST]"}.get(
         dimension, f"{name} [m]"
     )
     if not unit:
-        more = ", or say trajectory.time_scale" if name == "time" else ""
-        refuse(f"{name} has no unit; write '{example}'{more}")
+        time_scale_hint = ", or say trajectory.time_scale" if name == "time" else ""
+        refuse(f"{name} has no unit; write '{example}'{time_scale_hint}")
     try:
         return _Column(name, shown(unit), units.parse_quantity(f"1 {unit}", dimension), index)
     except InvalidValueError as error:
@@ -593,7 +655,19 @@ def _measured(name: str, index: int, unit: str | None, refuse: Callable[[str], N
 
 @dataclass(eq=False)
 class _Rows:
-    """Rows that are read, messages about those that cannot be by their lines, and how many an exporter left empty."""
+    """Rows of a log.
+
+    Attributes
+    ----------
+    tables : list of _Table
+        The rows that are read.
+    broken : dict
+        Messages about rows that cannot be read, by their lines.
+    most_broken : int
+        Largest number of broken rows that is accepted.
+    empty : int
+        Number of rows that an exporter left empty.
+    """
 
     tables: list[_Table]
     broken: dict[int, str]
@@ -607,39 +681,41 @@ class _Rows:
 
 
 def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
-    """Every row behind the header; a chunk of lines at a time, which is fast and needs little memory."""
-    nothing = np.zeros(0)
-    empty = _Table(np.zeros(0, dtype=np.int64), np.zeros((0, len(header.columns))), nothing, nothing)
+    """Every row after the header, read in chunks of lines, which is fast and needs little memory."""
+    no_values = np.zeros(0)
+    empty = _Table(np.zeros(0, dtype=np.int64), np.zeros((0, len(header.columns))), no_values, no_values)
     rows = _Rows([empty], {}, most_left_out(len(lines) - header.line))
-    is_any = False
-    for first in range(header.line, len(lines), _CHUNK):
-        chunk = lines[first : first + _CHUNK]
-        kept = [n for n, line in enumerate(chunk) if line[:1] > "#" or _is_said(line)]  # numbers begin behind #
-        if kept:
-            is_any = True
-            _read_rows([chunk[n] for n in kept], np.array(kept) + first + 1, header, name, rows)
-    if not is_any:
+    has_rows = False
+    for first in range(header.line, len(lines), _CHUNK_LINES):
+        chunk = lines[first : first + _CHUNK_LINES]
+        content_indices = [
+            n for n, line in enumerate(chunk) if line[:1] > "#" or _has_content(line)
+        ]  # numbers begin behind #
+        if content_indices:
+            has_rows = True
+            _read_rows([chunk[n] for n in content_indices], np.array(content_indices) + first + 1, header, name, rows)
+    if not has_rows:
         raise PathFileError(f"{name}:{header.line}: has a header and no places")
     return rows
 
 
 def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name: str, rows: _Rows) -> None:
-    """Read some rows at once; where that fails, halve them until the rows that are none are found."""
-    read = _plain_cells(texts, header) or _quoted_cells(texts, header)
-    if read is not None and np.isfinite(read[0][:, : len(header.numbers)]).all():
-        numbers, stamps = read
+    """Read rows at once. If that fails, halve the rows until the faulty rows are found."""
+    cells = _plain_cells(texts, header) or _quoted_cells(texts, header)
+    if cells is not None and np.isfinite(cells[0][:, : len(header.numbers)]).all():
+        numbers, stamps = cells
         instants = (np.zeros(len(lines)),) * 2 if stamps is None else _instants(stamps, header)
         if instants is not None:
             rows.tables.append(_Table(lines, numbers, *instants))
             return
-    if len(texts) > _LEAST_SEARCHED:
+    if len(texts) > _MIN_HALVED_ROWS:
         half = len(texts) // 2
         _read_rows(texts[:half], lines[:half], header, name, rows)
         _read_rows(texts[half:], lines[half:], header, name, rows)
         return
     is_sound = []
     for text, line in zip(texts, lines.tolist(), strict=True):
-        is_empty = header.vendor is not None and not _is_whole(text, header)  # before the first fix
+        is_empty = header.vendor is not None and not _has_all_numbers(text, header)  # before the first fix
         fault = None if is_empty else _row_fault(text, header)
         rows.empty += is_empty
         if fault is not None:
@@ -650,23 +726,23 @@ def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name
                     + ("; more than 1 % of the rows cannot be used" if len(rows.broken) > 1 else "")
                 )
         is_sound.append(not is_empty and fault is None)
-    sound = [n for n, is_good in enumerate(is_sound) if is_good]
-    if len(sound) == len(texts):
+    sound_indices = [index for index, is_good in enumerate(is_sound) if is_good]
+    if len(sound_indices) == len(texts):
         raise AssertionError("a row that has no fault was refused")
-    if sound:
-        _read_rows([texts[n] for n in sound], lines[sound], header, name, rows)
+    if sound_indices:
+        _read_rows([texts[index] for index in sound_indices], lines[sound_indices], header, name, rows)
 
 
-def _is_whole(text: str, header: _Header) -> bool:
-    """Whether no number of a row is left out; what is wrong otherwise is said elsewhere."""
+def _has_all_numbers(text: str, header: _Header) -> bool:
+    """Whether every number of a row is present. A row with any other fault counts as complete."""
     cells = _cells(text, header.delimiter)
     if isinstance(cells, str) or len(cells) != header.width:
         return True
-    return all(cells[column.place].strip() for column in header.numbers)
+    return all(cells[column.index].strip() for column in header.numbers)
 
 
 def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
-    """Numbers (n, 3 or 4) and stamps of rows without quotes; None where they are something else."""
+    """Numbers (n, columns) and stamps of rows without quotes; None if the rows cannot be read in this way."""
     delimiter = header.delimiter
     if {text.count(delimiter) for text in texts} != {header.width - 1} or any(map(_QUOTED, texts)):
         return None
@@ -675,36 +751,36 @@ def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] |
             texts,
             delimiter=delimiter,
             comments=None,
-            usecols=[one.place for one in header.columns],
-            converters={one.place: _or_nan for one in header.accuracy} or None,
+            usecols=[column.index for column in header.columns],
+            converters={column.index: _or_nan for column in header.accuracy} or None,
             ndmin=2,
         )
     except ValueError:
         return None
     if header.stamp is None:
         return numbers, None
-    place = header.stamp.place
-    return numbers, [text.split(delimiter, place + 1)[place].strip() for text in texts]
+    index = header.stamp.index
+    return numbers, [text.split(delimiter, index + 1)[index].strip() for text in texts]
 
 
 def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
-    """The same of rows with quotes, which takes six times as long."""
+    """Numbers and stamps of rows with quotes, like `_plain_cells`, in six times the time."""
     try:
         rows = list(csv.reader(texts, delimiter=header.delimiter, skipinitialspace=True))
         if len(rows) != len(texts) or set(map(len, rows)) != {header.width}:
             return None
-        cells = [[row[column.place] for row in rows] for column in header.numbers]
-        if any("".join(column).encode().translate(None, _IN_NUMBERS) for column in cells):
+        cells = [[row[column.index] for row in rows] for column in header.numbers]
+        if any("".join(column).encode().translate(None, _NUMBER_BYTES) for column in cells):
             return None
-        errors = [[_or_nan(row[column.place]) for row in rows] for column in header.accuracy]
+        errors = [[_or_nan(row[column.index]) for row in rows] for column in header.accuracy]
         numbers = np.array([list(map(float, column)) for column in cells] + errors).T
     except (csv.Error, ValueError):
         return None
-    return numbers, None if header.stamp is None else [row[header.stamp.place].strip() for row in rows]
+    return numbers, None if header.stamp is None else [row[header.stamp.index].strip() for row in rows]
 
 
 def _or_nan(cell: str) -> float:
-    """The number of a cell; NaN of one that has none."""
+    """The number of a cell; NaN for a cell without a number."""
     try:
         return float(cell)
     except ValueError:
@@ -712,15 +788,15 @@ def _or_nan(cell: str) -> float:
 
 
 def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None:
-    """Minutes since MJD 0 [s] and the seconds after; None where one of them is no instant.
+    """Minutes since MJD 0 and the seconds after; None if a text is no instant. [s]
 
-    NaN where an exporter leaves one out.
+    An instant that an exporter leaves out is NaN.
     """
-    is_said = [bool(text) or header.vendor is None for text in texts]
-    minutes = [_minute(text[:17]) if said else math.nan for text, said in zip(texts, is_said, strict=True)]
-    seconds = [text[17:] if said else "00" for text, said in zip(texts, is_said, strict=True)]
+    is_stated = [bool(text) or header.vendor is None for text in texts]
+    minutes = [_minute(text[:17]) if stated else math.nan for text, stated in zip(texts, is_stated, strict=True)]
+    seconds = [text[17:] if stated else "00" for text, stated in zip(texts, is_stated, strict=True)]
     if None in minutes or not all(
-        header.zone(text) if said else True for text, said in zip(seconds, is_said, strict=True)
+        header.zone(text) if stated else True for text, stated in zip(seconds, is_stated, strict=True)
     ):
         return None
     numbers = [text.replace("Z", "").partition("+")[0].replace(",", ".") for text in seconds]
@@ -729,13 +805,13 @@ def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None
 
 @lru_cache(maxsize=256)
 def _minute(text: str) -> float | None:
-    """Seconds since MJD 0 of the beginning of a stamp, which is that of many rows; None if it is none."""
+    """Seconds since MJD 0 of a stamp without its seconds, which many rows share; None if the text is no stamp."""
     instant = parse_instant(f"{text}00Z")
     return None if instant is None else instant.day * DAY + instant.seconds
 
 
 def _cells(text: str, delimiter: str) -> list[str] | str:
-    """Cells of a line, or why it has none."""
+    """Cells of a line, or the reason why the line cannot be split."""
     try:
         rows = list(csv.reader([text, ""], delimiter=delimiter, skipinitialspace=True))
     except csv.Error:
@@ -744,12 +820,13 @@ def _cells(text: str, delimiter: str) -> list[str] | str:
 
 
 def _row_fault(text: str, header: _Header) -> str | None:
+    """The reason why a row cannot be read; None for a sound row."""
     cells = _cells(text, header.delimiter)
     if isinstance(cells, str):
         return cells
     if len(cells) != header.width:
         return f"has {counted(len(cells), 'cell')}, the header has {header.width}"
-    stamp = "" if header.stamp is None else cells[header.stamp.place].strip()
+    stamp = "" if header.stamp is None else cells[header.stamp.index].strip()
     is_left_out = header.vendor is not None and not stamp
     if header.stamp is not None and not is_left_out and (_minute(stamp[:17]) is None or not header.zone(stamp[17:])):
         scale = SCALES[header.scale]
@@ -757,11 +834,11 @@ def _row_fault(text: str, header: _Header) -> str | None:
             f"{header.stamp.name} must be an instant of {scale} like {_example(header.scale)} (got {shown(stamp)!r})"
         )
     for column in header.numbers:
-        cell = cells[column.place].strip(" \t")
+        cell = cells[column.index].strip(" \t")
         if not cell:
             return f"{column.name} is empty"
         try:
-            value = float(cell) if not cell.encode().translate(None, _IN_NUMBERS) else None
+            value = float(cell) if not cell.encode().translate(None, _NUMBER_BYTES) else None
         except ValueError:
             value = None
         if value is None or not math.isfinite(value):
@@ -784,16 +861,16 @@ def _row_fault(text: str, header: _Header) -> str | None:
 # that Mission Planner and mavlogdump write, whose FMT rows name the columns. Alt is above mean sea level. Source:
 # ardupilot libraries/AP_GPS/LogStructure.h (LOG_STRUCTURE_FROM_GPS; a Status of 3 is a fix in three dimensions) and
 # AP_GPS.h (undulation), pymavlink/tools/mavlogdump.py.
-_DEGREE = math.pi / 180
+_DEGREE_RAD = math.pi / 180
 
 
 def _vendor(words: str, signs: str, least_fix: int = 0, **columns: _Column) -> _Vendor:
     return _Vendor(words, frozenset(signs.split()), columns, least_fix)
 
 
-_LATITUDE, _LONGITUDE = _Column("latitude", "deg", _DEGREE), _Column("longitude", "deg", _DEGREE)
+_LATITUDE, _LONGITUDE = _Column("latitude", "deg", _DEGREE_RAD), _Column("longitude", "deg", _DEGREE_RAD)
 _FIX = _Column("fix")
-_HORIZONTAL, _VERTICAL = (_Column(name, "m") for name in _LEVEL)
+_HORIZONTAL, _VERTICAL = (_Column(name, "m") for name in _LEVEL_ACCURACIES)
 _UNIX = _Column("unix", "us", 1e-6)
 _VENDORS = (
     _Vendor(
@@ -813,8 +890,8 @@ _VENDORS = (
         "time_utc_usec lat lon fix_type",
         3,
         time_utc_usec=_UNIX,
-        lat=_Column("latitude", "1e-7 deg", 1e-7 * _DEGREE),
-        lon=_Column("longitude", "1e-7 deg", 1e-7 * _DEGREE),
+        lat=_Column("latitude", "1e-7 deg", 1e-7 * _DEGREE_RAD),
+        lon=_Column("longitude", "1e-7 deg", 1e-7 * _DEGREE_RAD),
         alt_ellipsoid=_Column("height", "mm", 1e-3),
         alt=_Column("altitude", "mm", 1e-3),
         fix_type=_FIX,
@@ -865,15 +942,16 @@ _VENDORS = (
 
 
 def _vendor_of(cells: Sequence[str]) -> _Vendor | None:
-    """Whose columns these are; None where they are nobody's."""
+    """The exporter with these columns; None for a plain log."""
     names = [cell.strip().lower() for cell in cells]
-    return next((one for one in _VENDORS if one.signs.issubset(names)), None)
+    return next((vendor for vendor in _VENDORS if vendor.signs.issubset(names)), None)
 
 
 def _dataflash_as_csv(lines: list[str]) -> list[str]:
-    """Lines of a dataflash log with its GPS rows alone, and their FMT row as the header; other lines as they are.
+    """Lines of a dataflash log as CSV: its GPS rows, with their FMT row as the header, and empty lines for all else.
 
-    Each line keeps its number. HAcc and VAcc of the row GPA of the same time and receiver are two cells more.
+    Each line keeps its number. HAcc and VAcc of the GPA row with the time and receiver of a GPS row become two more
+    cells. Lines of any other file are returned unchanged.
     """
     if not any(line.startswith("FMT,") for line in lines[:100]):
         return lines
@@ -886,20 +964,20 @@ def _dataflash_as_csv(lines: list[str]) -> list[str]:
         elif cells and {"HAcc", "VAcc"}.issubset(names.get("GPA", ())) and len(cells) > len(names["GPA"]):
             row = dict(zip(names["GPA"], cells[1:], strict=False))
             accuracies[_time_and_receiver(row)] = f",{row['HAcc']},{row['VAcc']}"
-    more = ",HAcc,VAcc" if accuracies else ""
-    found = []
+    accuracy_header = ",HAcc,VAcc" if accuracies else ""
+    csv_lines = []
     header = ""
     for line in lines:
-        kept = ""
+        csv_line = ""
         if line.startswith("GPS,") and header:
-            kept = line
-            if more:
+            csv_line = line
+            if accuracy_header:
                 row = dict(zip(names["GPS"], (cell.strip() for cell in line.split(",")[1:]), strict=False))
-                kept = line.rstrip() + accuracies.get(_time_and_receiver(row), ",,")
+                csv_line = line.rstrip() + accuracies.get(_time_and_receiver(row), ",,")
         elif line.startswith("FMT,") and not header and line.split(",")[3].strip() == "GPS":
-            kept = header = ",".join(["GPS", *names["GPS"]]) + more
-        found.append(kept)
-    return found
+            csv_line = header = ",".join(["GPS", *names["GPS"]]) + accuracy_header
+        csv_lines.append(csv_line)
+    return csv_lines
 
 
 def _time_and_receiver(row: Mapping[str, str]) -> tuple[str, ...]:
