@@ -437,8 +437,8 @@ def counted(number: int, noun: str = "place") -> str:
 
 # ---------------------------------------------------------------------- logs that no platform can have flown
 # A frozen receiver repeats its last fix. A receiver that is slower than its log writes each fix several times. A
-# filter that is reset, or a wrong cell, makes a step that no platform takes. A polynomial through such fixes is smooth
-# all the same, and wrong. Deviations below the limits here are noise, and count as the residual.
+# filter that is reset, or a wrong cell, makes a step that no platform takes. A polynomial through such fixes is
+# smooth all the same, and wrong. Deviations below the limits here are noise, and count as the residual.
 _MAX_STILL_EXTENT_M = 1e-3  # over a whole aperture; the noise of any receiver is more
 _SAME_FIX_M = 1e-6  # equal numbers that are turned to the scene's axes differ by 1e-9 m
 _MIN_FAULT_M = 0.1  # shortest way that repeats miss, or smallest jump: six decimals of a degree round by this
@@ -500,8 +500,8 @@ def _hold_to_new_fixes(times: Floats, positions: Floats, extent: float, name: st
     if missed > _MIN_FAULT_M:
         raise PathFileError(
             f"{name}: repeats places: {int(is_repeated.sum())} of {times.size} around the aperture are the place "
-            f"before; from {times[begins[longest]]:+.4g} s of mid-aperture on for {durations[longest]:.3g} s, in which the"
-            f" platform moves {format_quantity(missed, 'm')}",
+            f"before; from {times[begins[longest]]:+.4g} s of mid-aperture on for {durations[longest]:.3g} s, in "
+            f"which the platform moves {format_quantity(missed, 'm')}",
             f"accepted: repeats in which it moves at most {_MIN_FAULT_M:g} m",
             "Leave out places that were not measured anew, or write more digits",
         )

@@ -252,7 +252,7 @@ def test_longitude_jumps_by_a_turn() -> None:
 
 
 def test_a_file_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reader, "LARGEST", 100)
+    monkeypatch.setattr(reader, "MAX_SBET_BYTES", 100)
     says = r"^a.out: has 0 MB, at most 0 MB are read$"
     with pytest.raises(PathFileError, match=says):
         read_sbet(sbet(SHORT), "a.out", NO_KEYS)
