@@ -22,7 +22,7 @@ from bisar_budget.paths.ephemeris import (
     velocity_error,
 )
 from bisar_budget.paths.flight import Orbit, PathFileError, Sample
-from bisar_budget.paths.instant import FIRST_DAY, Instant, tai
+from bisar_budget.paths.instant import FIRST_UTC_DAY, Instant, tai
 from bisar_budget.paths.messages import (
     LAST_ORBIT_DAY,
     MessageElement,
@@ -157,7 +157,7 @@ def _time(vector: MessageElement, elements: dict[str, MessageElement], system: s
         raise PathFileError(f"{name}:{vector.line}: the state vector has no {system}")
     text = elements[system].text.strip()
     time = epoch_in(text.removeprefix(f"{system}="))
-    if time is None or not FIRST_DAY < time.day < LAST_ORBIT_DAY:
+    if time is None or not FIRST_UTC_DAY < time.day < LAST_ORBIT_DAY:
         raise PathFileError(
             f"{name}:{elements[system].line}: {system} must be a time such as {system}=2026-05-31T10:12:13.000000"
             f" (got {shown(text)})"

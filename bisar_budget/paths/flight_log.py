@@ -28,7 +28,7 @@ from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, fault_words, shown
 from bisar_budget.paths.earth import Floats, Geodetic, axes_at, earth_fixed_places, geodetic_places
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
-from bisar_budget.paths.instant import DAY, GPS_EPOCH, SCALES, WEEK, Instant, parse_instant
+from bisar_budget.paths.instant import DAY, GPS_EPOCH_DAY, SCALES, WEEK_S, Instant, parse_instant
 from bisar_budget.paths.log_places import (
     NO_KEYS,
     LogKeys,
@@ -322,8 +322,8 @@ def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats,
             lambda i: f"GPS week must be a whole number from 0 to 9999 (got {weeks[i]:g})",
         )
         first = records.first
-        start = Instant(GPS_EPOCH + 7 * int(weeks[first]), 0.0).after(float(counted_s[first]))
-        return (weeks - weeks[first]) * WEEK + (counted_s - counted_s[first]), start, ""
+        start = Instant(GPS_EPOCH_DAY + 7 * int(weeks[first]), 0.0).after(float(counted_s[first]))
+        return (weeks - weeks[first]) * WEEK_S + (counted_s - counted_s[first]), start, ""
     if header.stamp is None:
         return counted_s, None, ""
     minutes, seconds = table.minutes, table.seconds

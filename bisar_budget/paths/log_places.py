@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.paths.earth import Floats, earth_fixed_places
 from bisar_budget.paths.flight import NO_MATRIX, LeftOut, Log, PathFileError
-from bisar_budget.paths.instant import SCALES, TAI_LESS, UNIX_EPOCH, Instant, tai_less_utc, utc
+from bisar_budget.paths.instant import SCALES, TAI_LESS, UNIX_EPOCH_DAY, Instant, tai_less_utc, utc
 from bisar_budget.paths.position_grid import cartesian_grid, geodetic_grid
 from bisar_budget.units import format_quantity
 
@@ -274,7 +274,7 @@ def utc_of(instant: Instant, scale: str) -> Instant:
 def unix_instant(unix_us: int) -> Instant:
     """Instant of UTC from microseconds since 1970-01-01."""
     days, microseconds = divmod(unix_us, 86_400_000_000)
-    return Instant(UNIX_EPOCH + days, microseconds * 1e-6)
+    return Instant(UNIX_EPOCH_DAY + days, microseconds * 1e-6)
 
 
 def scale_words(start: Instant, scale: str) -> str:

@@ -20,7 +20,7 @@ from bisar_budget.paths.ephemeris import (
     velocity_error,
 )
 from bisar_budget.paths.flight import Orbit, PathFileError, Sample
-from bisar_budget.paths.instant import DAY, FIRST_DAY, TAI_LESS, Instant, has_leap_second, tai_less_utc, utc
+from bisar_budget.paths.instant import DAY, FIRST_UTC_DAY, TAI_LESS, Instant, has_leap_second, tai_less_utc, utc
 from bisar_budget.paths.messages import (
     LAST_ORBIT_DAY,
     MessageElement,
@@ -86,8 +86,8 @@ def read_oem(
     """Orbit from an orbit ephemeris message, as every reader of `ORBIT_FORMATS` gives it.
 
     A message that names no interpolation is interpolated by Hermite's polynomial of degree 7 if its velocities agree
-    with its positions, and otherwise by Lagrange's polynomial of degree 7. A polynomial of degree n goes through n + 1
-    samples for Lagrange, and through half that number for Hermite.
+    with its positions, and otherwise by Lagrange's polynomial of degree 7. A polynomial of degree n goes through n +
+    1 samples for Lagrange, and through half that number for Hermite.
 
     `object_name` is an OBJECT_NAME or an OBJECT_ID.
     """
@@ -282,7 +282,7 @@ def _time(line: int, text: str, system: str, name: str) -> Instant:
     longest = 60 + (minute is not None and is_last and system == "UTC" and has_leap_second(minute.day))
     if minute is None or not _SECONDS.fullmatch(seconds) or (past := float(seconds.rstrip("Z"))) >= longest:
         raise PathFileError(f"{name}:{line}: must be a time such as 2026-05-31T10:12:13.123 (got {shown(text)})")
-    if not FIRST_DAY < minute.day < LAST_ORBIT_DAY:
+    if not FIRST_UTC_DAY < minute.day < LAST_ORBIT_DAY:
         raise PathFileError(f"{name}:{line}: times must be after 1972-01-01 and before 2200 (got {shown(text)})")
     # Seconds are added once: adding twice would round twice.
     return minute.after(past + (tai_less_utc(minute.day) if system == "UTC" else TAI_LESS[system]))

@@ -23,7 +23,7 @@ import numpy as np
 from bisar_budget.faults import shown
 from bisar_budget.paths.earth import Floats, Geodetic, axes_at, geodetic_places
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
-from bisar_budget.paths.instant import DAY, GPS_EPOCH, WEEK, Instant, parse_instant
+from bisar_budget.paths.instant import DAY, GPS_EPOCH_DAY, WEEK_S, Instant, parse_instant
 from bisar_budget.paths.log_places import (
     LogKeys,
     LogRecords,
@@ -177,13 +177,13 @@ def _row(text: str, header: _Columns, location: str) -> tuple[int, list[float]]:
         seconds = int(clock[1]) * 3600.0 + int(clock[2]) * 60.0 + float(clock[3])
     else:
         week, second = number_in(cells[0]), number_in(cells[1])
-        if week is None or second is None or week % 1 or not (0 <= week <= 9999 and 0 <= second <= WEEK):
+        if week is None or second is None or week % 1 or not (0 <= week <= 9999 and 0 <= second <= WEEK_S):
             time_text = shown(f"{cells[0]} {cells[1]}")
             raise PathFileError(
                 f"{location}: must begin with a GPS week and its second, like 2421 105619.250 (got {time_text!r})"
             )
         days, seconds = divmod(second, DAY)
-        day = GPS_EPOCH + 7 * int(week) + int(days)
+        day = GPS_EPOCH_DAY + 7 * int(week) + int(days)
     row = [0.0, 0.0]  # instead of the two cells of the time
     for cell in cells[2:]:
         try:

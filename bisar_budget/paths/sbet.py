@@ -27,7 +27,7 @@ from bisar_budget.paths.flight import (
     hold_to_usable_records,
     slow_times,
 )
-from bisar_budget.paths.instant import GPS_EPOCH, WEEK, Instant
+from bisar_budget.paths.instant import GPS_EPOCH_DAY, WEEK_S, Instant
 from bisar_budget.paths.log_places import (
     LogKeys,
     LogRecords,
@@ -38,8 +38,8 @@ from bisar_budget.paths.log_places import (
 )
 
 MAX_SBET_BYTES = 1_000_000_000  # bytes; ten hours at 200 Hz
-_MAX_TIME_S = 2 * WEEK  # a flight over the end of a week may count beyond one week
-_MIN_WEEK_STEP_S = WEEK - 3600  # a longer step back in time is a new week
+_MAX_TIME_S = 2 * WEEK_S  # a flight over the end of a week may count beyond one week
+_MIN_WEEK_STEP_S = WEEK_S - 3600  # a longer step back in time is a new week
 _RIGHT_ANGLE_RAD = math.pi / 2 * (1 + 1e-12)
 _WINDOW_S = 1.0  # for comparing positions and velocities; noise of positions is then less than 0.1 m/s
 _MAX_SPEED_ERROR_MPS = 1.0  # plus a hundredth of the speed; velocities of another frame have a larger error
@@ -104,7 +104,7 @@ class Accuracy:
 
 def of_gps(week: int, seconds: float) -> Instant:
     """Instant of GPS time from a GPS week, not rolled over, and seconds of the week."""
-    return Instant(GPS_EPOCH + 7 * week, 0.0).after(seconds)
+    return Instant(GPS_EPOCH_DAY + 7 * week, 0.0).after(seconds)
 
 
 def is_sbet(data: bytes) -> bool:
@@ -251,7 +251,7 @@ def _over_weeks(times: Floats, records: LogRecords) -> Floats:
     steps = np.diff(usable_times)
     # A step forward by a week ends a wrong time.
     weeks = np.cumsum((steps <= -_MIN_WEEK_STEP_S).astype(np.int64) - (steps >= _MIN_WEEK_STEP_S))
-    rolled = np.concatenate([[0.0], weeks * WEEK])
+    rolled = np.concatenate([[0.0], weeks * WEEK_S])
     continuous = times.copy()
     continuous[usable] = usable_times + rolled
     return continuous

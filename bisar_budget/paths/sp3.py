@@ -25,7 +25,7 @@ from bisar_budget.paths.ephemeris import (
     velocity_error,
 )
 from bisar_budget.paths.flight import Orbit, PathFileError, Sample
-from bisar_budget.paths.instant import FIRST_DAY, TAI_LESS, Instant, parse_instant, tai, tai_less_utc
+from bisar_budget.paths.instant import FIRST_UTC_DAY, TAI_LESS, Instant, parse_instant, tai, tai_less_utc
 from bisar_budget.paths.log_places import counted, most_left_out
 from bisar_budget.paths.messages import LAST_ORBIT_DAY, coordinate_in, decoded, hold_to_size, number_in, object_key
 from bisar_budget.paths.orientation import UNKNOWN, Orientation
@@ -320,7 +320,7 @@ def _epoch(line: str, system: str, location: str) -> Instant:
         minute_start is None
         or seconds is None
         or not 0 <= seconds < 61
-        or not FIRST_DAY < minute_start.day < LAST_ORBIT_DAY
+        or not FIRST_UTC_DAY < minute_start.day < LAST_ORBIT_DAY
     ):
         raise PathFileError(
             f"{location}: must be an epoch such as *  2026  5 31  0 15  0.00000000 (got {shown(line[:40])})"

@@ -16,7 +16,7 @@ from bisar_budget.paths.flight_log import read_csv
 from bisar_budget.paths.instant import Instant, parse_instant
 from bisar_budget.paths.log_places import NO_KEYS, LogKeys, utc_of
 from bisar_budget.paths.path_formats import LOG_FORMATS
-from bisar_budget.paths.sbet import WEEK, of_gps, read_accuracy, read_sbet
+from bisar_budget.paths.sbet import WEEK_S, of_gps, read_accuracy, read_sbet
 from tests.paths.flown import SECOND, START, Flight, flight, geodetic_csv, sbet, smrmsg, stamp
 from tests.paths.flown import WEEK as GPS_WEEK
 
@@ -108,7 +108,7 @@ def test_a_real_flight_has_the_wander_frame() -> None:
         (1930, 18.0, "2017-01-01T00:00:00Z"),
         (1930, 17.5, "2017-01-01T00:00:00.5Z"),
         (2421, 105619.25, "2026-06-01T05:20:01.25Z"),
-        (2421, WEEK + 18, "2026-06-07T00:00:00Z"),
+        (2421, WEEK_S + 18, "2026-06-07T00:00:00Z"),
     ],
 )
 def test_gps_time_is_ahead_of_utc(week: int, second: float, utc: str) -> None:
@@ -124,11 +124,11 @@ def test_leap_seconds_that_nobody_knows_are_said() -> None:
 
 @pytest.mark.parametrize("is_counted_on", [False, True])
 def test_a_week_ends_in_flight(is_counted_on: bool) -> None:
-    times = WEEK - 5 + FLOWN.times
-    data = sbet(FLOWN, time=times if is_counted_on else times % WEEK)
+    times = WEEK_S - 5 + FLOWN.times
+    data = sbet(FLOWN, time=times if is_counted_on else times % WEEK_S)
     log = read_sbet(data, "a.out", LogKeys(GPS_WEEK))
     assert log.times == pytest.approx(FLOWN.times, abs=1e-9)
-    assert log.start == utc_of(of_gps(GPS_WEEK, WEEK - 5), "gps")
+    assert log.start == utc_of(of_gps(GPS_WEEK, WEEK_S - 5), "gps")
     assert read_sbet(data, "a.out", NO_KEYS).times == pytest.approx(times, abs=1e-9)
 
 
