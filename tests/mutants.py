@@ -359,8 +359,8 @@ MUTANTS = (
     Mutant(
         "Monte Carlo: intervals of 90 % called 95 %",
         "bisar_budget/sampling/probability.py",
-        "_QUANTILE = 1.959963984540054 ",
-        "_QUANTILE = 1.6448536269514722 ",
+        "_QUANTILE_SIGMA = 1.959963984540054 ",
+        "_QUANTILE_SIGMA = 1.6448536269514722 ",
         (f"{_SEAMS}test_an_interval_of_95_percent_is_that",),
     ),
     Mutant(
@@ -401,8 +401,8 @@ MUTANTS = (
     Mutant(
         "seam: Monte Carlo counts twice what quadratic and cubic share",
         "bisar_budget/sampling/probability.py",
-        "left = left - np.multiply.outer(column, column)",
-        "left = left + 0 * np.multiply.outer(column, column)",
+        "remaining = remaining - np.multiply.outer(column, column)",
+        "remaining = remaining + 0 * np.multiply.outer(column, column)",
         (f"{_SEAMS}test_what_a_cubic_shares_with_the_quadratic_is_drawn_once",),
     ),
     Mutant(

@@ -1,12 +1,12 @@
-"""Draws of independent errors: what they do together, held to requirements, in pieces that join exactly.
+"""Draws of independent errors: their joint effects, compared with requirements, in pieces that join exactly.
 
-The full model is linear in small errors: a draw then is a sum of standard variables times effects. Where a sample of
+The full model is linear in small errors: a draw is then a sum of standard variables times effects. If a sample of
 draws shows that exact ranges differ, every draw goes through exact ranges.
 
-Draws come in chunks of a fixed size. What is random in a chunk depends on the seed, the name of the variable and the
-number of the chunk alone, so that any process can make it. What a piece gives are counts, and sums of squares that
-join without rounding: whoever made the pieces, and in which order, the result is the same. Memory does not grow with
-the draws.
+Draws come in chunks of a fixed size. The random numbers of a chunk depend only on the seed, the name of the variable
+and the number of the chunk, so that any process can draw it. A piece gives counts, and sums of squares that join
+without rounding. The result is the same for any order of the pieces and any processes. Memory does not grow with the
+number of draws.
 """
 
 import math
@@ -28,45 +28,53 @@ from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Floats, Found, 
 if TYPE_CHECKING:
     from bisar_budget.workers import MapBlocks
 
-# Draws held at once, the same for every number of draws: results depend on the seed alone. All that is summed are
-# a few megabytes and stay in a cache.
-BLOCK = 1 << 15
-CHUNK = 1 << 22  # draws of one stream; a second or so
-EXACT_PIECE = 1 << 18  # of a chunk, which it divides, where each draw goes through exact ranges: as long
-_ORDER = {"m": 0, "m/s": 1, "m/s^2": 2}
-_SAMPLE = 512  # draws that decide whether exact ranges are needed
-_DIFFERENT = 0.01  # of a limit
-_AFTER_BYTES = 256
-_WORTH_COMPILING = 1 << 30  # normal numbers; then Numba saves more seconds than it takes
+# Draws in memory at the same time, equal for every number of draws: results depend on the seed alone. All sums are a
+# few megabytes and stay in a cache.
+BLOCK_DRAWS = 1 << 15
+CHUNK_DRAWS = 1 << 22  # in one stream; they take about a second
+EXACT_PIECE_DRAWS = 1 << 18  # through exact ranges, in about a second too; a divisor of a chunk
+_DERIVATIVE_OF_UNIT = {"m": 0, "m/s": 1, "m/s^2": 2}
+_TRIAL_DRAWS = 512  # decide whether exact ranges are needed
+_LIMIT_FRACTION = 0.01  # largest difference between the linear model and exact ranges, as a fraction of a limit
+_FIRST_CHILD_CODE = 256  # beyond all bytes of a name
+_MIN_COMPILED_DRAWS = 1 << 30  # normal numbers from which Numba saves more seconds than it takes
 
 
 class Variable(NamedTuple):
-    """One standard variable, mean 0 and variance 1, and what it does.
+    """A standard variable, with mean 0 and variance 1, and its effects.
 
-    `of` is the error, or the covariance, that it belongs to. `parts` are the errors it makes, and how much of each
-    [unit]; none where it is noise, which is phases alone. Effects: quadratic and cubic phase at the aperture edge
-    [rad], displacement east and north [m].
+    Attributes
+    ----------
+    id, owner, distribution : str
+        Name, owner and distribution: `normal`, `uniform` or `bound`.
+    of : str
+        The error, or the covariance, to which the variable belongs.
+    sources : tuple
+        Errors that the variable makes, each with its size [unit]; empty for noise, which has effects only.
+    effects : (4,)
+        Quadratic and cubic phase at the aperture edge [rad], displacement east and north [m].
     """
 
     id: str
     of: str
     owner: str
     distribution: str
-    parts: tuple[tuple[ErrorSource, float], ...]
+    sources: tuple[tuple[ErrorSource, float], ...]
     effects: tuple[float, float, float, float]
 
 
 class HeldSum(NamedTuple):
-    """A requirement before the draws: the sum of whose errors, in which effects, is held to which limit.
+    """A requirement before the draws: a limit for the sum of the errors of its owners, in one or two effects.
 
-    The limit of a quadratic phase has the gain of autofocus in it, which corrects nothing of the hidden phase.
+    `columns` are indices of effects: one phase, or east and north. The limit of a quadratic phase includes the gain
+    of autofocus, which does not correct the hidden phase.
     """
 
     id: str
     unit: str
     limit: float
     owners: tuple[str, ...]
-    columns: tuple[int, ...]  # of the effects: one phase, or east and north
+    columns: tuple[int, ...]
     gain: float = 1.0
 
 
@@ -78,9 +86,10 @@ class DrawsPiece(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """All that draws need, so that another process can make pieces of them; `name` is the mission's.
+    """All data for draws, so that another process can draw pieces.
 
-    `is_exact` says that every draw goes through exact ranges, `chunk` how many of them have one stream.
+    `name` is the name of the mission, `is_exact` whether every draw goes through exact ranges, and `chunk` the number
+    of draws in one stream.
     """
 
     name: str
@@ -94,8 +103,8 @@ class Drawing(NamedTuple):
     chunk: int
 
     def pieces(self) -> Iterator[DrawsPiece]:
-        """Cut the draws into pieces, always the same ones; none where they are held to nothing."""
-        size = min(EXACT_PIECE, self.chunk) if self.is_exact else self.chunk
+        """The pieces of the draws, always the same; none without requirements."""
+        size = min(EXACT_PIECE_DRAWS, self.chunk) if self.is_exact else self.chunk
         for start in range(0, self.draws if self.judged else 0, size):
             yield DrawsPiece(start, min(start + size, self.draws))
 
@@ -103,8 +112,16 @@ class Drawing(NamedTuple):
 class Tally(NamedTuple):
     """Counts and sums of squares of one piece.
 
-    For each requirement the draws in which it held, those that have an image, and the sum of squares over these; the
-    draws in which all held.
+    Attributes
+    ----------
+    holds : (requirements,)
+        Number of draws that keep each requirement.
+    imaged : (requirements,)
+        Number of draws with an image.
+    squares : (requirements,)
+        Sum of squares over draws with an image.
+    all_hold : int
+        Number of draws that keep all requirements.
     """
 
     holds: tuple[int, ...]
@@ -117,24 +134,24 @@ def drawing_of(
     analysis: Analysis, variables: Sequence[Variable], judged: Sequence[HeldSum], draws: int, seed: int
 ) -> Drawing:
     """Prepare draws of all variables; a sample decides whether they need exact ranges."""
-    given = (analysis.mission.name, tuple(variables), tuple(judged), analysis.exact, analysis.geometry.both)
-    drawing = Drawing(*given, draws, seed, False, CHUNK)
+    context = (analysis.mission.name, tuple(variables), tuple(judged), analysis.exact, analysis.geometry.both)
+    drawing = Drawing(*context, draws, seed, False, CHUNK_DRAWS)
     is_exact = bool(variables and judged) and _needs_exact_ranges(drawing)
 
     def counts(variable: Variable) -> bool:
-        """Whether it does anything that is judged; each has a stream of its own, so that none misses it."""
-        if is_exact and variable.parts:
-            return any(size for _, size in variable.parts)
-        return any(variable.effects[column] for one in judged for column in one.columns)
+        """Whether a variable affects a requirement. Leaving one out changes no draw: each has its own stream."""
+        if is_exact and variable.sources:
+            return any(size for _, size in variable.sources)
+        return any(variable.effects[column] for requirement in judged for column in requirement.columns)
 
     return drawing._replace(variables=tuple(filter(counts, variables)), is_exact=is_exact)
 
 
 def joined(tallies: Iterable[Tally], count: int) -> tuple[list[int], list[float], int]:
-    """Join what pieces give about so many requirements, in any order: integers, and fractions that do not round.
+    """Join the tallies of pieces, in any order: integers, and fractions that do not round.
 
-    For each requirement the draws in which it held and the mean square, over draws that have an image; the draws in
-    which all held.
+    Returns the number of draws that keep each of `count` requirements, the mean square over draws with an image, and
+    the number of draws that keep all requirements.
     """
     holds, imaged, all_hold = [0] * count, [0] * count, 0
     squares = [Fraction()] * count
@@ -148,7 +165,7 @@ def joined(tallies: Iterable[Tally], count: int) -> tuple[list[int], list[float]
     return holds, means, all_hold
 
 
-Share = Callable[[Drawing], Iterable[tuple[DrawsPiece, Tally]]]  # gives every piece once, in any order
+Share = Callable[[Drawing], Iterable[tuple[DrawsPiece, Tally]]]  # returns every piece once, in any order
 
 
 def in_turn(drawing: Drawing) -> Iterator[tuple[DrawsPiece, Tally]]:
@@ -159,85 +176,101 @@ def in_turn(drawing: Drawing) -> Iterator[tuple[DrawsPiece, Tally]]:
 
 
 def shared_out(drawing: Drawing, mapped: "MapBlocks") -> Iterator[tuple[DrawsPiece, Tally]]:
-    """Have others draw the pieces; gives each when it is done, in any order."""
-    of = f"of {printable(drawing.name)}"
-    return mapped(tally_of, drawing, drawing.pieces(), lambda piece: f"draws {piece.start} to {piece.stop - 1} {of}")
+    """Draw the pieces on workers; yields each when it is done, in any order."""
+    mission_words = f"of {printable(drawing.name)}"
+
+    def about(piece: DrawsPiece) -> str:
+        return f"draws {piece.start} to {piece.stop - 1} {mission_words}"
+
+    return mapped(tally_of, drawing, drawing.pieces(), about)
 
 
 def tally_of(drawing: Drawing, piece: DrawsPiece) -> Tally:
-    """Draw a piece in a process that knows nothing else."""
+    """Draw a piece in another process, without earlier pieces."""
     return Drawer(drawing).tally(piece)
 
 
 class Sums:
-    """Effects of one block of draws, added up: the quadratic phase by owner, all else for the mission.
+    """Sums of the effects of one block of draws: the quadratic phase by owner, all further effects for the mission.
 
-    By owner, if kept: `motion` is position, velocity and acceleration error of both platforms, (2, 3, 3, draws),
-    `tags` their time tags (2, draws), `clock` its coefficients (4, draws), `alone` what is known by its effects only:
-    quadratic and cubic phase, displacement east and north (4, draws). Where it `adds`, `square` can be asked for,
-    where it `keeps_motion`, `exact_square`.
+    `adds` allows `square`, and `keeps_motion` allows `exact_square`.
+
+    Attributes
+    ----------
+    phases, totals : dict
+        Quadratic phase by owner, and all further effects by column, (draws,).
+    motion : dict
+        Position, velocity and acceleration errors of both platforms by owner, (2, 3, 3, draws).
+    tags : dict
+        Time tag errors of both platforms by owner, (2, draws).
+    clock : dict
+        Coefficients of the clock by owner, (4, draws).
+    effects_only : dict
+        Effects of errors without a motion by owner: quadratic and cubic phase, displacement east and north,
+        (4, draws).
     """
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
         self.exact, self.size, self.keeps_motion, self.paths = drawing.exact, size, keeps_motion, drawing.paths
-        wanted = {column for one in drawing.judged for column in one.columns}
+        columns = {column for requirement in drawing.judged for column in requirement.columns}
         self.phases = {variable.owner: np.zeros(size) for variable in drawing.variables} if adds else {}
-        self.totals = {column: np.zeros(size) for column in sorted(wanted - {0})} if adds else {}
+        self.totals = {column: np.zeros(size) for column in sorted(columns - {0})} if adds else {}
         self.motion: dict[str, Floats] = {}
         self.tags: dict[str, Floats] = {}
         self.clock: dict[str, Floats] = {}
-        self.alone: dict[str, Floats] = {}
+        self.effects_only: dict[str, Floats] = {}
         self._exact: dict[tuple[str, ...], Found] = {}
         self._scaled = np.empty(size)
         self._square = np.empty(size)
 
     def clear(self) -> None:
         """Begin another block."""
-        every: list[Mapping[Any, Floats]] = [self.phases, self.totals, self.motion, self.tags, self.clock, self.alone]
-        for kept in every:
-            for one in kept.values():
-                one.fill(0.0)
+        by_owner = (self.motion, self.tags, self.clock, self.effects_only)
+        every: list[Mapping[Any, Floats]] = [self.phases, self.totals, *by_owner]
+        for arrays in every:
+            for array in arrays.values():
+                array.fill(0.0)
         self._exact.clear()
 
-    def add(self, variable: Variable, drawn: Floats) -> None:
+    def add(self, variable: Variable, values: Floats) -> None:
         """Add one variable's draws, (draws,)."""
         if self.phases:
-            for target, column in ((self.phases[variable.owner], 0), *((t, c) for c, t in self.totals.items())):
+            for column, target in {0: self.phases[variable.owner], **self.totals}.items():
                 if variable.effects[column]:
-                    np.multiply(drawn, variable.effects[column], out=self._scaled)
+                    np.multiply(values, variable.effects[column], out=self._scaled)
                     target += self._scaled
         if self.keeps_motion:
-            for source, size in variable.parts:
-                self._add_motion(variable.owner, source, size, drawn)
-            if not variable.parts:
-                self._add_effects(variable.owner, variable.effects, drawn)
+            for source, size in variable.sources:
+                self._add_motion(variable.owner, source, size, values)
+            if not variable.sources:
+                self._add_effects(variable.owner, variable.effects, values)
 
-    def _add_motion(self, owner: str, source: ErrorSource, size: float, drawn: Floats) -> None:
+    def _add_motion(self, owner: str, source: ErrorSource, size: float, values: Floats) -> None:
         if source.is_time_tag:
-            tags = self._kept(self.tags, owner, (2,))
+            tags = self._array_of(self.tags, owner, (2,))
             for platform in source.platforms:
-                tags[platform] += size * drawn
+                tags[platform] += size * values
         elif source.is_position:
-            motion = self._kept(self.motion, owner, (2, 3, 3))
+            motion = self._array_of(self.motion, owner, (2, 3, 3))
             for platform in source.platforms:
                 for axis, component in enumerate(source.direction_of(platform)):
                     if component:
-                        motion[platform, _ORDER[source.unit], axis] += size * component * drawn
+                        motion[platform, _DERIVATIVE_OF_UNIT[source.unit], axis] += size * component * values
         elif source.clock is not None:
-            self._kept(self.clock, owner, (4,))[:] += np.multiply.outer(size * np.array(source.clock), drawn)
+            self._array_of(self.clock, owner, (4,))[:] += np.multiply.outer(size * np.array(source.clock), values)
         else:
-            self._add_effects(owner, (size, 0.0, 0.0, 0.0), drawn)
+            self._add_effects(owner, (size, 0.0, 0.0, 0.0), values)
 
-    def _add_effects(self, owner: str, effects: tuple[float, ...], drawn: Floats) -> None:
-        self._kept(self.alone, owner, (4,))[:] += np.multiply.outer(effects, drawn)
+    def _add_effects(self, owner: str, effects: tuple[float, ...], values: Floats) -> None:
+        self._array_of(self.effects_only, owner, (4,))[:] += np.multiply.outer(effects, values)
 
-    def _kept(self, where: dict[str, Floats], owner: str, shape: tuple[int, ...]) -> Floats:
-        if owner not in where:
-            where[owner] = np.zeros((*shape, self.size))
-        return where[owner]
+    def _array_of(self, arrays: dict[str, Floats], owner: str, shape: tuple[int, ...]) -> Floats:
+        if owner not in arrays:
+            arrays[owner] = np.zeros((*shape, self.size))
+        return arrays[owner]
 
     def square(self, judged: HeldSum) -> Floats:
-        """Square of what a requirement is about, (draws,); it stands until the next is asked for."""
+        """Square of the effect of a requirement, (draws,). The next call overwrites the array."""
         square = self._square
         if judged.columns == (0,):
             square.fill(0.0)
@@ -246,22 +279,22 @@ class Sums:
                     square += phase
             square *= square
             return square
-        first, *others = judged.columns
+        first, *further_columns = judged.columns
         np.multiply(self.totals[first], self.totals[first], out=square)
-        for column in others:
+        for column in further_columns:
             np.multiply(self.totals[column], self.totals[column], out=self._scaled)
             square += self._scaled
         return square
 
     def exact_square(self, judged: HeldSum) -> Floats:
-        """Square of it by exact ranges, (draws,); not a number for a draw without an image."""
+        """Square of the effect of a requirement by exact ranges, (draws,); NaN for a draw without an image."""
         owners = judged.owners
         if owners not in self._exact:
             self._exact[owners] = self._by_exact_ranges(owners)
-        found, alone = self._exact[owners], _sum(self.alone, owners, np.zeros((4, 1)))
-        by_ranges = (found.quadratic, found.cubic, found.east, found.north)
-        square = np.asarray(sum((by_ranges[column] + alone[column]) ** 2 for column in judged.columns))
-        return square + (judged.gain * found.hidden) ** 2 if judged.columns == (0,) else square
+        exact, effects = self._exact[owners], _sum(self.effects_only, owners, np.zeros((4, 1)))
+        by_ranges = (exact.quadratic, exact.cubic, exact.east, exact.north)
+        square = np.asarray(sum((by_ranges[column] + effects[column]) ** 2 for column in judged.columns))
+        return square + (judged.gain * exact.hidden) ** 2 if judged.columns == (0,) else square
 
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> Found:
         times = self.exact.times[:, 0]
@@ -270,30 +303,30 @@ class Sums:
         motion = _sum(self.motion, owners, np.broadcast_to(0.0, (2, 3, 3, self.size)))
         tags = _sum(self.tags, owners, np.broadcast_to(0.0, (2, self.size)))
         clock = _sum(self.clock, owners, np.broadcast_to(0.0, (4, self.size)))
-        shifts: list[Any] = [powers @ one.swapaxes(0, 1) if one.any() else STILL for one in motion]
+        shifts: list[Any] = [powers @ errors.swapaxes(0, 1) if errors.any() else STILL for errors in motion]
         for platform, tag in enumerate(tags):
             if tag.any():
-                late = self.paths[platform].later(times[:, None], tag)
-                shifts[platform] = [one + other for one, other in zip(shifts[platform], late, strict=True)]
+                late_shifts = self.paths[platform].later(times[:, None], tag)
+                shifts[platform] = [shift + late for shift, late in zip(shifts[platform], late_shifts, strict=True)]
         return followed(self.exact, clock_powers @ clock, shifts, np.zeros(self.size, dtype=int))
 
 
-def _sum(parts: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
-    """Sum of the parts of several owners; `nothing` where none has any."""
-    found = [parts[owner] for owner in owners if owner in parts]
-    return sum(found[1:], found[0]) if found else nothing
+def _sum(arrays: Mapping[str, Floats], owners: Sequence[str], zero: Floats) -> Floats:
+    """Sum of the arrays of several owners; `zero` if no owner has an array."""
+    present = [arrays[owner] for owner in owners if owner in arrays]
+    return sum(present[1:], present[0]) if present else zero
 
 
 class Drawer:
-    """Makes pieces of draws; one that follows the last one of its chunk goes on where that ended."""
+    """Draws pieces. A piece that follows the last piece of the same chunk continues its streams."""
 
     def __init__(self, drawing: Drawing) -> None:
         self._drawing = drawing
-        self._chunk, self._at = -1, 0
+        self._chunk, self._position = -1, 0
         self._streams: list[_Stream] = []
         normal = sum(variable.distribution == "normal" for variable in drawing.variables)
-        self._fill_normal = _compiled() if drawing.draws * normal >= _WORTH_COMPILING else _fill_normal
-        self._buffer = np.empty(BLOCK)
+        self._fill_normal = _compiled() if drawing.draws * normal >= _MIN_COMPILED_DRAWS else _fill_normal
+        self._buffer = np.empty(BLOCK_DRAWS)
 
     def tally(self, piece: DrawsPiece) -> Tally:
         """Draw a piece and count."""
@@ -302,61 +335,61 @@ class Drawer:
         count = len(drawing.judged)
         holds, imaged, squares, all_hold = [0] * count, [0] * count, [0.0] * count, 0
         sums: Sums | None = None
-        for start in range(piece.start, piece.stop, BLOCK):
-            size = min(BLOCK, piece.stop - start)
+        for start in range(piece.start, piece.stop, BLOCK_DRAWS):
+            size = min(BLOCK_DRAWS, piece.stop - start)
             if sums is None or sums.size != size:
-                sums = None  # the room of the others
+                sums = None  # frees the memory of the last block
                 sums = Sums(drawing, size, adds=not drawing.is_exact, keeps_motion=drawing.is_exact)
             self._draw(sums)
-            together = np.ones(size, dtype=bool)
-            for index, one in enumerate(drawing.judged):
-                square = sums.exact_square(one) if drawing.is_exact else sums.square(one)
-                # What has no image holds nothing: it is not a number.
-                held = square <= (one.limit * (1 + UTILIZATION_TOLERANCE)) ** 2
-                holds[index] += int(np.count_nonzero(held))
+            holds_all = np.ones(size, dtype=bool)
+            for index, requirement in enumerate(drawing.judged):
+                square = sums.exact_square(requirement) if drawing.is_exact else sums.square(requirement)
+                # A draw without an image keeps no requirement: its square is not a number.
+                is_held = square <= (requirement.limit * (1 + UTILIZATION_TOLERANCE)) ** 2
+                holds[index] += int(np.count_nonzero(is_held))
                 if drawing.is_exact:
                     square = square[np.isfinite(square)]
                 imaged[index] += square.size
                 squares[index] += float(square.sum())
-                together &= held
-            all_hold += int(np.count_nonzero(together))
+                holds_all &= is_held
+            all_hold += int(np.count_nonzero(holds_all))
         return Tally(tuple(holds), tuple(imaged), tuple(squares), all_hold)
 
     def _go_to(self, start: int) -> None:
-        """Have streams of the chunk at a draw."""
+        """Set the streams of a chunk to a draw."""
         chunk = start // self._drawing.chunk
-        if chunk != self._chunk or start < self._at:
-            self._chunk, self._at = chunk, chunk * self._drawing.chunk
+        if chunk != self._chunk or start < self._position:
+            self._chunk, self._position = chunk, chunk * self._drawing.chunk
             self._streams = [
                 _Stream(variable, self._drawing.seed, chunk, self._fill_normal)
                 for variable in self._drawing.variables
             ]
         for stream in self._streams:
-            stream.skip(start - self._at, self._buffer)
-        self._at = start
+            stream.skip(start - self._position, self._buffer)
+        self._position = start
 
     def _draw(self, sums: Sums) -> None:
         sums.clear()
-        drawn = self._buffer[: sums.size]
+        values = self._buffer[: sums.size]
         for variable, stream in zip(self._drawing.variables, self._streams, strict=True):
-            stream.fill(drawn)
-            sums.add(variable, drawn)
-        self._at += sums.size
+            stream.fill(values)
+            sums.add(variable, values)
+        self._position += sums.size
 
 
 def _needs_exact_ranges(drawing: Drawing) -> bool:
-    """Whether exact ranges differ from the linear model in a sample of draws, by more than a part of a limit.
+    """Whether exact ranges differ from the linear model in a sample of draws, by more than a fraction of a limit.
 
-    The linear model has no hidden phase: where band and turn hide more than that part, draws need exact ranges.
+    The linear model has no hidden phase: if band and turn hide more than that fraction, draws need exact ranges.
     """
-    sums = Sums(drawing, _SAMPLE, adds=True, keeps_motion=True)
-    drawn = np.empty(_SAMPLE)
+    sums = Sums(drawing, _TRIAL_DRAWS, adds=True, keeps_motion=True)
+    values = np.empty(_TRIAL_DRAWS)
     for variable in drawing.variables:
-        _Stream(variable, drawing.seed).fill(drawn)
-        sums.add(variable, drawn)
-    for one in drawing.judged:
-        linear, exact = np.sqrt(sums.square(one)), np.sqrt(sums.exact_square(one))
-        if not np.all(np.abs(exact - linear) <= _DIFFERENT * one.limit):
+        _Stream(variable, drawing.seed).fill(values)
+        sums.add(variable, values)
+    for requirement in drawing.judged:
+        linear, exact = np.sqrt(sums.square(requirement)), np.sqrt(sums.exact_square(requirement))
+        if not np.all(np.abs(exact - linear) <= _LIMIT_FRACTION * requirement.limit):
             return True
     return False
 
@@ -367,29 +400,29 @@ def _fill_normal(generator: np.random.Generator, out: Floats) -> None:
 
 @cache
 def _compiled() -> Callable[[np.random.Generator, Floats], None]:
-    """Filling by compiled code, where Numba is there, has room and can keep what it compiles."""
+    """Filling by compiled code, if Numba is installed, has memory and can keep the compiled code."""
     if not is_spacious():
         return _fill_normal
     try:
         from numba import njit
 
-        found: Callable[[np.random.Generator, Floats], None] = njit(cache=True, nogil=True)(_fill_each)
-    except (ImportError, RuntimeError):  # not installed, or nowhere to keep what it compiles
+        compiled: Callable[[np.random.Generator, Floats], None] = njit(cache=True, nogil=True)(_fill_each)
+    except (ImportError, RuntimeError):  # not installed, or without a folder for compiled code
         return _fill_normal
-    return found
+    return compiled
 
 
 def _fill_each(generator: np.random.Generator, out: Floats) -> None:
-    """Fill with normal draws, compiled by Numba: those of NumPy to the last bit, in two thirds of the time."""
+    """Fill with normal draws, compiled by Numba: equal to NumPy's to the last bit, in two thirds of the time."""
     for index in range(out.size):
         out[index] = generator.standard_normal()
 
 
 class _Stream:
-    """Draws of a variable in a chunk. Each has a stream of its own, so that another error in the file changes none.
+    """Draws of a variable in a chunk. Each variable has its own stream, so that a new error changes no stream.
 
-    That of the first chunk is seeded by the seed and the name, those of the others are children of it. What tells a
-    child is no byte of a name: those of one variable are not the streams of another with a longer name.
+    The seed and the name seed the stream of the first chunk. The streams of further chunks are its children. The code
+    of a child is no byte of a name, so that it differs from the stream of a variable with a longer name.
     """
 
     def __init__(
@@ -399,7 +432,7 @@ class _Stream:
         chunk: int = 0,
         fill_normal: Callable[[np.random.Generator, Floats], None] = _fill_normal,
     ) -> None:
-        child = (_AFTER_BYTES + chunk,) if chunk else ()
+        child = (_FIRST_CHILD_CODE + chunk,) if chunk else ()
         self._bits = np.random.PCG64(np.random.SeedSequence([seed, *variable.id.encode()], spawn_key=child))
         self._generator = np.random.Generator(self._bits)
         self._distribution, self._fill_normal = variable.distribution, fill_normal
@@ -413,11 +446,11 @@ class _Stream:
         out -= 0.5
         if self._distribution == "uniform":
             out *= math.sqrt(12)
-        else:  # a bound: as often below zero as not
+        else:  # a bound, of either sign with equal probability
             np.copysign(1.0, out, out=out)
 
     def skip(self, count: int, buffer: Floats) -> None:
-        """Go past so many draws: normal ones take as many random numbers as it happens, the others one each."""
+        """Skip draws. A normal draw takes a random count of random numbers, and any further draw takes one."""
         if self._distribution != "normal":
             self._bits.advance(count)
             return
@@ -426,20 +459,20 @@ class _Stream:
 
 
 # ---------------------------------------------------------------------- eigenvectors
-_SWEEPS = 30  # of a Jacobi method: convergence is quadratic, a 6 x 6 takes about five
+_MAX_JACOBI_ROUNDS = 30  # convergence is quadratic; a 6 x 6 matrix takes about five
 
 
 def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[list[float]]]:
     """Eigenvalues of a symmetric matrix (n, n) and, as columns, its unit eigenvectors, in no order.
 
-    By Jacobi's rotations. Of equal eigenvalues LAPACK takes other vectors than these, and a seed would draw others.
+    By Jacobi's rotations. For equal eigenvalues LAPACK has different vectors, and a seed would give different draws.
     """
     n = len(matrix)
     a = [list(row) for row in matrix]
     v = [[float(i == j) for j in range(n)] for i in range(n)]
-    # Below this an element moves no eigenvalue by more than rounding does.
+    # A smaller element moves an eigenvalue by less than rounding.
     negligible = 1e-17 * max((abs(x) for row in a for x in row), default=0.0)
-    for _ in range(_SWEEPS):
+    for _ in range(_MAX_JACOBI_ROUNDS):
         is_done = True
         for p in range(n - 1):
             for q in range(p + 1, n):

@@ -1,12 +1,12 @@
-"""Monte Carlo: errors drawn from their declared distributions, and how often each requirement then holds.
+"""Monte Carlo: draws of errors from their declared distributions, and the probability that each requirement holds.
 
-The referee of root-sum-square and worst case. All declared errors are drawn at once, their effects by the full model
-add, and the magnitude of the sum is held to the requirement. Of small errors a draw is a sum of standard variables
-times effects, of large ones it goes through exact ranges (`draws`); a covariance is six variables, along the axes of
-its correlation matrix.
+It is the referee of root-sum-square and worst case. All declared errors are drawn together, their effects by the full
+model add, and the magnitude of the sum is compared with the requirement. For small errors a draw is a sum of standard
+variables times effects, for large errors it goes through exact ranges (`draws`). A covariance is six variables, along
+the axes of its correlation matrix.
 
-Draws come from the distributions themselves: the coverage factor, which makes bounds of sigmas, has no part in them.
-Vibration is not drawn: its amplitude is declared and its limits are those of echoes.
+Draws come from the distributions themselves, without the coverage factor, which turns sigmas into bounds. Vibration
+is not drawn: its amplitude is declared, and its limits are limits of echoes.
 """
 
 import math
@@ -28,16 +28,15 @@ from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.phrases import Note
 from bisar_budget.sampling.draws import HeldSum, Share, Variable, drawing_of, eigensystem, in_turn, joined
 
-CONFIDENCE = 0.95
-DOMINANT = 0.5  # of the variance: beyond, a sum has the shape of that one error, whatever the others are
-_QUANTILE = 1.959963984540054  # of the standard normal at 97.5 %
-_SURE_QUANTILE = 3.2905267314919255  # at 99.95 %: a warning is not to be chance
-_MATERIAL = 0.1  # of the probability to fail: a difference that is sure but smaller changes nobody's mind
-
-_DIGITS = 9  # of sampled sigmas: further ones differ between processors, and mean nothing
-_PARTS = ("", ".cubic", ".east", ".north")  # variables of a random error, beside its quadratic phase
-_NOTHING_LEFT = 1e-12  # of a variance: what rounding leaves of one that others account for
-_ANGLES = 4096  # of a mean over a circle of a smooth function
+CONFIDENCE_PROBABILITY = 0.95
+DOMINANT_VARIANCE_FRACTION = 0.5  # with more of the variance in one error, the sum has the shape of that error
+_QUANTILE_SIGMA = 1.959963984540054  # of the standard normal at 97.5 %
+_SURE_QUANTILE_SIGMA = 3.2905267314919255  # at 99.95 %, so that no warning comes by chance
+_MATERIAL_FRACTION = 0.1  # of the probability to fail; a smaller difference does not matter
+_SIGMA_DIGITS = 9  # of sampled sigmas; further digits differ between processors
+_NOISE_SUFFIXES = ("", ".cubic", ".east", ".north")  # of the variables of a random error: quadratic phase and more
+_ROUNDING_FRACTION = 1e-12  # of a variance: rounding, after earlier variables explain all of it
+_ANGLE_STEPS = 4096  # in the mean of a smooth function over a circle
 
 
 def monte_carlo(
@@ -51,11 +50,11 @@ def monte_carlo(
     Parameters
     ----------
     draws : int
-        From 1 to `MAX_DRAWS`; memory does not grow with it.
+        Number of draws, from 1 to `MAX_DRAWS`. Memory does not grow with it.
     seed : int, optional
         None: `simulation.seed` of the file. The same seed gives the same result.
     share : callable, optional
-        Makes the pieces of the draws; None: one after the other, here. The result does not depend on who makes them.
+        Draws the pieces; None: one after the other, in this process. The result is the same for every `share`.
 
     Raises
     ------
@@ -75,14 +74,14 @@ def monte_carlo(
     holds, mean_squares, all_hold = joined((tally for _, tally in (share or in_turn)(drawing)), len(judged))
     predictions = _Predictions(analysis, variables)
     requirements = tuple(
-        _requirement(*one, draws, predictions) for one in zip(judged, holds, mean_squares, strict=True)
+        _requirement(*figures, draws, predictions) for figures in zip(judged, holds, mean_squares, strict=True)
     )
-    low, high = _wilson(all_hold, draws, _QUANTILE) if judged else (None, None)
+    low, high = _wilson(all_hold, draws, _QUANTILE_SIGMA) if judged else (None, None)
     return MonteCarlo(
         draws=draws,
         seed=seed,
         model="full",
-        confidence=CONFIDENCE,
+        confidence=CONFIDENCE_PROBABILITY,
         requirements=requirements,
         probability=all_hold / draws if judged else None,
         probability_low=low,
@@ -95,16 +94,16 @@ def monte_carlo(
 def _variables(analysis: Analysis) -> Iterator[Variable]:
     mission, full = analysis.mission, analysis.full
     factor = mission.allocation.coverage_factor
-    left = {source.id: source for source in analysis.stated}
+    remaining = {source.id: source for source in analysis.stated}
     for group in analysis.groups:
-        members = [left.pop(row_id) for row_id in group.ids]
+        members = [remaining.pop(row_id) for row_id in group.ids]
         values, vectors = eigensystem(group.correlation)
         for index, value in enumerate(values):
             # To six decimals a correlation matrix may have an eigenvalue just below zero.
             scale = math.sqrt(max(0.0, value)) / factor
-            parts = [(s, (s.declared or 0.0) * vectors[i][index] * scale) for i, s in enumerate(members)]
-            yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", parts, full)
-    for source in left.values():
+            sources = [(s, (s.declared or 0.0) * vectors[i][index] * scale) for i, s in enumerate(members)]
+            yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", sources, full)
+    for source in remaining.values():
         distribution = distribution_of(mission, source)
         size = abs(source.declared or 0.0) / (factor if source.is_covered else 1.0)
         if distribution == "uniform":
@@ -115,73 +114,74 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
 
 
 def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
-    """Variables of a sensor, a clock or the air: its quadratic phase and what goes with it, the cubic with the rest…
+    """Variables of a sensor, a clock or the air.
 
-    They are columns of the Cholesky root of its covariance of phases and displacement. An effect from elsewhere is a
-    bound: a phase of either sign, a displacement of its length.
+    They are the columns of the Cholesky root of its covariance of phases and displacement: the quadratic phase with
+    the correlated share of all effects, then the cubic phase with the remaining share, and so on. An error that is
+    not covered is a bound: a phase of either sign, a displacement of its length.
     """
     if not error.declared or error.full.covariance is None or error.counted_in:
         return
-    size = error.declared / (factor if error.is_covered else 1.0)  # that of an oscillator is in its effects
+    size = error.declared / (factor if error.is_covered else 1.0)  # for an oscillator, the factor is in its effects
     distribution = "normal" if error.is_covered else "bound"
-    left = np.array(error.full.covariance) * size**2
-    scale = np.diagonal(left).copy()
-    for place, part in enumerate(_PARTS):
-        if left[place, place] <= _NOTHING_LEFT * scale[place]:
+    remaining = np.array(error.full.covariance) * size**2
+    scale = np.diagonal(remaining).copy()
+    for index, suffix in enumerate(_NOISE_SUFFIXES):
+        if remaining[index, index] <= _ROUNDING_FRACTION * scale[index]:
             continue
-        column = left[:, place] / math.sqrt(left[place, place])
-        left = left - np.multiply.outer(column, column)
-        yield Variable(f"{error.id}{part}", error.id, error.owner, distribution, (), tuple(column.tolist()))
+        column = remaining[:, index] / math.sqrt(remaining[index, index])
+        remaining = remaining - np.multiply.outer(column, column)
+        yield Variable(f"{error.id}{suffix}", error.id, error.owner, distribution, (), tuple(column.tolist()))
 
 
 def _variable(
-    id: str, of: str, owner: str, distribution: str, parts: Sequence[tuple[ErrorSource, float]], full: Model
+    id: str, of: str, owner: str, distribution: str, sources: Sequence[tuple[ErrorSource, float]], full: Model
 ) -> Variable:
-    moves = [full.displacement(source.full, size) or (0.0, 0.0) for source, size in parts]
+    moves = [full.displacement(source.full, size) or (0.0, 0.0) for source, size in sources]
     effects = (
-        math.fsum(source.full.qpe * size for source, size in parts),
-        math.fsum(source.full.cubic * size for source, size in parts),
+        math.fsum(source.full.qpe * size for source, size in sources),
+        math.fsum(source.full.cubic * size for source, size in sources),
         math.fsum(move[0] for move in moves),
         math.fsum(move[1] for move in moves),
     )
-    return Variable(id, of, owner, distribution, tuple(parts), effects)
+    return Variable(id, of, owner, distribution, tuple(sources), effects)
 
 
 def _requirements(
     mission: Mission, allocation: Allocation, variables: Sequence[Variable], *, is_placed: bool
 ) -> Iterator[HeldSum]:
-    """Requirements of `check` that declared errors count against; the location where it is known (`is_placed`)."""
+    """Requirements of `check` for declared errors. The location needs `is_placed`: a known displacement."""
     present = {variable.owner for variable in variables}
-    every = ("transmitter", "receiver", "clock", "mission")
-    wanted = {
+    all_owners = ("transmitter", "receiver", "clock", "mission")
+    owners_of_sums = {
         "transmitter": ("transmitter",),
         "receiver": ("receiver",) if allocation.qpe.clock is not None else ("receiver", "clock"),
         "timing": ("clock",) if allocation.qpe.clock is not None else (),
-        "mission": every,
+        "mission": all_owners,
     }
-    for name, owners in wanted.items():
+    for name, owners in owners_of_sums.items():
         if present.intersection(owners):
             limit = allocation.qpe_allowed("clock" if name == "timing" else name)
             yield HeldSum(f"{name}.quadratic_phase_error", "rad", limit, owners, (0,), allocation.autofocus_gain)
     cubic, location = mission.requirements.cubic_phase_error, mission.requirements.location_error
-    moves = any(source.is_motion for variable in variables for source, _ in variable.parts)
+    moves = any(source.is_motion for variable in variables for source, _ in variable.sources)
     displaces = moves or any(variable.effects[2] or variable.effects[3] for variable in variables)
     if cubic is not None and (moves or any(variable.effects[1] for variable in variables)):
-        yield HeldSum("mission.cubic_phase_error", "rad", cubic, every, (1,))
+        yield HeldSum("mission.cubic_phase_error", "rad", cubic, all_owners, (1,))
     if location is not None and displaces and is_placed:
-        yield HeldSum("mission.location_error", "m", location, every, (2, 3))
+        yield HeldSum("mission.location_error", "m", location, all_owners, (2, 3))
 
 
 class _Predictions:
-    """Figures without draws: combinations by the rules of `check`, standard uncertainties, a normal distribution."""
+    """Figures without draws: combinations by the rules of `check`, standard uncertainties, normal probabilities."""
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
         self.together = Together(analysis.errors, "full", (), (), analysis.random, analysis.groups)
         self.variables = variables
 
     def combined(self, judged: HeldSum, rule: str) -> float | None:
-        """Size that a rule of `allocation.combine` holds to the limit, coverage factor included; None: no image."""
-        members = [one for one in self.together.phases if one.owner in judged.owners]
+        """Sum by a rule of `allocation.combine`, with the coverage factor; None without an image."""
+        members = [error for error in self.together.phases if error.owner in judged.owners]
         if judged.columns == (0,):
             size = self.together.combined(quadratics(members), rule)
         elif judged.columns == (1,):
@@ -191,23 +191,23 @@ class _Predictions:
         return float(size[0]) if math.isfinite(size[0]) else None
 
     def variances(self, judged: HeldSum) -> dict[str, float]:
-        """Variance that each error, or each covariance, brings."""
-        found: dict[str, float] = {}
+        """Variance by error, or by covariance."""
+        variances: dict[str, float] = {}
         for variable in self.variables:
             if variable.owner in judged.owners:
                 square = math.fsum(variable.effects[column] ** 2 for column in judged.columns)
-                found[variable.of] = found.get(variable.of, 0.0) + square
-        return found
+                variances[variable.of] = variances.get(variable.of, 0.0) + square
+        return variances
 
     def is_normal(self, name: str) -> bool:
-        """Whether an error has a normal distribution; a covariance, which is no single variable, always has."""
-        return all(v.distribution == "normal" for v in self.variables if v.of == name)
+        """Whether an error has a normal distribution. A covariance always has, although it is several variables."""
+        return all(variable.distribution == "normal" for variable in self.variables if variable.of == name)
 
     def probability_normal(self, judged: HeldSum) -> float:
         """Probability that a normal distribution with these variances stays within the limit."""
         members = [variable.effects for variable in self.variables if variable.owner in judged.owners]
         a, b = judged.columns[0], judged.columns[-1]
-        xx, yy, xy = (math.fsum(one[i] * one[j] for one in members) for i, j in ((a, a), (b, b), (a, b)))
+        xx, yy, xy = (math.fsum(effects[i] * effects[j] for effects in members) for i, j in ((a, a), (b, b), (a, b)))
         if len(judged.columns) == 2:
             return _within(judged.limit, xx, yy, xy)
         return math.erf(judged.limit / math.sqrt(2 * xx)) if xx else 1.0
@@ -225,15 +225,15 @@ def _within(radius: float, xx: float, yy: float, xy: float) -> float:
     if not large:
         return 1.0
     total = 0.0
-    for step in range(_ANGLES):
-        angle = math.pi * (step + 0.5) / _ANGLES
+    for step in range(_ANGLE_STEPS):
+        angle = math.pi * (step + 0.5) / _ANGLE_STEPS
         square = large * math.cos(angle) ** 2 + small * math.sin(angle) ** 2
         total += math.exp(-(radius**2) / (2 * square)) if square else 0.0
-    return 1 - total / _ANGLES
+    return 1 - total / _ANGLE_STEPS
 
 
 def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
-    """Confidence interval of a probability by Wilson's score: closed, and right for 0 and for all of few draws."""
+    """Confidence interval of a probability by Wilson's score: closed, and correct for 0 or all of a few draws."""
     p, z = successes / draws, quantile
     middle = p + z**2 / (2 * draws)
     half = z * math.sqrt(p * (1 - p) / draws + (z / (2 * draws)) ** 2)
@@ -247,15 +247,15 @@ def _requirement(
     variances = predictions.variances(judged)
     variance = math.fsum(variances.values())
     dominant = max(variances, key=lambda name: variances[name])
-    low, high = _wilson(holds, draws, _QUANTILE)
-    found = Requirement(
+    low, high = _wilson(holds, draws, _QUANTILE_SIGMA)
+    requirement = Requirement(
         id=judged.id,
         unit=judged.unit,
         limit=judged.limit,
         sum=predictions.combined(judged, "sum"),
         rss=predictions.combined(judged, "rss"),
         sigma_rss=math.sqrt(variance),
-        sigma=float(f"{math.sqrt(mean_square):.{_DIGITS}g}") if math.isfinite(mean_square) else None,
+        sigma=float(f"{math.sqrt(mean_square):.{_SIGMA_DIGITS}g}") if math.isfinite(mean_square) else None,
         probability=holds / draws,
         probability_low=low,
         probability_high=high,
@@ -264,21 +264,22 @@ def _requirement(
         dominant_share=variances[dominant] / variance if variance else 0.0,
         warnings=(),
     )
-    return found._replace(warnings=tuple(_doubts(found, holds, draws, predictions)))
+    return requirement._replace(warnings=tuple(_doubts(requirement, holds, draws, predictions)))
 
 
-def _doubts(found: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
-    """Say where root-sum-square and the normal distribution do not describe the sum."""
-    # A covariance, which is no single variable, is always normal.
-    if found.dominant_share > DOMINANT and not predictions.is_normal(found.dominant):
+def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
+    """Warnings for a sum that root-sum-square or the normal distribution does not describe."""
+    # A covariance is always normal, although it is several variables.
+    if requirement.dominant_share > DOMINANT_VARIANCE_FRACTION and not predictions.is_normal(requirement.dominant):
         yield (
-            f"{found.dominant}, which is not normal, has {100 * found.dominant_share:.3g} % of the variance: the "
-            "sum has its shape, and no multiple of sigma is the bound it would be of a normal distribution"
+            f"{requirement.dominant}, which is not normal, has {100 * requirement.dominant_share:.3g} % of the "
+            "variance: the sum has its shape, and no multiple of sigma is the bound it would be of a normal "
+            "distribution"
         )
-    low, high = _wilson(holds, draws, _SURE_QUANTILE)
-    normal, drawn = found.probability_normal, found.probability
+    low, high = _wilson(holds, draws, _SURE_QUANTILE_SIGMA)
+    normal, drawn = requirement.probability_normal, requirement.probability
     fails = max(1 - normal, 1 - drawn)
-    if not low <= normal <= high and abs(normal - drawn) > _MATERIAL * fails:
+    if not low <= normal <= high and abs(normal - drawn) > _MATERIAL_FRACTION * fails:
         kind = "optimistic" if normal > drawn else "pessimistic"
         yield (
             f"root-sum-square is {kind}: a normal distribution would fail in {100 * (1 - normal):.3g} %, the draws "
@@ -287,7 +288,7 @@ def _doubts(found: Requirement, holds: int, draws: int, predictions: _Prediction
 
 
 def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: bool) -> Iterator[Note]:
-    """Say what is drawn by a rule of ours, and what is not drawn."""
+    """Notes on errors that are drawn by a rule of this program, and on errors that are not drawn."""
     if is_exact:
         yield phrases.drawn_through_exact_ranges()
     if mission.gating_model != "full":
@@ -299,7 +300,7 @@ def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: b
     if bounds:
         yield phrases.drawn_as_bounds(bounds)
     vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
-    if analysis.displacing_tones or any(one.wideband for one in vibrations):
+    if analysis.displacing_tones or any(vibration.wideband for vibration in vibrations):
         yield phrases.vibration_is_not_drawn()
     if mission.requirements.location_error is not None and not is_placed:
         undriven = clocks_without_oscillator(mission)
