@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterator
 from random import Random
 
-from bisar_budget.paths.earth import EQUATORIAL_RADIUS, FLATTENING
+from bisar_budget.paths.earth import EQUATORIAL_RADIUS_M, FLATTENING
 from bisar_budget.paths.instant import parse_instant
 
 SEED = 20260710
@@ -55,8 +55,8 @@ def lines() -> Iterator[str]:
     assert middle is not None
     gusts = [turbulence(random, sigma) for sigma in GUSTS]
     eccentricity_squared = FLATTENING * (2 - FLATTENING)
-    across = EQUATORIAL_RADIUS / math.sqrt(1 - eccentricity_squared * math.sin(LATITUDE) ** 2)
-    along = across**3 * (1 - eccentricity_squared) / EQUATORIAL_RADIUS**2
+    across = EQUATORIAL_RADIUS_M / math.sqrt(1 - eccentricity_squared * math.sin(LATITUDE) ** 2)
+    along = across**3 * (1 - eccentricity_squared) / EQUATORIAL_RADIUS_M**2
     yield from COMMENT.splitlines()
     yield "utc,latitude [deg],longitude [deg],height [m]"
     for n in range(DURATION * RATE + 1):

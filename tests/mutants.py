@@ -371,8 +371,8 @@ MUTANTS = (
     Mutant(
         "Monte Carlo: intervals of 90 % called 95 %",
         "bisar_budget/sampling/probability.py",
-        "_QUANTILE = 1.959963984540054 ",
-        "_QUANTILE = 1.6448536269514722 ",
+        "_QUANTILE_SIGMA = 1.959963984540054 ",
+        "_QUANTILE_SIGMA = 1.6448536269514722 ",
         (f"{_SEAMS}test_an_interval_of_95_percent_is_that",),
     ),
     Mutant(

@@ -1,7 +1,8 @@
-"""Parts of a sweep that are done: a Parquet data set, one file for each block of cases, of one question.
+"""Finished parts of a sweep: a Parquet data set for one question, with a file for each block of cases.
 
-Each file says in its metadata which question it answers, and is written beside its name and renamed: what is there is
-whole. Values are those of the engine, in SI; the table that was asked for is written from them in the end.
+Each file states its question in its metadata. It is written under a temporary name and then renamed, so that every
+part is complete. Values are the values of the engine, in SI. The table of the command is written from them at the
+end.
 """
 
 import json
@@ -24,53 +25,53 @@ from bisar_budget.memory import hold_room
 from bisar_budget.resources import locked
 
 Question = Mapping[str, str]
-_NAME = re.compile(r"part-\d{12}\.parquet", re.ASCII)
+_PART_NAME = re.compile(r"part-\d{12}\.parquet", re.ASCII)
 
 
 def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
-    """Refuse an option without its libraries; a `MemoryError` says that there is no room for them. [B]"""
+    """Refuse an option without its libraries; raises `MemoryError` if they do not fit into `room`. [B]"""
     hold_room(room, option)
     try:
         for module in modules:
             import_module(module)
     except ImportError as error:
-        message = f"{option} needs {error.name}, which is not installed; {install_command(extra)} brings it"
-        raise ClusterError(message) from None
+        problem = f"{option} needs {error.name}, which is not installed; {install_command(extra)} brings it"
+        raise ClusterError(problem) from None
 
 
 def question_of(asked: Asked) -> Question:
-    """All that decides the values of parts, by the words that a message has for it: equal ones can be mixed."""
-    question, swept = asked.travelling, asked.swept(iter(()))
-    waives = bool(asked.table.mission.waivers)  # the day decides about waivers alone
+    """All inputs that decide the values of parts, by their words in messages. Parts of equal questions can mix."""
+    question, sweep = asked.travelling, asked.swept(iter(()))
+    has_waivers = bool(asked.table.mission.waivers)  # only waivers depend on the day
     return {
         "the version of bisar-budget was": __version__,
-        "the hash of the mission file was": swept.mission_sha256[:16],
+        "the hash of the mission file was": sweep.mission_sha256[:16],
         "the hash of what the mission names was": question.named.sha256[:16] if question.named else "",
         "--set was": changes_words(question.changes),
         "the model that decides was": asked.table.mission.gating_model,
-        "--date was": question.today.isoformat() if waives else "",
-        "the cases were": f"{asked.cases.count} of {', '.join(swept.varied)}",
+        "--date was": question.today.isoformat() if has_waivers else "",
+        "the cases were": f"{asked.cases.count} of {', '.join(sweep.varied)}",
         "the hash of the values of the cases was": _hash_of(asked.cases)[:16],
         "the size of the parts was": str(asked.chunks.size),
-        "the columns were": ", ".join(column.name for column in swept.columns),
+        "the columns were": ", ".join(column.name for column in sweep.columns),
     }
 
 
 def _hash_of(cases: Cases) -> str:
-    """SHA-256 of what the cases are made from: the values of each key."""
-    whole = sha256(repr((cases.is_grid, cases.shape)).encode())
+    """SHA-256 of the values of each key, from which the cases are made."""
+    digest = sha256(repr((cases.is_grid, cases.shape)).encode())
     for values in cases.columns:
         is_words = values.dtype == object
-        whole.update(json.dumps(values.tolist()).encode() if is_words else np.ascontiguousarray(values, "<f8").data)
-    return whole.hexdigest()
+        digest.update(json.dumps(values.tolist()).encode() if is_words else np.ascontiguousarray(values, "<f8").data)
+    return digest.hexdigest()
 
 
 @contextmanager
 def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: bool) -> "Iterator[PartsFolder]":
-    """Give a folder to this command alone, to go on from what is there or, where not `is_resumed`, to begin in.
+    """Lock a folder for this command, to continue from its parts if `is_resumed`, or else to begin without parts.
 
-    A `ClusterError` says that parts are there and should not be, or are of another question; that the folder cannot
-    be written, or that another command has it.
+    Raises `ClusterError` if there are parts without `is_resumed`, or parts of another question, if the folder cannot
+    be written, or if another command has it.
     """
     with ExitStack() as ends:
         try:
@@ -78,7 +79,7 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
             if (lock := locked(os.path.realpath(path))) is not None:
                 ends.callback(os.close, lock)
                 for name in os.listdir(path):
-                    if name.startswith(".part-"):  # a command that was killed was writing it
+                    if name.startswith(".part-"):  # from a killed command
                         os.unlink(os.path.join(path, name))
             folder = PartsFolder(path, question)
             folder.find(chunks, is_resumed)
@@ -90,63 +91,71 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
 
 
 class PartsFolder:
-    """The parts of one question; `done` are the first cases of those that are there and whole."""
+    """The parts of a question; `done` are the first cases of finished parts."""
 
     def __init__(self, path: str, question: Question) -> None:
         self.path, self.question, self.done = path, question, set[int]()
 
     def find(self, chunks: Chunks, is_resumed: bool) -> None:
-        """Look which parts are there; refuses those of another question, and all where none should be there."""
+        """Find the finished parts. Parts of another question are refused, and all parts without `is_resumed`."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        other: Question | None = None
-        for name in filter(_NAME.fullmatch, os.listdir(self.path)):
+        other_question: Question | None = None
+        for name in filter(_PART_NAME.fullmatch, os.listdir(self.path)):
             if not is_resumed:
                 raise ClusterError(
                     f"{self.path} has parts of a sweep that was not finished; accepted: --resume to go on from them, "
                     "or remove the folder"
                 )
             start = int(name[5:17])
-            # A pipe would be waited for, and a device never ends.
+            # Reading a pipe would wait, and a device never ends.
             if start in self.done or not os.path.isfile(self._file(start)):
                 continue
-            # A machine stopped, its disk without it.
+            # A part may be damaged if the machine stopped before its disk was written.
             with suppress(OSError, TypeError, ValueError, pa.ArrowException):
-                found = pq.read_metadata(self._file(start))
-                said = found.metadata or {}
-                question, of = dict(json.loads(said.get(b"question", b"{}"))), int(said.get(b"start", -1))
+                part_metadata = pq.read_metadata(self._file(start))
+                entries = part_metadata.metadata or {}
+                question = dict(json.loads(entries.get(b"question", b"{}")))
+                cases = int(entries.get(b"start", -1)), part_metadata.num_rows
                 if question != self.question:
-                    other = question
-                elif start in chunks.starts and (of, found.num_rows) == (start, chunks.stop(start) - start):
+                    other_question = question
+                elif start in chunks.starts and cases == (start, chunks.stop(start) - start):
                     self.done.add(start)
-        if other is not None and not self.done:
-            words = ((one, other.get(one) or "not there", new or "not there") for one, new in self.question.items())
-            differ = "; ".join(f"{one} {old}, and now {new}" for one, old, new in words if old != new)
-            raise ClusterError(f"{self.path} is of another sweep: {differ}")
+        if other_question is not None and not self.done:
+            values = (
+                (key, other_question.get(key) or "not there", new_value or "not there")
+                for key, new_value in self.question.items()
+            )
+            differences = "; ".join(
+                f"{key} {old_value}, and now {new_value}"
+                for key, old_value, new_value in values
+                if old_value != new_value
+            )
+            raise ClusterError(f"{self.path} is of another sweep: {differences}")
 
-    def put(self, sweep_part: Part) -> None:
-        """Keep a part; a `ClusterError` says that it cannot be written."""
+    def put(self, part: Part) -> None:
+        """Write a part; raises `ClusterError` if it cannot be written."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        metadata = {"question": json.dumps(self.question), "start": str(sweep_part.start)}
-        kinds = {name: pa.string() if values.dtype == object else None for name, values in sweep_part.values.items()}
-        table = pa.table({name: pa.array(values, kinds[name]) for name, values in sweep_part.values.items()})
+        metadata = {"question": json.dumps(self.question), "start": str(part.start)}
+        kinds = {name: pa.string() if values.dtype == object else None for name, values in part.values.items()}
+        table = pa.table({name: pa.array(values, kinds[name]) for name, values in part.values.items()})
         temporary = os.path.join(self.path, f".part-{os.getpid()}")
         try:
             with open(temporary, "wb") as file:
                 pq.write_table(table.replace_schema_metadata(metadata), file, write_page_checksum=True)
-            os.replace(temporary, self._file(sweep_part.start))
+            os.replace(temporary, self._file(part.start))
         except OSError as error:
             raise ClusterError(f"cannot write {self.path}: {error.strerror or error}") from None
         finally:
             with suppress(OSError):
                 os.unlink(temporary)
-        self.done.add(sweep_part.start)
+        self.done.add(part.start)
 
     def parts(self, starts: Iterable[int]) -> Iterator[Part]:
-        """Read parts in this order; a `ClusterError` says that one cannot be read, and then it is not kept."""
+        """Read parts in the order of `starts`; raises `ClusterError` for an unreadable part, and removes it."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -156,16 +165,16 @@ class PartsFolder:
                 table = pq.ParquetFile(file, page_checksum_verification=True).read(use_threads=False)
                 values = {name: table.column(name).to_numpy() for name in table.column_names}
             except (OSError, KeyError, ValueError, pa.ArrowException) as error:
-                if getattr(error, "errno", None) is None:  # what it holds is at fault, not the system
+                if getattr(error, "errno", None) is None:  # the content is at fault, not the system
                     self.done.discard(start)
                     with suppress(OSError):
                         os.unlink(file)
-                message = f"{file} cannot be read: {error}; the same command with --resume goes on"
-                raise ClusterError(message) from None
+                problem = f"{file} cannot be read: {error}; the same command with --resume goes on"
+                raise ClusterError(problem) from None
             yield Part(start, start + table.num_rows, values)
 
     def remove(self) -> None:
-        """Take away what is done with; what else somebody put there stays."""
+        """Remove all parts, and the folder if it is then empty."""
         with suppress(OSError):
             for name in os.listdir(self.path):
                 if name.startswith(("part-", ".part-")):

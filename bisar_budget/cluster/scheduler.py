@@ -1,8 +1,8 @@
-"""The workers of a Dask scheduler, which call a function with what is common and with each of many blocks.
+"""The workers of a Dask scheduler. They call a function with common data and with each of many blocks.
 
-A block is some cases of a sweep, some draws of a Monte Carlo, or a row to verify. What is common, such as the mission
-with all that it names, goes to a worker once. Dask gives the blocks of a worker that is lost to others. A worker
-needs bisar-budget of the same version, nothing else.
+A block is a number of cases of a sweep, a number of draws of a Monte Carlo, or a row to verify. Common data, such as
+the mission with its files, go to a worker once. Dask gives the blocks of a lost worker to further workers. A worker
+only needs the same version of bisar-budget.
 """
 
 import asyncio
@@ -30,55 +30,56 @@ from bisar_budget.memory import OF_CLUSTER
 
 _ADDRESS = re.compile(r"(?:tcp|tls)://\S+:\d{1,5}", re.ASCII)
 _LOCAL = re.compile(r"local:([1-9]\d{0,2})", re.ASCII)
-_ACCEPTED = "accepted: tcp://HOST:PORT, tls://HOST:PORT, or local:N for N processes here"
-_CONNECTION = 5.0  # s for a connection
-_LOOK = 5.0  # s between two looks at who works
-_FETCH = 20.0  # s for what came of a block; then it is looked who works
-_AHEAD = 4  # blocks for each thread of a worker that are given out at once
-_LEAST_AHEAD = 32
+_ACCEPTED_ADDRESSES = "accepted: tcp://HOST:PORT, tls://HOST:PORT, or local:N for N processes here"
+_CONNECTION_TIMEOUT_S = 5.0
+_LOOK_PERIOD_S = 5.0  # between two counts of the workers
+_FETCH_TIMEOUT_S = 20.0  # for the result of a block; then the workers are counted
+_BLOCKS_PER_THREAD = 4  # submitted ahead for each thread of a worker
+_MIN_PENDING_BLOCKS_COUNT = 32
 
 
 @contextmanager
 def connected(address: str, patience: float, tell: Callable[[str], None]) -> "Iterator[Workers]":
-    """Give the workers of a scheduler; `local:N` starts N here, and ends them.
+    """Connect to the workers of a scheduler. `local:N` starts N workers on this machine, and ends them.
 
-    `patience` is how long it may have no worker before it is given up [s]; `tell` takes what somebody who waits is to
-    know. A `ClusterError` says that it cannot be reached, has no worker, or one with another version of bisar-budget,
-    a `MemoryError` that there is no room for its libraries.
+    `patience` is the longest time without a worker [s]. `tell` takes messages for a waiting user. Raises
+    `ClusterError` if the scheduler cannot be reached, has no worker, or has a worker with another version of
+    bisar-budget. Raises `MemoryError` if there is no memory for its libraries.
     """
     local = _LOCAL.fullmatch(address)
     if not (local or _ADDRESS.fullmatch(address)):
-        raise ClusterError(f"--scheduler {printable(address)}: is no scheduler; {_ACCEPTED}")
+        raise ClusterError(f"--scheduler {printable(address)}: is no scheduler; {_ACCEPTED_ADDRESSES}")
     check_libraries("--scheduler", OF_CLUSTER, "cluster", "distributed", "pyarrow")
     from distributed import Client
 
     with ExitStack() as ends:
         ends.callback(logging.disable, logging.root.manager.disable)
-        logging.disable(logging.CRITICAL)  # what matters of what Dask logs is said here
+        logging.disable(logging.CRITICAL)  # messages of this module replace the log of Dask
         try:
             if not local:
                 _greet(address)
             cluster = _local_cluster(int(local[1]), ends) if local else address
-            client: Any = Client(cluster, timeout=_CONNECTION, set_as_default=False)
+            client: Any = Client(cluster, timeout=_CONNECTION_TIMEOUT_S, set_as_default=False)
         except Exception as error:
-            reason = f"no answer within {_CONNECTION:g} s" if isinstance(error, TimeoutError) else _first_line(error)
-            raise ClusterError(f"--scheduler {address}: cannot be reached: {reason}") from None
+            timeout_words = f"no answer within {_CONNECTION_TIMEOUT_S:g} s"
+            problem = timeout_words if isinstance(error, TimeoutError) else _first_line(error)
+            raise ClusterError(f"--scheduler {address}: cannot be reached: {problem}") from None
         ends.callback(_close, client, 2)
-        client.loop.asyncio_loop.set_exception_handler(lambda *_: None)  # it would write of what is given up
+        client.loop.asyncio_loop.set_exception_handler(lambda *_: None)  # it would report cancelled work
         workers = Workers(client, address, patience, tell)
         workers.look()
-        # By a function of Python's own, which a worker of any version has.
+        # With a function of Python's library, which a worker of any version has.
         versions = client.run(pydoc.locate, "bisar_budget.__version__", on_error="return")
         for worker, version in sorted(versions.items()):
             if version != __version__:
-                raise ClusterError(f"--scheduler {address}: {_unlike(worker, version, __version__)}")
+                raise ClusterError(f"--scheduler {address}: {_version_problem(worker, version, __version__)}")
         yield workers
 
 
 def _local_cluster(count: int, ends: ExitStack) -> Any:
-    """Start a scheduler and workers here; `ends` closes them.
+    """Start a scheduler and workers on this machine; `ends` closes them.
 
-    A thread does it, which Ctrl-C does not stop half way: half of a cluster cannot be closed.
+    A thread starts them, because Ctrl-C does not interrupt a thread: an incomplete cluster could not be closed.
     """
     from distributed import LocalCluster
 
@@ -86,46 +87,46 @@ def _local_cluster(count: int, ends: ExitStack) -> Any:
         cluster = LocalCluster(
             n_workers=count,
             threads_per_worker=1,
-            dashboard_address="127.0.0.1:0",  # a port of its own: without one all would want 8787
+            dashboard_address="127.0.0.1:0",  # a free port; by default all clusters would want 8787
             silence_logs=logging.CRITICAL + 1,
             preload=[__name__],
         )
         ends.callback(_close, cluster, 10)
         return cluster
 
-    resource_tracker.ensure_running()  # else that thread would: it unblocks the signal there
+    resource_tracker.ensure_running()  # otherwise the thread would start it, and unblock the signal there
     with ThreadPoolExecutor(1, initializer=_block_interrupts) as starter:
         return starter.submit(started).result()
 
 
 def _block_interrupts() -> None:
     """Block Ctrl-C in this thread and in the workers that it starts, before they could ignore it."""
-    if hasattr(signal, "pthread_sigmask"):  # Windows has none
+    if hasattr(signal, "pthread_sigmask"):  # not on Windows
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def dask_setup(worker: object) -> None:
-    """Leave Ctrl-C, which a terminal sends to every process, to the command; Dask calls this in workers of here."""
+    """Ignore Ctrl-C, which a terminal sends to every process, in a worker of a local cluster. Dask calls this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _close(opened: Any, seconds: float) -> None:
-    with suppress(Exception):  # what is left of it ends with this process
+    with suppress(Exception):  # anything still open ends with this process
         opened.close(timeout=seconds)
 
 
 def _greet(address: str) -> None:
-    """Raise what is wrong with an address before a client tries it, which takes longer and knows less."""
+    """Raise the fault of an address before a client tries it, which would take longer and know less."""
     from distributed.core import rpc
     from distributed.security import Security
 
     url = urlsplit(address)
-    socket.create_connection((url.hostname or "", url.port or 0), timeout=_CONNECTION).close()
+    socket.create_connection((url.hostname or "", url.port or 0), timeout=_CONNECTION_TIMEOUT_S).close()
 
     async def identity() -> Any:
         secured = Security().get_connection_args("client")
-        async with rpc(address, timeout=_CONNECTION, connection_args=secured) as scheduler:
-            return await asyncio.wait_for(scheduler.identity(), _CONNECTION)
+        async with rpc(address, timeout=_CONNECTION_TIMEOUT_S, connection_args=secured) as scheduler:
+            return await asyncio.wait_for(scheduler.identity(), _CONNECTION_TIMEOUT_S)
 
     try:
         kind = asyncio.run(identity())["type"]
@@ -137,7 +138,7 @@ def _greet(address: str) -> None:
 
 @dataclass
 class Workers:
-    """Workers of a scheduler; `threads` is how many they had at the last look."""
+    """Workers of a scheduler; `threads` is the number of their threads at the last count."""
 
     client: Any
     address: str
@@ -146,8 +147,8 @@ class Workers:
     threads: int = 0
 
     def look(self) -> None:
-        """Look who works; where nobody does, wait for a worker, and raise a `ClusterError` where none comes."""
-        with suppress(Exception):  # a scheduler that is gone: the blocks say so
+        """Count the threads of the workers. Without workers wait for one; raises `ClusterError` if none comes."""
+        with suppress(Exception):  # the blocks report a lost scheduler
             self.threads = sum(self.client.nthreads().values())
         if self.threads:
             return
@@ -166,14 +167,14 @@ class Workers:
     def mapped(
         self, function: Callable[[Any, Any], Any], common: Any, blocks: Iterable[Any], about: Callable[[Any], str]
     ) -> Iterator[tuple[Any, Any]]:
-        """Have workers call `function(common, block)`; gives each block with what came of it, in any order.
+        """Call `function(common, block)` on workers; yields each block and its result, in any order.
 
-        `about` says of a block what it is, for messages. Few blocks are given out ahead. A `ClusterError` says that
-        the scheduler went away, or all workers, that a block ended every worker that had it, or that one cannot do
-        it; a `RuntimeError` what the function raised, and where.
+        `about` names a block in messages. Only a few blocks are submitted ahead. Raises `ClusterError` if the
+        scheduler or all workers went away, if a block ended every worker that had it, or if a worker cannot do a
+        block. Raises `RuntimeError` if the function raised an error.
         """
         finished: SimpleQueue[Any] = SimpleQueue()
-        # A task gives what is common, not the client: Dask makes it again where a worker that has it is lost.
+        # A task makes the common data, not the client: Dask makes them again if a worker with them is lost.
         shared = self.client.submit(pickle.loads, pickle.dumps(common), pure=False)
         pending: dict[str, tuple[Any, Any]] = {}
         remaining, next_look = iter(blocks), 0.0
@@ -181,9 +182,9 @@ class Workers:
             while True:
                 if monotonic() >= next_look:
                     self.look()
-                    next_look = monotonic() + _LOOK
-                ahead = max(_LEAST_AHEAD, _AHEAD * self.threads)
-                for block in islice(remaining, max(0, ahead - len(pending))):
+                    next_look = monotonic() + _LOOK_PERIOD_S
+                max_pending = max(_MIN_PENDING_BLOCKS_COUNT, _BLOCKS_PER_THREAD * self.threads)
+                for block in islice(remaining, max(0, max_pending - len(pending))):
                     future = self.client.submit(_called, __version__, function, shared, block, pure=False)
                     pending[future.key] = future, block
                     future.add_done_callback(finished.put)
@@ -191,11 +192,11 @@ class Workers:
                     return
                 with suppress(Empty):
                     future = finished.get(timeout=max(next_look - monotonic(), 0.05))
-                    try:  # Dask makes again what a worker took with it between done and fetched
-                        result = future.result(timeout=_FETCH)
+                    try:  # Dask repeats a block whose worker is lost between its end and the fetch
+                        result = future.result(timeout=_FETCH_TIMEOUT_S)
                     except Exception as error:
                         if future.status == "error":
-                            raise _why(future.exception(), about(pending[future.key][1])) from None
+                            raise _fault_of_block(future.exception(), about(pending[future.key][1])) from None
                         if not isinstance(error, TimeoutError):  # cancelled, with the connection
                             raise self._gone() from error
                         finished.put(future)
@@ -210,37 +211,35 @@ class Workers:
 
 
 def _called(version: str, function: Callable[[Any, Any], Any], common: Any, block: Any) -> Any:
-    """Do a block on a worker; one that came after the others were asked may have another version."""
+    """Do a block on a worker. A worker that came after the check of versions may have another version."""
     from distributed import get_worker
 
-    here = get_worker().address
+    worker = get_worker().address
     if version != __version__:
-        raise ClusterError(_unlike(here, __version__, version))
+        raise ClusterError(_version_problem(worker, __version__, version))
     try:
         return function(common, block)
     except MissionError as error:
-        raise ClusterError(f"worker {here} cannot use the mission: {'; '.join(error.lines())}") from None
+        raise ClusterError(f"worker {worker} cannot use the mission: {'; '.join(error.lines())}") from None
 
 
-def _unlike(worker: str, installed_version: object, version: str) -> str:
-    has = (
-        f"bisar-budget {installed_version}"
-        if isinstance(installed_version, str)
-        else "no bisar-budget that can be imported"
-    )
-    return f"worker {worker} has {has}; accepted: {version}, as here"
+def _version_problem(worker: str, worker_version: object, version: str) -> str:
+    is_installed = isinstance(worker_version, str)
+    installed = f"bisar-budget {worker_version}" if is_installed else "no bisar-budget that can be imported"
+    return f"worker {worker} has {installed}; accepted: {version}, as here"
 
 
-def _why(error: BaseException, about: str) -> Exception:
-    """Words for the fault of a block that failed."""
+def _fault_of_block(error: BaseException, about: str) -> Exception:
+    """The error of a block that failed, with its message."""
     from distributed.scheduler import KilledWorker
 
-    if isinstance(error, ClusterError):  # the worker is not like this process
+    if isinstance(error, ClusterError):  # another version, or an unusable mission
         return ClusterError(f"{about}: {error}")
     if isinstance(error, KilledWorker):
-        last = error.last_worker.address
+        last_worker = error.last_worker.address
         return ClusterError(
-            f"{about} ended {error.allowed_failures + 1} workers, the last of them {last}, as when memory runs out"
+            f"{about} ended {error.allowed_failures + 1} workers, the last of them {last_worker}, as when "
+            "memory runs out"
         )
     message = f"{about}, on a worker: {type(error).__name__}: {_first_line(error)}"
     return (ClusterError if isinstance(error, ImportError | MemoryError) else RuntimeError)(message)

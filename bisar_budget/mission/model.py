@@ -46,7 +46,7 @@ from bisar_budget.mission.readers import (
 )
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at
 from bisar_budget.paths.instant import Instant
-from bisar_budget.paths.orientation import FARTHEST_POLE, FARTHEST_UT1, UNKNOWN, Orientation
+from bisar_budget.paths.orientation import MAX_POLE_RAD, MAX_UT1_S, UNKNOWN, Orientation
 from bisar_budget.units import format_quantity
 
 if TYPE_CHECKING:
@@ -128,14 +128,14 @@ class Scene(NamedTuple):
 PLACE_KEYS = ("latitude", "longitude", "height")
 
 _ACCEPTED_ORIENTATIONS = "accepted: ut1_minus_utc, with or without polar_motion_x and polar_motion_y; or file"
-_POLE = Quantity(units.ANGLE, ge=-FARTHEST_POLE, le=FARTHEST_POLE)
+_POLE = Quantity(units.ANGLE, ge=-MAX_POLE_RAD, le=MAX_POLE_RAD)
 
 
 class EarthOrientation(NamedTuple):
     """UT1 - UTC and polar motion in the middle of the aperture; orbits in axes of the stars need them."""
 
     ut1_minus_utc: Annotated[
-        float | None, Key(Quantity(units.TIME, ge=-FARTHEST_UT1, le=FARTHEST_UT1), "IERS, Bulletin A or B.")
+        float | None, Key(Quantity(units.TIME, ge=-MAX_UT1_S, le=MAX_UT1_S), "IERS, Bulletin A or B.")
     ] = None
     polar_motion_x: Annotated[float | None, Key(_POLE, "Of the pole, towards Greenwich.")] = None
     polar_motion_y: Annotated[float | None, Key(_POLE, "Of the pole, towards 90 deg west.")] = None

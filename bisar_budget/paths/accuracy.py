@@ -1,7 +1,7 @@
-"""The accuracy that the source of a path states of itself: covariances, sigmas, and figures without a direction.
+"""The accuracy that the source of a path states: covariances, sigmas, and figures without a direction.
 
-A covariance of an ephemeris is known at epochs of its own. In the orbit's axes (radial, in-track, cross-track) it
-changes little from one epoch to the next: there it is interpolated, and turned to the Earth where the path is flown.
+An ephemeris states covariances at epochs. In the orbit's axes (radial, in-track, cross-track) a covariance changes
+little from one epoch to the next. It is interpolated in these axes, and then turned to the Earth.
 """
 
 import math
@@ -18,19 +18,27 @@ from bisar_budget.paths.instant import Instant, utc
 Matrix = tuple[tuple[float, ...], ...]
 
 LOCAL_AXES = ("RTN", "TNW")  # of an orbit; other names of CCSDS for the same axes are in `local_axes`
-_EQUAL = 1e-6  # relative, of variances that turning axes leaves alike
-_ROUNDED_EIGENVALUE = 1e-4  # of the largest: so far below zero, a matrix has been written with few digits
-_SAME_AXES = {"RSW": "RTN", "RIC": "RTN", "QSW": "RTN"}
-_SUFFIXES = ("_INERTIAL", "_ROTATING")
+_EQUAL_VARIANCE_FRACTION = 1e-6  # difference of equal variances after a turn of axes
+_ROUNDED_EIGENVALUE_FRACTION = 1e-4  # of the largest; a matrix with few digits may have one this far below 0
+_AXES_SYNONYMS = {"RSW": "RTN", "RIC": "RTN", "QSW": "RTN"}
+_AXES_SUFFIXES = ("_INERTIAL", "_ROTATING")
 _VELOCITY_STEP_S = 0.5
 
 
 class StatedAccuracy(NamedTuple):
-    """The error that the source of a path states of itself, one sigma.
+    """The one-sigma error that the source of a path states.
 
-    `covariance` is that of the position (3, 3) [m²], or of position and velocity (6, 6) [m², m²/s, m²/s²], along the
-    axes of the Earth or of a scene. A source that names no direction has a `total` instead [m]: in whatever direction
-    the error is. A typical figure is usual for what the source says of itself, and stated by nobody.
+    Attributes
+    ----------
+    words : str
+        The statement in reports.
+    covariance : (3, 3) or (6, 6), optional
+        Covariance of the position [m²], or of position and velocity [m², m²/s, m²/s²], along the axes of the Earth or
+        of a scene.
+    total : float
+        Error without a direction, from a source without covariance. [m]
+    is_typical : bool
+        Whether the figure is not stated, but usual for the quality that the source states.
     """
 
     words: str
@@ -40,7 +48,7 @@ class StatedAccuracy(NamedTuple):
 
     @property
     def position_m(self) -> float:
-        """Root-sum-square of the position error over its axes, or what the source states without a direction. [m]"""
+        """Root-sum-square of the position error over its axes, or the error without a direction. [m]"""
         variances = (
             [row[axis] for axis, row in enumerate(self.covariance[:3])] if self.covariance else [self.total**2]
         )
@@ -50,8 +58,9 @@ class StatedAccuracy(NamedTuple):
 class PathNoise(NamedTuple):
     """The error of a path by the noise of its log, as polynomials of slow time over the aperture.
 
-    `modes` (modes, orders, 3) are coefficients of slow time to the power 0, 1, …: errors of one sigma each along one
-    axis of the scene, independent of each other [m], [m/s], …. What errs faster than order 8 is left out.
+    `modes` (modes, orders, 3) are coefficients of slow time to the power 0, 1, … [m], [m/s], …. Each mode is an error
+    of one sigma along one axis of the scene, and is independent of all further modes. Errors beyond order 8 are left
+    out.
     """
 
     modes: tuple[tuple[Vector, ...], ...]
@@ -72,7 +81,7 @@ def as_rows(values: Floats) -> Matrix:
 
 
 def diagonal(variances: Sequence[float]) -> Matrix:
-    """Covariance of errors that are independent."""
+    """Covariance of independent errors."""
     return as_matrix(np.diag(np.asarray(variances, dtype=float)))
 
 
@@ -83,27 +92,27 @@ def block_turned(covariance: Floats, axes: Floats) -> Floats:
 
 
 def correlations(covariance: Floats) -> Matrix:
-    """Correlation matrix of a covariance; an error without a variance is correlated with none."""
+    """Correlation matrix of a covariance. An error without variance has no correlation."""
     sigmas = np.sqrt(np.diag(covariance))
     scale = np.where(sigmas > 0, sigmas, 1.0)
-    found = covariance / np.outer(scale, scale)
-    np.fill_diagonal(found, 1.0)
-    return as_matrix(found)
+    matrix = covariance / np.outer(scale, scale)
+    np.fill_diagonal(matrix, 1.0)
+    return as_matrix(matrix)
 
 
 def covering_sigmas(covariance: Floats) -> Vector:
-    """Sigmas of independent errors that have, in no direction, less variance than a covariance (3, 3). [m], [m/s]
+    """Sigmas of independent errors with at least the variance of a covariance (3, 3) in every direction. [m], [m/s]
 
-    They are its own sigmas where these are independent, and up to √3 times as large where they are not.
+    For independent errors they are the sigmas of the covariance, and otherwise up to √3 times as large.
     """
     largest = float(np.linalg.eigvalsh(np.array(correlations(covariance)))[-1])
-    factor = math.sqrt(largest) if largest > 1 + _EQUAL else 1.0
+    factor = math.sqrt(largest) if largest > 1 + _EQUAL_VARIANCE_FRACTION else 1.0
     x, y, z = (factor * np.sqrt(np.diag(covariance))).tolist()
     return (x, y, z)
 
 
 def held_to_covariance(values: Floats) -> Floats:
-    """The nearest covariance to numbers that rounding has left a little beside one.
+    """The nearest covariance to a matrix that is not quite a covariance because of rounding.
 
     Raises
     ------
@@ -116,18 +125,18 @@ def held_to_covariance(values: Floats) -> Floats:
     sigmas = np.sqrt(variances)
     scale = np.where(sigmas > 0, sigmas, 1.0)
     sizes, directions = np.linalg.eigh(values / np.outer(scale, scale))
-    if sizes[0] < -_ROUNDED_EIGENVALUE * max(float(sizes[-1]), 1.0):
+    if sizes[0] < -_ROUNDED_EIGENVALUE_FRACTION * max(float(sizes[-1]), 1.0):
         raise CovarianceError("is not positive semi-definite: no error has such a covariance")
-    held = (directions * np.maximum(sizes, 0.0)) @ directions.T
-    return np.asarray(held * np.outer(scale, scale))
+    correlation = (directions * np.maximum(sizes, 0.0)) @ directions.T
+    return np.asarray(correlation * np.outer(scale, scale))
 
 
 # ---------------------------------------------------------------------- covariances of an orbit
 def local_axes(name: str) -> str | None:
-    """`RTN` or `TNW` of a name of CCSDS for axes that turn with an orbit; None for other names."""
-    for suffix in _SUFFIXES:
+    """`RTN` or `TNW` from a name of CCSDS for axes that turn with an orbit; None for any further name."""
+    for suffix in _AXES_SUFFIXES:
         name = name.removesuffix(suffix)
-    name = _SAME_AXES.get(name, name)
+    name = _AXES_SYNONYMS.get(name, name)
     return name if name in LOCAL_AXES else None
 
 
@@ -135,8 +144,8 @@ def local_axes(name: str) -> str | None:
 class EpochCovariance:
     """Covariance (6, 6) of position and velocity at an epoch of TAI. [m², m²/s, m²/s²]
 
-    `axes` are `RTN` or `TNW`, `earth` for axes that are fixed to the Earth, or `stars` for axes that `turn` takes to
-    the Earth. None: axes that are not known, of which only the total counts.
+    `axes` are `RTN` or `TNW`, `earth` for axes that are fixed to the Earth, or `stars` for axes that `turn` turns to
+    the Earth. None means unknown axes: then only the total variance counts.
     """
 
     epoch: Instant
@@ -146,36 +155,36 @@ class EpochCovariance:
 
 
 class OrbitState(NamedTuple):
-    """Place and velocity against the stars, along the axes of the Earth. [m], [m/s]"""
+    """Position, and velocity against the stars, along the axes of the Earth. [m], [m/s]"""
 
-    place: Vector
+    position: Vector
     velocity: Vector
 
     def axes(self, name: str) -> Floats:
         """Rows of `RTN` (radial, in-track, cross-track) or `TNW` (along the velocity, in-plane, cross-track)."""
-        place, velocity = np.array(self.place), np.array(self.velocity)
-        across = np.cross(place, velocity)
+        position, velocity = np.array(self.position), np.array(self.velocity)
+        across = np.cross(position, velocity)
         across /= np.linalg.norm(across)
-        first = (place if name == "RTN" else velocity) / np.linalg.norm(place if name == "RTN" else velocity)
+        first = (position if name == "RTN" else velocity) / np.linalg.norm(position if name == "RTN" else velocity)
         return np.array((first, np.cross(across, first), across))
 
 
-def state_of(place: Callable[[Instant], Vector], instant: Instant, span: tuple[Instant, Instant]) -> OrbitState:
-    """State of an orbit from its Earth-fixed places near an instant of a span, by a central difference."""
+def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: tuple[Instant, Instant]) -> OrbitState:
+    """State of an orbit from its Earth-fixed positions near an instant of a span, by a central difference."""
     first = max(instant.after(-_VELOCITY_STEP_S), span[0])
     last = min(instant.after(_VELOCITY_STEP_S), span[1])
-    before, here, after = (np.array(place(time)) for time in (first, instant, last))
-    moved = (after - before) / last.since(first)
-    against_stars = moved + np.cross((0.0, 0.0, ROTATION_RATE), here)
-    (x, y, z), (u, v, w) = here.tolist(), against_stars.tolist()
+    position_before, position, position_after = (np.array(position_at(time)) for time in (first, instant, last))
+    velocity = (position_after - position_before) / last.since(first)
+    against_stars = velocity + np.cross((0.0, 0.0, ROTATION_RATE), position)
+    (x, y, z), (u, v, w) = position.tolist(), against_stars.tolist()
     return OrbitState((x, y, z), (u, v, w))
 
 
 def _turning(sign: float) -> Floats:
-    """Change of place and velocity (6, 6) by the Earth's rotation: to a velocity against the stars, or back."""
-    found = np.eye(6)
-    found[3:, :3] = sign * ROTATION_RATE * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    return found
+    """Matrix (6, 6) that adds the Earth's rotation to velocities (sign 1), or removes it (sign -1)."""
+    matrix = np.eye(6)
+    matrix[3:, :3] = sign * ROTATION_RATE * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    return matrix
 
 
 def stated_of_orbit(
@@ -186,45 +195,46 @@ def stated_of_orbit(
 ) -> StatedAccuracy | None:
     """Accuracy that the covariances of an ephemeris state at an instant of its span, along the axes of the Earth.
 
-    Between two epochs it is linear, in the orbit's axes; outside them that of the nearest epoch. None where there is
-    no covariance, or where it is zero, which states nothing.
+    Between two epochs the covariance is interpolated linearly in the orbit's axes. Outside all epochs the nearest
+    epoch counts. None without a covariance; a covariance of zero counts as missing.
     """
-    known = sorted((one for one in covariances if np.trace(one.values[:3, :3]) > 0), key=lambda one: one.epoch)
-    if not known:
+    nonzero = (covariance for covariance in covariances if np.trace(covariance.values[:3, :3]) > 0)
+    stated = sorted(nonzero, key=lambda covariance: covariance.epoch)
+    if not stated:
         return None
-    epochs = [utc(one.epoch) for one in known]
+    epochs = [utc(covariance.epoch) for covariance in stated]
     after = sum(instant.since(epoch) >= 0 for epoch in epochs)
-    near = sorted({max(after - 1, 0), min(after, len(known) - 1)})
-    words = f"covariance{'s' * (len(near) > 1)} of {' and '.join(epochs[index].as_text() for index in near)}"
-    if any(known[index].axes is None for index in near):
-        total = max(math.sqrt(float(np.trace(known[index].values[:3, :3]))) for index in near)
+    nearest = sorted({max(after - 1, 0), min(after, len(stated) - 1)})
+    words = f"covariance{'s' * (len(nearest) > 1)} of {' and '.join(epochs[index].as_text() for index in nearest)}"
+    if any(stated[index].axes is None for index in nearest):
+        total = max(math.sqrt(float(np.trace(stated[index].values[:3, :3]))) for index in nearest)
         return StatedAccuracy(f"{words}, in axes that are not known", total=total)
 
     def along_orbit(index: int) -> Floats:
-        own = min(max(epochs[index], span[0]), span[1])
-        return _along_orbit(known[index], state_of(place, own, span), own)
+        time = min(max(epochs[index], span[0]), span[1])
+        return _covariance_along_orbit(stated[index], state_of(place, time, span), time)
 
-    parts = [along_orbit(index) for index in near]
-    if len(near) > 1:
-        first, last = (epochs[index] for index in near)
-        share = instant.since(first) / max(last.since(first), 1e-9)
-        values = (1 - share) * parts[0] + share * parts[1]
+    at_epochs = [along_orbit(index) for index in nearest]
+    if len(nearest) > 1:
+        first, last = (epochs[index] for index in nearest)
+        fraction = instant.since(first) / max(last.since(first), 1e-9)
+        interpolated = (1 - fraction) * at_epochs[0] + fraction * at_epochs[1]
     else:
-        values = parts[0]
-    here = state_of(place, instant, span)
-    along_stars = block_turned(values, here.axes("RTN").T)
+        interpolated = at_epochs[0]
+    state = state_of(place, instant, span)
+    along_stars = block_turned(interpolated, state.axes("RTN").T)
     back = _turning(-1.0)
     return StatedAccuracy(words, as_matrix(back @ along_stars @ back.T))
 
 
-def _along_orbit(one: EpochCovariance, state: OrbitState, instant: Instant) -> Floats:
-    """A covariance along radial, in-track and cross-track, of a velocity against the stars."""
-    if one.axes in LOCAL_AXES:
-        fixed = block_turned(one.values, state.axes(one.axes).T)
-    elif one.turn is not None:
-        ends = np.array([one.turn(axis, instant) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))])
-        fixed = block_turned(one.values, ends.T)
+def _covariance_along_orbit(covariance: EpochCovariance, state: OrbitState, instant: Instant) -> Floats:
+    """A covariance along radial, in-track and cross-track, for a velocity against the stars."""
+    if covariance.axes in LOCAL_AXES:
+        fixed = block_turned(covariance.values, state.axes(covariance.axes).T)
+    elif covariance.turn is not None:
+        turned_axes = [covariance.turn(axis, instant) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+        fixed = block_turned(covariance.values, np.array(turned_axes).T)
     else:
         turning = _turning(1.0)
-        fixed = turning @ one.values @ turning.T
+        fixed = turning @ covariance.values @ turning.T
     return block_turned(fixed, state.axes("RTN"))

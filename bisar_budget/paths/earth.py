@@ -1,4 +1,4 @@
-"""The Earth as WGS-84 has it: geodetic places, and the axes of a scene on it.
+"""The Earth by WGS-84: geodetic coordinates, and the axes of a scene on the ground.
 
 Earth-fixed axes: x through Greenwich on the equator, z through the north pole. [m]
 """
@@ -16,16 +16,15 @@ from bisar_budget.geometry import Axes, Vector, cross, dot, unit
 Floats = NDArray[np.float64]
 
 # NGA.STND.0036, table 3.1
-EQUATORIAL_RADIUS = 6378137.0  # m
+EQUATORIAL_RADIUS_M = 6378137.0  # m
 FLATTENING = 1 / 298.257223563
 ROTATION_RATE = 7.292115e-5  # rad/s
 _ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
-_STEPS = 4
-_SETTLED = 1e-15  # rad; a metre on the ground is 1.6e-7
-
+_RUNGE_KUTTA_STEPS = 4
+_MAX_CHANGE_RAD = 1e-15  # a metre on the ground is 1.6e-7
 
 # Gravitation: GM of the same standard, and J₂ = −√5·C̄₂₀ of EGM2008, a thousandth at the equator.
-FLATTENED = 1.08263e-3
+J2_FACTOR = 1.08263e-3
 
 
 class Geodetic(NamedTuple):
@@ -38,18 +37,18 @@ class Geodetic(NamedTuple):
 
 @dataclass(frozen=True)
 class SceneAxes:
-    """East, north and up at a place, and the place itself, in Earth-fixed axes."""
+    """East, north and up at an origin, and the origin itself, in Earth-fixed axes."""
 
     origin: Vector
     axes: Axes
 
     def place(self, earth_fixed: Vector) -> Vector:
-        """A place in the scene's axes. [m]"""
+        """A position in the scene's axes. [m]"""
         x, y, z = earth_fixed
         return self.turned((x - self.origin[0], y - self.origin[1], z - self.origin[2]))
 
     def places(self, earth_fixed: Floats) -> Floats:
-        """Places (n, 3) in the scene's axes. [m]"""
+        """Positions (n, 3) in the scene's axes. [m]"""
         turned: Floats = (earth_fixed - np.array(self.origin)) @ np.array(self.axes).T
         return turned
 
@@ -58,9 +57,9 @@ class SceneAxes:
         east, north, up = self.axes
         return (dot(east, earth_fixed), dot(north, earth_fixed), dot(up, earth_fixed))
 
-    def earth_fixed(self, place: Vector) -> Vector:
-        """A place of the scene in Earth-fixed axes. [m]"""
-        x, y, z = self.turned_back(place)
+    def earth_fixed(self, position: Vector) -> Vector:
+        """A position in the scene in Earth-fixed axes. [m]"""
+        x, y, z = self.turned_back(position)
         return (x + self.origin[0], y + self.origin[1], z + self.origin[2])
 
     def turned_back(self, vector: Vector) -> Vector:
@@ -68,14 +67,14 @@ class SceneAxes:
         x, y, z = (dot(axis, vector) for axis in zip(*self.axes, strict=True))
         return (x, y, z)
 
-    def radial(self, place: Vector, velocity: Vector) -> Axes:
+    def radial(self, position: Vector, velocity: Vector) -> Axes:
         """Axes of the `ric` frame of a platform, in the scene's axes.
 
-        Radial: away from the Earth's centre. Cross-track: normal of the plane that holds the velocity against the
-        stars, v + ω×r. In-track completes them, and is not quite the velocity on an eccentric orbit (CCSDS 502.0-B,
-        RTN).
+        Radial: away from the Earth's centre. Cross-track: normal of the plane of the position and of the velocity
+        against the stars, v + ω×r. In-track completes them, and differs slightly from the velocity on an eccentric
+        orbit (CCSDS 502.0-B, RTN).
         """
-        r = self.earth_fixed(place)
+        r = self.earth_fixed(position)
         x, y, z = self.turned_back(velocity)
         against_stars = (x - ROTATION_RATE * r[1], y + ROTATION_RATE * r[0], z)
         radial = unit(r)
@@ -84,14 +83,14 @@ class SceneAxes:
 
 
 def free_fall(position: Vector, velocity: Vector, axes: SceneAxes | None) -> Vector:
-    """Acceleration of what falls freely, in the axes of a scene. [m/s²]
+    """Acceleration of a body in free fall, in the axes of a scene. [m/s²]
 
     Parameters
     ----------
     position, velocity : (3,)
         East, north, up; numbers or arrays (cases,). [m, m/s]
     axes : SceneAxes or None
-        Those of a scene on the Earth; without them the Earth does not turn, and is a sphere of its mean radius below
+        Axes of a scene on the Earth. Without them the Earth does not turn, and is a sphere of its mean radius below
         the scene.
 
     Notes
@@ -108,7 +107,7 @@ def free_fall(position: Vector, velocity: Vector, axes: SceneAxes | None) -> Vec
     u, v, _ = axes.turned_back(velocity)
     square = x * x + y * y + z * z
     factor = -EARTH_GRAVITATIONAL_PARAMETER / square**1.5
-    flat, polar = 1.5 * FLATTENED * EQUATORIAL_RADIUS**2 / square, z * z / square
+    flat, polar = 1.5 * J2_FACTOR * EQUATORIAL_RADIUS_M**2 / square, z * z / square
     level = factor * (1 + flat * (1 - 5 * polar)) + ROTATION_RATE**2
     return axes.turned(
         (
@@ -135,14 +134,14 @@ def earth_fixed(place: Geodetic) -> Vector:
 
 def _vector(coordinates: Floats) -> Vector:
     """Three numbers of coordinates (3,), or three arrays (cases,) of (cases, 3)."""
-    x, y, z = (one if one.ndim else one.item() for one in np.moveaxis(coordinates, -1, 0))
+    x, y, z = (coordinate if coordinate.ndim else coordinate.item() for coordinate in np.moveaxis(coordinates, -1, 0))
     return (x, y, z)
 
 
 def curvature_radii(sine: Any) -> tuple[Any, Any]:
     """Radii of curvature along the meridian and across it, by the sine of the latitude. [m]"""
-    across = EQUATORIAL_RADIUS / np.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
-    return across**3 * (1 - _ECCENTRICITY_SQUARED) / EQUATORIAL_RADIUS**2, across
+    across = EQUATORIAL_RADIUS_M / np.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
+    return across**3 * (1 - _ECCENTRICITY_SQUARED) / EQUATORIAL_RADIUS_M**2, across
 
 
 def geodetic_places(points: Floats) -> tuple[Any, Any, Any]:
@@ -157,15 +156,15 @@ def geodetic_places(points: Floats) -> tuple[Any, Any, Any]:
     latitude = np.arctan2(z, level)
     for _ in range(10):
         reduced = np.arctan(tangent)
-        up = z + _ECCENTRICITY_SQUARED / (1 - FLATTENING) * EQUATORIAL_RADIUS * np.sin(reduced) ** 3
-        out = level - _ECCENTRICITY_SQUARED * EQUATORIAL_RADIUS * np.cos(reduced) ** 3
-        before, latitude = latitude, np.arctan2(up, out)
-        if np.max(np.abs(latitude - before)) < _SETTLED:
+        up = z + _ECCENTRICITY_SQUARED / (1 - FLATTENING) * EQUATORIAL_RADIUS_M * np.sin(reduced) ** 3
+        out = level - _ECCENTRICITY_SQUARED * EQUATORIAL_RADIUS_M * np.cos(reduced) ** 3
+        previous, latitude = latitude, np.arctan2(up, out)
+        if np.max(np.abs(latitude - previous)) < _MAX_CHANGE_RAD:
             break
         tangent = (1 - FLATTENING) * np.tan(latitude)
     sine = np.sin(latitude)
     height = (
-        level * np.cos(latitude) + z * sine - EQUATORIAL_RADIUS * np.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
+        level * np.cos(latitude) + z * sine - EQUATORIAL_RADIUS_M * np.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
     )
     return latitude, np.arctan2(y, x), height
 
@@ -183,7 +182,7 @@ def _directions(latitude: Any, longitude: Any) -> Floats:
     east = (-sine_l, cosine_l, zero)
     north = (-sine * cosine_l, -sine * sine_l, cosine)
     up = (cosine * cosine_l, cosine * sine_l, sine)
-    return np.stack([np.stack(one, axis=-1) for one in (east, north, up)])
+    return np.stack([np.stack(direction, axis=-1) for direction in (east, north, up)])
 
 
 def axes_at(place: Geodetic) -> SceneAxes:
@@ -213,26 +212,26 @@ def flown(place: Geodetic, heading: float, speed: float, climb: float, times_s: 
     """
     axes = axes_at(place)
     start = np.array(axes.origin)
-    step = np.asarray(times_s, dtype=float)[..., None] / _STEPS
+    step = np.asarray(times_s, dtype=float)[..., None] / _RUNGE_KUTTA_STEPS
 
     def rates(state: Floats) -> Floats:
         """Rates of the way from the start and of the direction, (2, ..., 3)."""
-        way, direction = state
-        latitude, longitude, height = geodetic_places(start + way)
+        displacement, direction = state
+        latitude, longitude, height = geodetic_places(start + displacement)
         east, north, up = _directions(latitude, longitude)
-        along, across = curvature_radii(np.sin(latitude))
+        meridian_radius, transverse_radius = curvature_radii(np.sin(latitude))
         to_east, to_north = np.sum(direction * east, axis=-1), np.sum(direction * north, axis=-1)
-        radius = 1 / (to_north**2 / along + to_east**2 / across) + height
+        radius = 1 / (to_north**2 / meridian_radius + to_east**2 / transverse_radius) + height
         return np.stack([speed * direction + climb * up, -speed / radius[..., None] * up])
 
     # The way counts from the start, so that it is rounded as what it is and not as the Earth's radius.
-    way = np.zeros((*step.shape[:-1], 3))
-    state = np.stack([way, way + axes.turned_back((math.sin(heading), math.cos(heading), 0.0))])
-    for _ in range(_STEPS):
-        a = rates(state)
-        b = rates(state + step / 2 * a)
-        c = rates(state + step / 2 * b)
-        d = rates(state + step * c)
-        state = state + step / 6 * (a + 2 * b + 2 * c + d)
+    displacement = np.zeros((*step.shape[:-1], 3))
+    state = np.stack([displacement, displacement + axes.turned_back((math.sin(heading), math.cos(heading), 0.0))])
+    for _ in range(_RUNGE_KUTTA_STEPS):
+        rates_1 = rates(state)
+        rates_2 = rates(state + step / 2 * rates_1)
+        rates_3 = rates(state + step / 2 * rates_2)
+        rates_4 = rates(state + step * rates_3)
+        state = state + step / 6 * (rates_1 + 2 * rates_2 + 2 * rates_3 + rates_4)
     places: Floats = start + state[0]
     return places

@@ -1,14 +1,14 @@
 """Mean elements of orbits: two-line sets and orbit mean-elements messages (OMM), propagated by SGP4.
 
-SGP4 places a satellite about 1 km off at the epoch of its elements, and 1 to 3 km more with each day from it
-(documentation of the package sgp4; Vallado and others, Revisiting Spacetrack Report #3, AIAA 2006-6753). Constants
-are those of WGS-72, which the elements are made with. Places in the true equator and mean equinox of date turn to the
-Earth by the mean sidereal time of 1982.
+A position by SGP4 is about 1 km off at the epoch of the elements, and 1 to 3 km more with each day from the epoch
+(documentation of the package sgp4; Vallado and others, Revisiting Spacetrack Report #3, AIAA 2006-6753). The
+constants of WGS-72 are used, as in the making of elements. Positions in the true equator and mean equinox of date
+turn to the Earth by the mean sidereal time of 1982.
 
-Two-line sets are those of Hoots & Roehrich, Spacetrack Report No. 3, 1980, section 12, with Space-Track's alpha-5
-catalogue numbers. Messages are those of CCSDS 502.0-B, as text of keywords and values, as XML, JSON or CSV. JSON and
-CSV have the message's keywords. CelesTrak leaves those out there that can have one value only; Space-Track writes all
-of them.
+Two-line sets follow Hoots & Roehrich, Spacetrack Report No. 3, 1980, section 12, with Space-Track's alpha-5 catalogue
+numbers. Messages follow CCSDS 502.0-B, as text of keywords and values, as XML, JSON or CSV. JSON and CSV have the
+keywords of the message. CelesTrak leaves out keywords there that can have one value only; Space-Track writes all
+keywords.
 """
 
 import csv
@@ -29,8 +29,8 @@ from bisar_budget.paths.accuracy import EpochCovariance, StatedAccuracy, stated_
 from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample, interpolate
 from bisar_budget.paths.instant import DAY, Instant, day_of_year, later, tai, tai_less_utc
 from bisar_budget.paths.messages import (
-    EARLIEST,
-    LATEST,
+    FIRST_ORBIT_DAY,
+    LAST_ORBIT_DAY,
     decoded,
     epoch_in,
     hold_to_size,
@@ -43,15 +43,15 @@ from bisar_budget.paths.messages import (
 from bisar_budget.paths.oem import named_covariance, read_covariance
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, from_teme
 
-# CCSDS 502.0-B-3, EPHEMERIS_TYPE; 0 is SGP4 in all that is distributed, 4 is SGP4-XP. Two-line sets have a digit.
-_PROPAGATED = ("", "0", "2", "SGP4")
-_DAY_OF_1950 = 33281  # modified Julian day of 1949-12-31, from which SGP4 counts days
-_NODES, _STEP_S = 8, 30.0
-_FRESH_DAYS = 7.0
-_AROUND_S = 60.0  # beyond the epoch and the aperture, where velocities are taken from places
-_FARTHEST_DAYS = 36525.0  # SGP4 steps through the time to a resonant orbit
-_AT_EPOCH_KM, _PER_DAY_KM = 1, (1, 3)
-_USUAL_PER_DAY_KM = 2.0  # middle of what the sources say
+# CCSDS 502.0-B-3, EPHEMERIS_TYPE; 0 is SGP4 in all distributed elements, 4 is SGP4-XP. Two-line sets have a digit.
+_SGP4_TYPES = ("", "0", "2", "SGP4")
+_SGP4_EPOCH_DAY = 33281  # modified Julian day of 1949-12-31, from which SGP4 counts days
+_SMOOTHING_NODES, _NODE_STEP_S = 8, 30.0
+_MAX_FRESH_DAYS = 7.0
+_MARGIN_S = 60.0  # beyond the epoch and the aperture; velocities are differences of positions within it
+_MAX_AGE_DAYS = 36525.0  # SGP4 steps through the time to a resonant orbit
+_EPOCH_ERROR_KM, _DAILY_ERRORS_KM = 1, (1, 3)
+_DAILY_ERROR_KM = 2.0  # middle of the range in the sources
 # The error codes of Satrec.sgp4; 5 is no longer in use.
 _FAILURES = {
     1: "its mean eccentricity leaves the range from 0 to 1",
@@ -64,9 +64,9 @@ _FAILURES = {
 
 @dataclass(frozen=True, kw_only=True)
 class Elements:
-    """Mean elements of an object at an epoch, as SGP4 takes them: angles in rad, mean motion in rad/min.
+    """Mean elements of an object at an epoch, in the units of SGP4: angles in rad, mean motion in rad/min.
 
-    `covariance` is that of position and velocity at the epoch, where the message states one.
+    `covariance` is the covariance of position and velocity at the epoch, if the message states it.
     """
 
     name: str
@@ -79,7 +79,7 @@ class Elements:
     perigee: float
     anomaly: float
     drag: float  # B*, 1/Earth radii
-    kind: str  # what they were read from
+    kind: str  # kind of file, for reports
     where: str  # file and line or record
     covariance: EpochCovariance | None = None
 
@@ -90,17 +90,17 @@ class Elements:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name and catalogue number, as they are compared."""
+        """Name and catalogue number for comparisons."""
         return (object_key(self.name), str(self.number))
 
 
 @dataclass(frozen=True, kw_only=True)
 class BrokenEntry:
-    """An entry of a catalogue that cannot be used: why, and the names that tell whose it is, as far as it says."""
+    """An entry of a catalogue that cannot be used: the reason, and the names of its object that can be read."""
 
     problem: str
     names: tuple[str, ...] = ()
-    is_empty: bool = False  # it says nothing of anybody
+    is_empty: bool = False  # without any value
 
 
 Entry = Elements | BrokenEntry
@@ -112,16 +112,16 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
     Raises
     ------
     PathFileError
-        The package sgp4 is not installed, or refuses the elements. What is returned raises it without a prefix where
-        SGP4 has no place.
+        The package sgp4 is not installed, or refuses the elements. The returned function raises it for an instant at
+        which SGP4 has no position.
     """
     try:
         from sgp4.api import WGS72, Satrec
     except ImportError:
         raise PathFileError(f"{elements.where}: needs the package sgp4: {install_command('orbits')}") from None
     satellite = Satrec()
-    epoch = elements.epoch.day - _DAY_OF_1950 + elements.epoch.seconds / DAY
-    # The derivatives of the mean motion are no part of SGP4, and the number is ours to keep.
+    epoch = elements.epoch.day - _SGP4_EPOCH_DAY + elements.epoch.seconds / DAY
+    # SGP4 does not use the derivatives of the mean motion, nor the catalogue number.
     shape = (elements.eccentricity, elements.perigee, elements.inclination, elements.anomaly)
     satellite.sgp4init(WGS72, "i", 0, epoch, elements.drag, 0.0, 0.0, *shape, elements.mean_motion, elements.node)
     if satellite.error:
@@ -129,14 +129,14 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
 
     def place(instant: Instant) -> Vector:
         elapsed = instant.since(elements.epoch) + tai_less_utc(instant.day) - tai_less_utc(elements.epoch.day)
-        if abs(elapsed) > _FARTHEST_DAYS * DAY:
+        if abs(elapsed) > _MAX_AGE_DAYS * DAY:
             raise PathFileError(
                 f"{elements.where}: the elements of {elements.object} are of {elements.epoch.as_text()}, more than a"
                 " century from the aperture"
             )
         # A Julian date of two numbers would be as exact, but its epoch passes through a calendar.
         error, position, _ = satellite.sgp4_tsince(elapsed / 60)
-        if error or not all(math.isfinite(one) for one in position):
+        if error or not all(math.isfinite(coordinate) for coordinate in position):
             raise PathFileError(
                 f"{elements.where}: SGP4 has no place of {elements.object} at {instant.as_text()}: {_failure(error)}"
             )
@@ -147,69 +147,73 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
 
 
 def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
-    """The same places without the steps of their rounding, which grow with the age of the elements.
+    """The positions of a function without the steps of their rounding, which grow with the age of the elements.
 
-    SGP4 counts minutes and angles from the epoch: a week from it a place is rounded to 2e-6 m, and 100 days from it
-    to 4e-5 m, which a polynomial of slow time takes for bends of the path. Lagrange's polynomial through eight places
-    30 s apart leaves 1e-8 m in a low orbit, by its remainder. It also rounds off the millimetres by which SGP4 jumps
-    every half day in resonant orbits.
+    SGP4 counts minutes and angles from the epoch. A week from the epoch a position is rounded to 2e-6 m, 100 days
+    from it to 4e-5 m, and a polynomial of slow time would follow these steps as bends of the path. Lagrange's
+    polynomial through eight positions 30 s apart has an error of 1e-8 m in a low orbit, by its remainder. It also
+    smooths the millimetres by which SGP4 jumps every half day in resonant orbits.
     """
 
     @lru_cache(maxsize=64)
     def node(day: int, count: int) -> Sample:
-        midnight = Instant(day, 0.0)  # the seconds of its day run on beside it, whatever leaps
-        return Sample(midnight.after(count * _STEP_S), place(later(midnight, count * _STEP_S)), (0.0, 0.0, 0.0))
+        midnight = Instant(day, 0.0)  # seconds of its day continue beyond the day, without leap seconds
+        second = count * _NODE_STEP_S
+        return Sample(midnight.after(second), place(later(midnight, second)), (0.0, 0.0, 0.0))
 
     def between(instant: Instant) -> Vector:
-        count = math.floor(instant.seconds / _STEP_S)
+        count = math.floor(instant.seconds / _NODE_STEP_S)
         try:
-            near = [node(instant.day, count + n) for n in range(1 - _NODES // 2, 1 + _NODES // 2)]
+            first = count + 1 - _SMOOTHING_NODES // 2
+            samples = [node(instant.day, number) for number in range(first, first + _SMOOTHING_NODES)]
         except PathFileError:  # within minutes of the end of an orbit
             return place(instant)
-        return interpolate(near, instant, _NODES, False)
+        return interpolate(samples, instant, _SMOOTHING_NODES, False)
 
     return between
 
 
 def orbit_of(
-    entries: Sequence[Entry], name: str, wanted: str | None, center: Instant, orientation: Orientation
+    entries: Sequence[Entry], name: str, object_name: str | None, center: Instant, orientation: Orientation
 ) -> Orbit:
-    """Orbit of one object, by the elements whose epoch is nearest; of two that are as near the last of the file.
+    """Orbit of an object from the elements with the nearest epoch, and from the last of equally near elements.
 
-    All but the entries of a file are arguments of its reader; `wanted` is a name or a catalogue number. Entries of
-    other objects that are broken are left out, and counted in the words of the orbit. A `PathFileError` says that
-    there are no elements, or those of several objects; that an entry of the object is broken, or one of nobody knows
-    whom where no object is named; that SGP4 is missing or refuses.
+    `entries` are the entries of a file, and the remaining arguments those of its reader; `object_name` is a name or a
+    catalogue number. Broken entries of further objects are left out, and counted in the words of the orbit. Raises
+    `PathFileError` if there are no elements, or elements of several objects and no name. Raises it if an entry of the
+    object is broken, or any entry if no object is named. Raises it if SGP4 is missing or refuses the elements.
     """
-    found = [entry for entry in entries if isinstance(entry, Elements)]
+    sets = [entry for entry in entries if isinstance(entry, Elements)]
     broken = [entry for entry in entries if isinstance(entry, BrokenEntry)]
     for entry in broken:
-        is_wanted = wanted is None and not (entry.is_empty and found)
-        if is_wanted or not found or (wanted is not None and object_key(wanted) in entry.names):
+        is_fault = object_name is None and not (entry.is_empty and sets)
+        if is_fault or not sets or (object_name is not None and object_key(object_name) in entry.names):
             raise PathFileError(entry.problem)
-    if not found:
+    if not sets:
         raise PathFileError(f"{name}: has no element set")
-    elements = min(reversed(one_object(found, name, wanted, "number")), key=lambda one: abs(center.since(one.epoch)))
+    candidates = one_object(sets, name, object_name, "number")
+    elements = min(reversed(candidates), key=lambda candidate: abs(center.since(candidate.epoch)))
     for entry in broken:
         if elements.names[-1] in entry.names:
             raise PathFileError(entry.problem)
     left_out = f", {len(broken)} of {len(entries)} entries left out ({broken[0].problem})" if broken else ""
     inertial = smooth(teme(elements))
-    inertial(elements.epoch)  # what SGP4 refuses is known before anybody asks
+    inertial(elements.epoch)  # raises now if SGP4 refuses the elements
 
     def doubt(instant: Instant) -> PathDoubt:
         days = abs(instant.since(elements.epoch)) / DAY
-        words = f"elements {days:.3g} days from their epoch: {_AT_EPOCH_KM} km there, {_USUAL_PER_DAY_KM:g} km a day"
-        return PathDoubt(1e3 * (_AT_EPOCH_KM + _USUAL_PER_DAY_KM * days), words)
+        words = f"elements {days:.3g} days from their epoch: {_EPOCH_ERROR_KM} km there, {_DAILY_ERROR_KM:g} km a day"
+        return PathDoubt(1e3 * (_EPOCH_ERROR_KM + _DAILY_ERROR_KM * days), words)
 
     def doubts(instant: Instant) -> Sequence[str]:
         days = instant.since(elements.epoch) / DAY
-        if abs(days) <= _FRESH_DAYS:
+        if abs(days) <= _MAX_FRESH_DAYS:
             return ()
-        least, most = (_AT_EPOCH_KM + abs(days) * one for one in _PER_DAY_KM)
+        smallest_km, largest_km = (_EPOCH_ERROR_KM + abs(days) * daily_km for daily_km in _DAILY_ERRORS_KM)
         return (
             f"{name}: the elements of {elements.object} are of {elements.epoch.as_text()}, {abs(days):.1f} days"
-            f" {'before' if days > 0 else 'after'} the aperture; SGP4 may place it {least:.0f} to {most:.0f} km off",
+            f" {'before' if days > 0 else 'after'} the aperture; SGP4 may place it {smallest_km:.0f} to "
+            f"{largest_km:.0f} km off",
         )
 
     def place(instant: Instant) -> Vector:
@@ -218,7 +222,7 @@ def orbit_of(
     def stated(instant: Instant) -> StatedAccuracy | None:
         if elements.covariance is None:
             return None
-        span = (min(instant, elements.epoch).after(-_AROUND_S), max(instant, elements.epoch).after(_AROUND_S))
+        span = (min(instant, elements.epoch).after(-_MARGIN_S), max(instant, elements.epoch).after(_MARGIN_S))
         return stated_of_orbit([elements.covariance], place, instant, span)
 
     words = f"{elements.kind} of {elements.object}, epoch {elements.epoch.as_text()}, SGP4{orientation.words}"
@@ -238,43 +242,43 @@ def _failure(error: int) -> str:
     return _FAILURES.get(error, "it gives no number")
 
 
-def _hold_to_type(kind: str, where: str) -> None:
-    if kind not in _PROPAGATED:
-        raise PathFileError(f"{where}: the elements are of type {shown(kind)}, which SGP4 does not propagate")
+def _hold_to_type(kind: str, location: str) -> None:
+    if kind not in _SGP4_TYPES:
+        raise PathFileError(f"{location}: the elements are of type {shown(kind)}, which SGP4 does not propagate")
 
 
-def _angle(degrees: float, most: float, called: str, where: str) -> float:
+def _angle(degrees: float, max_degrees: float, quantity: str, location: str) -> float:
     """An angle of a file, in rad, which must be within its range."""
-    if not 0 <= degrees <= most:
-        raise PathFileError(f"{where}: {called} must be from 0 to {most:g} degrees (got {degrees:g})")
+    if not 0 <= degrees <= max_degrees:
+        raise PathFileError(f"{location}: {quantity} must be from 0 to {max_degrees:g} degrees (got {degrees:g})")
     return math.radians(degrees)
 
 
-def _mean_motion(turns: float, where: str) -> float:
+def _mean_motion(turns: float, location: str) -> float:
     """From revolutions a day, to rad/min."""
     if not 0 < turns < 20:
-        raise PathFileError(f"{where}: mean motion must be more than 0 and less than 20 a day (got {turns:g})")
+        raise PathFileError(f"{location}: mean motion must be more than 0 and less than 20 a day (got {turns:g})")
     return turns * 2 * math.pi / 1440
 
 
 # ---------------------------------------------------------------------- two-line sets
-_COLUMNS = 69
+_LINE_COLUMNS = 69
 _DECIMAL = r"\d+\.\d*"
 
 
 def read_tle(
-    data: bytes, name: str, wanted: str | None, center: Instant, orientation: Orientation = UNKNOWN
+    data: bytes, name: str, object_name: str | None, center: Instant, orientation: Orientation = UNKNOWN
 ) -> Orbit:
     """Orbit from two-line element sets, as every reader of `ORBIT_FORMATS` gives it.
 
-    A line of the name may stand above each. Blank lines, and those that begin with `#`, are no part of the file.
+    A line with the name may come before each set. Blank lines, and lines that begin with `#`, are ignored.
     """
     hold_to_size(len(data), name)
-    return orbit_of(list(_entries(decoded(data, name), name)), name, wanted, center, orientation)
+    return orbit_of(list(_entries(decoded(data, name), name)), name, object_name, center, orientation)
 
 
 def element_sets(text: str, name: str) -> Iterator[Elements]:
-    """The element sets of a file; a `PathFileError` says what is wrong with the first that is broken."""
+    """The element sets of a file; raises `PathFileError` for the first broken set."""
     for entry in _entries(text, name):
         if isinstance(entry, BrokenEntry):
             raise PathFileError(entry.problem)
@@ -282,50 +286,52 @@ def element_sets(text: str, name: str) -> Iterator[Elements]:
 
 
 def _entries(text: str, name: str) -> Iterator[Entry]:
-    """The element sets of a file, in its order; after a broken one reading goes on with the next line of its form."""
-    above: tuple[int, str] | None = None
-    first: tuple[int, str] | None = None
+    """The element sets of a file, in order. After a broken set, reading continues with the next line 1 or name."""
+    name_line: tuple[int, str] | None = None
+    line_1: tuple[int, str] | None = None
 
-    def broken(at: int, problem: str, *lines: str) -> BrokenEntry:
+    def broken(number: int, problem: str, *lines: str) -> BrokenEntry:
         numbers = [object_key(line[2:7]) for line in lines]
-        names = (object_key(above[1]),) if above else ()
-        return BrokenEntry(problem=f"{name}:{at}: {problem}", names=(*names, *numbers))
+        names = (object_key(name_line[1]),) if name_line else ()
+        return BrokenEntry(problem=f"{name}:{number}: {problem}", names=(*names, *numbers))
 
-    for at, line in enumerate(text.removeprefix("\ufeff").split("\n"), 1):
+    for number, line in enumerate(text.removeprefix("\ufeff").split("\n"), 1):
         line = line.rstrip(" \t\r")
         if not line or line.startswith("#"):
             continue
         if not line.isascii() or not line.isprintable():
-            wrong = next(one for one in line if not one.isascii() or not one.isprintable())
-            lines = [one for one in (first[1] if first else "", line) if one and one[0] in "12"]
-            yield broken(at, f"has a character that element sets do not have (got {shown(wrong)})", *lines)
-            above = first = None
+            character = next(
+                candidate for candidate in line if not candidate.isascii() or not candidate.isprintable()
+            )
+            lines = [text for text in (line_1[1] if line_1 else "", line) if text and text[0] in "12"]
+            yield broken(number, f"has a character that element sets do not have (got {shown(character)})", *lines)
+            name_line = line_1 = None
             continue
-        if first is not None and _begins(line, "2"):
+        if line_1 is not None and _begins(line, "2"):
             try:
-                yield _from_lines(first, (at, line), above[1] if above else "", name)
+                yield _from_lines(line_1, (number, line), name_line[1] if name_line else "", name)
             except PathFileError as error:
-                entry = broken(at, "", first[1], line)
+                entry = broken(number, "", line_1[1], line)
                 yield BrokenEntry(problem=str(error), names=entry.names)
-            above = first = None
+            name_line = line_1 = None
             continue
-        if first is not None:
-            yield broken(at, f"must be line 2 of the set that begins in line {first[0]}{_got(line)}", first[1])
-            above = first = None
+        if line_1 is not None:
+            yield broken(number, f"must be line 2 of the set that begins in line {line_1[0]}{_got(line)}", line_1[1])
+            name_line = line_1 = None
         if _begins(line, "1"):
-            first = (at, line)
+            line_1 = (number, line)
         elif _begins(line, "2"):
-            yield broken(at, "is line 2 of an element set; its line 1 must come before it", line)
-            above = None
+            yield broken(number, "is line 2 of an element set; its line 1 must come before it", line)
+            name_line = None
         else:
-            if above is not None:
-                yield broken(at, f"must be line 1 of the set that line {above[0]} names{_got(line)}")
-            above = (at, shown(line.removeprefix("0 ").strip()))
-    if first is not None:
-        yield broken(first[0], "line 1 of an element set has no line 2 after it", first[1])
-    elif above is not None:
-        problem = f"must be line 1 of an element set, or a name above one{_got(above[1])}"
-        yield broken(above[0], problem)
+            if name_line is not None:
+                yield broken(number, f"must be line 1 of the set that line {name_line[0]} names{_got(line)}")
+            name_line = (number, shown(line.removeprefix("0 ").strip()))
+    if line_1 is not None:
+        yield broken(line_1[0], "line 1 of an element set has no line 2 after it", line_1[1])
+    elif name_line is not None:
+        problem = f"must be line 1 of an element set, or a name above one{_got(name_line[1])}"
+        yield broken(name_line[0], problem)
 
 
 def _got(line: str) -> str:
@@ -338,25 +344,25 @@ def _begins(line: str, number: str) -> bool:
 
 def _from_lines(first: tuple[int, str], second: tuple[int, str], object_name: str, name: str) -> Elements:
     lines = {}
-    for at, line in (first, second):
-        where = f"{name}:{at}"
-        if len(line) == _COLUMNS - 1:
-            raise PathFileError(f"{where}: has 68 columns: the checksum, column {_COLUMNS}, is missing")
-        if len(line) != _COLUMNS:
-            raise PathFileError(f"{where}: has {len(line)} columns, a line of an element set has {_COLUMNS}")
+    for line_number, line in (first, second):
+        location = f"{name}:{line_number}"
+        if len(line) == _LINE_COLUMNS - 1:
+            raise PathFileError(f"{location}: has 68 columns: the checksum, column {_LINE_COLUMNS}, is missing")
+        if len(line) != _LINE_COLUMNS:
+            raise PathFileError(f"{location}: has {len(line)} columns, a line of an element set has {_LINE_COLUMNS}")
         digits = (sum(n * line.count(str(n), 0, -1) for n in range(1, 10)) + line.count("-", 0, -1)) % 10
         if line[-1] != str(digits):
-            raise PathFileError(f"{where}: the checksum is {line[-1]}, its digits give {digits}")
-        lines[line[0]] = (where, line)
+            raise PathFileError(f"{location}: the checksum is {line[-1]}, its digits give {digits}")
+        lines[line[0]] = (location, line)
     (where_1, line_1), (where_2, line_2) = lines["1"], lines["2"]
-    number, again = _catalogue_number(line_1, where_1), _catalogue_number(line_2, where_2)
-    if number != again:
-        raise PathFileError(f"{where_2}: is of object {again}, line 1 above it of {number}")
+    number, second_number = _catalogue_number(line_1, where_1), _catalogue_number(line_2, where_2)
+    if number != second_number:
+        raise PathFileError(f"{where_2}: is of object {second_number}, line 1 above it of {number}")
     _hold_to_type(line_1[62].strip(), where_1)
 
-    def angle(start: int, end: int, most: float, called: str) -> float:
+    def angle(start: int, end: int, max_degrees: float, quantity: str) -> float:
         """Angle in columns of line 2, counted from 1."""
-        return _angle(_column(line_2, where_2, start, end, called, _DECIMAL), most, called, where_2)
+        return _angle(_column(line_2, where_2, start, end, quantity, _DECIMAL), max_degrees, quantity, where_2)
 
     return Elements(
         name=object_name,
@@ -374,59 +380,61 @@ def _from_lines(first: tuple[int, str], second: tuple[int, str], object_name: st
     )
 
 
-def _column(line: str, where: str, start: int, end: int, called: str, form: str, before: str = "") -> float:
+def _column(line: str, location: str, start: int, end: int, quantity: str, form: str, prefix: str = "") -> float:
     text = line[start - 1 : end].strip()
     if not re.fullmatch(form, text, re.ASCII):
-        raise PathFileError(f"{where}: {called} must be a number in columns {start} to {end} (got {shown(text)})")
-    return float(before + text)
+        raise PathFileError(
+            f"{location}: {quantity} must be a number in columns {start} to {end} (got {shown(text)})"
+        )
+    return float(prefix + text)
 
 
-def _catalogue_number(line: str, where: str) -> int:
-    """Five digits, or a letter for ten thousands from 10 on, without I and O, and four digits."""
+def _catalogue_number(line: str, location: str) -> int:
+    """Catalogue number from five digits, or from four digits after a letter (10 for A on, without I and O)."""
     text = line[2:7].strip()
     if re.fullmatch(r"\d{1,5}", text, re.ASCII):
         return int(text)
     if re.fullmatch(r"[A-HJ-NP-Z]\d{4}", text, re.ASCII):
         return (10 + "ABCDEFGHJKLMNPQRSTUVWXYZ".index(text[0])) * 10000 + int(text[1:])
-    raise PathFileError(f"{where}: the catalogue number must be in columns 3 to 7 (got {shown(text)})")
+    raise PathFileError(f"{location}: the catalogue number must be in columns 3 to 7 (got {shown(text)})")
 
 
-def _epoch(line: str, where: str) -> Instant:
-    year = int(_column(line, where, 19, 20, "epoch year", r"\d\d"))
+def _epoch(line: str, location: str) -> Instant:
+    year = int(_column(line, location, 19, 20, "epoch year", r"\d\d"))
     year += 1900 if year >= 57 else 2000
-    called = "epoch day"
-    _column(line, where, 21, 32, called, r"\d{1,3}\.\d+")
+    quantity = "epoch day"
+    _column(line, location, 21, 32, quantity, r"\d{1,3}\.\d+")
     day, fraction = line[20:32].strip().split(".")
-    found = day_of_year(year, int(day))
-    if found is None:
-        raise PathFileError(f"{where}: {called} must be from 1 to {365 + isleap(year)} (got {day}.{fraction})")
-    return Instant(found, float(f"0.{fraction}") * DAY)
+    julian_day = day_of_year(year, int(day))
+    if julian_day is None:
+        raise PathFileError(f"{location}: {quantity} must be from 1 to {365 + isleap(year)} (got {day}.{fraction})")
+    return Instant(julian_day, float(f"0.{fraction}") * DAY)
 
 
-def _drag(line: str, where: str) -> float:
-    """B*: five digits behind a decimal point that is not written, and an exponent of a sign and a digit."""
+def _drag(line: str, location: str) -> float:
+    """B* from five digits, after an implied decimal point, and an exponent of a sign and a digit."""
     text = line[53:61].strip()
     match = re.fullmatch(r"([+-]?)\.?(\d{1,5})\s?([+-]\d)", text, re.ASCII)
     if match is None:
-        raise PathFileError(f"{where}: B* must be a number in columns 54 to 61 (got {shown(text)})")
+        raise PathFileError(f"{location}: B* must be a number in columns 54 to 61 (got {shown(text)})")
     return float(f"{match[1]}0.{match[2]}e{match[3]}")
 
 
 # ---------------------------------------------------------------------- orbit mean-elements messages
-_VERSION = "CCSDS_OMM_VERS"
+_VERSION_KEYWORD = "CCSDS_OMM_VERS"
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Message:
-    """Keywords and values of a message; what is wrong with its form; and whether it may leave nothing out."""
+    """Keywords and values of a message, the fault of its form, and whether it must have all mandatory keywords."""
 
     where: str
     leaves: Mapping[str, Any]
     problem: str = ""
-    is_complete: bool = False  # as the standard has it; JSON and CSV of CelesTrak leave out what has one value only
+    is_complete: bool = False  # by the standard; JSON and CSV of CelesTrak leave out keywords with one possible value
 
 
-_MANDATORY = {
+_ACCEPTED_VALUES = {
     "MEAN_ELEMENT_THEORY": ("SGP4", "SGP/SGP4"),  # the second in examples of CCSDS 502.0-B
     "REF_FRAME": ("TEME",),
     "TIME_SYSTEM": ("UTC",),
@@ -435,7 +443,7 @@ _MANDATORY = {
 
 
 def read_omm(
-    data: bytes, name: str, wanted: str | None, center: Instant, orientation: Orientation = UNKNOWN
+    data: bytes, name: str, object_name: str | None, center: Instant, orientation: Orientation = UNKNOWN
 ) -> Orbit:
     """Orbit from orbit mean-elements messages, as every reader of `ORBIT_FORMATS` gives it."""
     hold_to_size(len(data), name)
@@ -447,23 +455,23 @@ def read_omm(
         if begins[:1] in ("[", "{"):
             records = _from_json(text, name)
         else:
-            records = _from_keywords(text, name) if begins.startswith(_VERSION) else _from_csv(text, name)
-    return orbit_of([_entry(message, orientation) for message in records], name, wanted, center, orientation)
+            records = _from_keywords(text, name) if begins.startswith(_VERSION_KEYWORD) else _from_csv(text, name)
+    return orbit_of([_entry(message, orientation) for message in records], name, object_name, center, orientation)
 
 
 def _entry(message: _Message, orientation: Orientation) -> Entry:
-    """Elements of a message, or what is wrong with it."""
+    """Elements of a message, or a broken entry with its fault."""
     try:
         if message.problem:
             raise PathFileError(message.problem)
-        for key in _MANDATORY if message.is_complete else ():
+        for key in _ACCEPTED_VALUES if message.is_complete else ():
             _value(message.leaves, key, message.where)
         elements = _from_message(message.leaves, message.where)
         covariance = _covariance(message.leaves, elements.epoch, orientation, message.where)
         return elements if covariance is None else replace(elements, covariance=covariance)
     except PathFileError as error:
-        stated = [message.leaves.get(key) for key in ("OBJECT_NAME", "NORAD_CAT_ID")]
-        names = tuple(object_key(str(value)) for value in stated if value not in (None, ""))
+        identifiers = [message.leaves.get(key) for key in ("OBJECT_NAME", "NORAD_CAT_ID")]
+        names = tuple(object_key(str(value)) for value in identifiers if value not in (None, ""))
         is_empty = not message.problem and not any(value not in (None, "") for value in message.leaves.values())
         return BrokenEntry(problem=str(error), names=names, is_empty=is_empty)
 
@@ -472,50 +480,51 @@ def _from_markup(data: bytes, name: str) -> Iterator[_Message]:
     for message in parse_markup(data, name).all("omm"):
         leaves = {}
         for block in ("covarianceMatrix", "metadata", "meanElements", "tleParameters"):
-            for found in message.all(block):
-                leaves.update({one.name: one.text.strip() for one in found.children})
+            for element in message.all(block):
+                leaves.update({leaf.name: leaf.text.strip() for leaf in element.children})
         yield _Message(where=f"{name}:{message.line}", leaves=leaves, is_complete=True)
 
 
 def _from_keywords(text: str, name: str) -> Iterator[_Message]:
-    """Messages of a text that has a keyword and a value in each line; each begins with its version."""
+    """Messages of a text with a keyword and a value in each line. Each message begins with its version."""
     leaves: dict[str, str] = {}
-    began, problem = 0, ""
-    for at, line in enumerate(text.split("\n"), 1):
+    first_line, problem = 0, ""
+    for line_number, line in enumerate(text.split("\n"), 1):
         line = line.strip()
         if not line or line.startswith("COMMENT"):
             continue
-        key, equals, value = (part.strip() for part in line.partition("="))
-        if key == _VERSION:
-            if began:
-                yield _Message(where=f"{name}:{began}", leaves=leaves, problem=problem, is_complete=True)
-            leaves, began, problem = {}, at, ""
+        key, equals, value = (piece.strip() for piece in line.partition("="))
+        if key == _VERSION_KEYWORD:
+            if first_line:
+                yield _Message(where=f"{name}:{first_line}", leaves=leaves, problem=problem, is_complete=True)
+            leaves, first_line, problem = {}, line_number, ""
         elif not equals:
-            problem = problem or f"{name}:{at}: must be a keyword, = and its value (got {shown(line)})"
+            problem = problem or f"{name}:{line_number}: must be a keyword, = and its value (got {shown(line)})"
         elif key in leaves:
-            problem = problem or f"{name}:{at}: {shown(key)} is there twice in the message of line {began}"
+            twice = f"{shown(key)} is there twice in the message of line {first_line}"
+            problem = problem or f"{name}:{line_number}: {twice}"
         else:
-            leaves[key] = value.partition("[")[0].strip()  # a unit, in brackets, is the standard's own
-    if began:
-        yield _Message(where=f"{name}:{began}", leaves=leaves, problem=problem, is_complete=True)
+            leaves[key] = value.partition("[")[0].strip()  # a unit in brackets can only be the unit of the standard
+    if first_line:
+        yield _Message(where=f"{name}:{first_line}", leaves=leaves, problem=problem, is_complete=True)
 
 
 def _from_json(text: str, name: str) -> Iterator[_Message]:
     try:
-        found = json.loads(text)
+        document = json.loads(text)
     except json.JSONDecodeError as error:
         raise PathFileError(f"{name}:{error.lineno}: is not JSON: {error.msg}") from None
     except (RecursionError, ValueError):  # brackets without end, digits without end
         raise PathFileError(f"{name}: is not JSON of orbit mean-elements messages") from None
-    records = found if isinstance(found, list) else [found]
+    records = document if isinstance(document, list) else [document]
     for count, record in enumerate(records, 1):
-        where = f"{name}: record {count}" if records is found else name
+        location = f"{name}: record {count}" if records is document else name
         if not isinstance(record, dict):
-            yield _Message(where=where, leaves={}, problem=f"{where}: must have keywords and values")
+            yield _Message(where=location, leaves={}, problem=f"{location}: must have keywords and values")
             continue
-        # A list or a mapping is no value of any keyword.
+        # No keyword has a list or a mapping as its value.
         leaves = {key: value for key, value in record.items() if isinstance(value, str | int | float)}
-        yield _Message(where=where, leaves=leaves)
+        yield _Message(where=location, leaves=leaves)
 
 
 def _from_csv(text: str, name: str) -> Iterator[_Message]:
@@ -523,79 +532,81 @@ def _from_csv(text: str, name: str) -> Iterator[_Message]:
     try:
         header = next(lines, [])
         if "NORAD_CAT_ID" not in header and "EPOCH" not in header:
-            said = "is empty" if not text.strip() else "is no orbit mean-elements message"
-            raise PathFileError(f"{name}: {said}; accepted: text of keywords, XML, JSON, CSV with a line of keywords")
+            fault = "is empty" if not text.strip() else "is no orbit mean-elements message"
+            raise PathFileError(
+                f"{name}: {fault}; accepted: text of keywords, XML, JSON, CSV with a line of keywords"
+            )
         for line in lines:
             if not line:
                 continue
-            where = f"{name}:{lines.line_num}"
+            location = f"{name}:{lines.line_num}"
             is_cut = len(line) != len(header)
-            problem = f"{where}: has {len(line)} values, line 1 has {len(header)} keywords" if is_cut else ""
-            yield _Message(where=where, leaves=dict(zip(header, line, strict=False)), problem=problem)
+            problem = f"{location}: has {len(line)} values, line 1 has {len(header)} keywords" if is_cut else ""
+            yield _Message(where=location, leaves=dict(zip(header, line, strict=False)), problem=problem)
     except csv.Error as error:
         raise PathFileError(f"{name}:{lines.line_num}: is not CSV: {error}") from None
 
 
-_COVARIANCE = re.compile(r"C[XYZ](_DOT)?_[XYZ](_DOT)?", re.ASCII)
+_COVARIANCE_KEYWORD = re.compile(r"C[XYZ](_DOT)?_[XYZ](_DOT)?", re.ASCII)
 
 
 def _covariance(
-    record: Mapping[str, Any], epoch: Instant, orientation: Orientation, where: str
+    record: Mapping[str, Any], epoch: Instant, orientation: Orientation, location: str
 ) -> EpochCovariance | None:
-    """The covariance that a message states at the epoch of its elements; None of one without."""
-    stated = {key: str(value).strip() for key, value in record.items() if _COVARIANCE.fullmatch(key)}
-    if not any(stated.values()):
+    """The covariance that a message states at the epoch of its elements; None for a message without covariance."""
+    elements = {key: str(value).strip() for key, value in record.items() if _COVARIANCE_KEYWORD.fullmatch(key)}
+    if not any(elements.values()):
         return None
     frame = str(record.get("COV_REF_FRAME") or "").strip()
-    block = named_covariance({**stated, "COV_REF_FRAME": frame}, 0)
-    return read_covariance(block, tai(epoch), "TEME", orientation, where)
+    block = named_covariance({**elements, "COV_REF_FRAME": frame}, 0)
+    return read_covariance(block, tai(epoch), "TEME", orientation, location)
 
 
-def _value(record: Mapping[str, Any], key: str, where: str) -> Any:
+def _value(record: Mapping[str, Any], key: str, location: str) -> Any:
     value = record.get(key)
     if value is None or value == "":
-        raise PathFileError(f"{where}: has no {key}")
+        raise PathFileError(f"{location}: has no {key}")
     return value
 
 
-def _from_message(record: Mapping[str, Any], where: str) -> Elements:
-    for key, accepted in _MANDATORY.items():
+def _from_message(record: Mapping[str, Any], location: str) -> Elements:
+    for key, accepted in _ACCEPTED_VALUES.items():
         value = record.get(key)
         if value not in (None, "") and str(value).strip().upper() not in accepted:
-            raise PathFileError(f"{where}: {key} must be {accepted[0]} (got {shown(str(value))})")
-    _hold_to_type(str(record.get("EPHEMERIS_TYPE", "")).strip(), where)
+            raise PathFileError(f"{location}: {key} must be {accepted[0]} (got {shown(str(value))})")
+    _hold_to_type(str(record.get("EPHEMERIS_TYPE", "")).strip(), location)
 
     def number(key: str) -> float:
-        value = _value(record, key, where)
-        found = number_in(value)
-        if found is None:
-            raise PathFileError(f"{where}: {key} must be a number (got {shown(str(value))})")
-        return found
+        value = _value(record, key, location)
+        value_number = number_in(value)
+        if value_number is None:
+            raise PathFileError(f"{location}: {key} must be a number (got {shown(str(value))})")
+        return value_number
 
-    def angle(key: str, most: float) -> float:
-        return _angle(number(key), most, key, where)
+    def angle(key: str, max_degrees: float) -> float:
+        return _angle(number(key), max_degrees, key, location)
 
     catalogue = number("NORAD_CAT_ID")
     if not 0 <= catalogue <= 999_999_999 or catalogue != int(catalogue):
         raise PathFileError(
-            f"{where}: NORAD_CAT_ID must be a whole number of up to nine digits"
+            f"{location}: NORAD_CAT_ID must be a whole number of up to nine digits"
             f" (got {shown(str(record['NORAD_CAT_ID']))})"
         )
-    written = str(_value(record, "EPOCH", where))
-    epoch = epoch_in(written)
-    if epoch is None or not EARLIEST <= epoch.day < LATEST:
+    epoch_text = str(_value(record, "EPOCH", location))
+    epoch = epoch_in(epoch_text)
+    if epoch is None or not FIRST_ORBIT_DAY <= epoch.day < LAST_ORBIT_DAY:
         raise PathFileError(
-            f"{where}: EPOCH must be an instant such as 2026-05-31T10:12:13.123 (got {shown(written)})"
+            f"{location}: EPOCH must be an instant such as 2026-05-31T10:12:13.123 (got {shown(epoch_text)})"
         )
     eccentricity = number("ECCENTRICITY")
     if not 0 <= eccentricity < 1:
-        raise PathFileError(f"{where}: ECCENTRICITY must be from 0 to less than 1 (got {eccentricity:g})")
+        raise PathFileError(f"{location}: ECCENTRICITY must be from 0 to less than 1 (got {eccentricity:g})")
     object_name = record.get("OBJECT_NAME")
     return Elements(
         name=shown(" ".join(str(object_name).split())) if object_name is not None else "",
         number=int(catalogue),
         epoch=epoch,
-        mean_motion=_mean_motion(number("MEAN_MOTION"), where),
+        mean_motion=_mean_motion(number("MEAN_MOTION"), location),
         eccentricity=eccentricity,
         inclination=angle("INCLINATION", 180),
         node=angle("RA_OF_ASC_NODE", 360),
@@ -603,5 +614,5 @@ def _from_message(record: Mapping[str, Any], where: str) -> Elements:
         anomaly=angle("MEAN_ANOMALY", 360),
         drag=number("BSTAR"),
         kind="orbit mean elements",
-        where=where,
+        where=location,
     )

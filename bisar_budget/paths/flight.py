@@ -1,9 +1,9 @@
 """A platform's path as a file knows it, and the function of slow time that a budget flies.
 
 Exact ranges, images and every other command take a path as a polynomial over the aperture, or as several in pieces.
-An orbit gives a place at any time: its polynomial interpolates. A log gives measured places: one polynomial smooths
-them by least squares, or a spline of as many pieces as the log needs. Both say how far the path is from what the file
-has.
+An orbit gives a position at any time: its polynomial interpolates. A log gives measured fixes: one polynomial smooths
+them by least squares, or a spline with the number of pieces that the log needs. Both paths come with their distance
+from the positions of the file.
 """
 
 import math
@@ -23,33 +23,84 @@ from bisar_budget.paths.instant import DAY, Instant, gps_week
 from bisar_budget.paths.splines import ORDER, SplineFit
 from bisar_budget.paths.splines import basis as spline_basis
 
-_NODES = 15  # Chebyshev points of an interpolation, so many coefficients
-_LEAST_WINDOW = 10.0  # s; in a shorter one rounding of an Earth-fixed place, 1e-9 m, is an acceleration
-_LOOKS = 65  # at the aperture, for what is between places
-_UNSEEN_M = 1e-7  # a coefficient that moves the path by less is rounding
-_ROUGH_M = 5e-3  # a path that is farther from its polynomial is not smooth; messages have places to 1 mm
-_TRIFLE_M = 1e-3
-_STRAY = 8  # times the usual residual; noise of thousands of places reaches 4
-_HIGHEST = 8  # order of a smoothed path of one piece
-_CLEAN_M = 1e-5  # root mean square that a path leaves of a log: what is less is no reason for more pieces
-_WHITE = 2.0  # times its standard deviation: so far what neighbouring residuals have in common is chance
-_MOST_PIECES = 256
-_TRIED = 128  # coefficients at least, before no number of pieces is better: enough for 40 full circles
-_TRIED_RATIO = 4  # or so many times those of the best path
-_LOOKS_PER_PIECE = 4
-_SAME = 1e-9  # of the largest mode of the noise: what is less is rounding
-_FEWEST = 5  # places of a log that give a path
-_ENOUGH = 9  # of them that say what is noise; of a log that has fewer in the aperture, places beside it help
-_GROWTH = 1.5  # of a stretch to the next wider one
-_WIDEST_RATIO = 64.0  # of a stretch over the narrowest
-_MOST_FITTED = 20_000  # places
-_SETTLED_M = 1e-6  # of the fit's own noise in the path: less decides nothing, at any carrier
-_CHANCE = 2.0  # times the variance that two fits are apart by chance
-_HOPELESS = 9.0  # times the least predicted error (squares), from which on no wider stretch is tried
-_RESIDUAL_GROWTH = 1.1  # of the residual in the aperture, from which on a wider fit does not follow the path
-_WIDEST_GAP = 5  # usual intervals between samples
-_LISTED = 3  # tracks that an error names
-_ROUNDED = 1 + 1e-6  # of an interval whose ends are rounded
+_INTERPOLATION_NODES = 15  # Chebyshev points of an interpolation
+_MIN_WINDOW_S = 10.0  # in a shorter window the rounding of an Earth-fixed position, 1e-9 m, is an acceleration
+_MAX_INTERPOLATION_ERROR_M = (
+    5e-3  # farther from its polynomial, a path is not smooth; messages have positions to 1 mm
+)
+_ROUNDING_M = 1e-7  # a coefficient that moves the path by less is rounding
+_ROUNDING_FACTOR = 1 + 1e-6  # on an interval whose ends are rounded
+_MAX_GAP_RATIO = 5  # of a gap between fixes to the median interval
+_NAMED_TRACKS = 3  # tracks that an error names
+
+
+@dataclass(frozen=True)
+class SmoothingSettings:
+    """Tunings of the path through the fixes of a log.
+
+    Attributes
+    ----------
+    min_fixes : int
+        Smallest number of fixes that give a path.
+    noise_fixes : int
+        Number of fixes that tell noise from motion. A stretch is widened beyond the aperture until it has them.
+    max_order : int
+        Largest order of a path of one piece.
+    max_pieces : int
+        Largest number of pieces of a path.
+    tried_coefficients, tried_ratio : int
+        Number of coefficients up to which more pieces are tried although none is better yet: at least this number,
+        which is enough for 40 full circles, and this ratio to the coefficients of the best path.
+    clean_rms_m : float
+        Root mean square of residuals below which a path gets no further pieces. [m]
+    white_sigmas : float
+        Standard deviations up to which the mean product of neighbouring residuals is chance.
+    min_samples : int
+        Smallest number of times over the aperture at which the error of a path is sampled.
+    samples_per_piece : int
+        Smallest number of such times in a piece.
+    mode_fraction : float
+        Modes of the noise below this fraction of the largest mode are rounding.
+    stretch_ratio, widest_ratio : float
+        Ratio of a stretch to the next narrower stretch, and of the widest to the narrowest stretch.
+    max_fitted_fixes : int
+        Largest number of fixes in a stretch.
+    negligible_noise_m : float
+        Error of the path by the noise of its fit below which no wider stretch is tried: no carrier sees it. [m]
+    chance_factor : float
+        Ratio of the difference of two fits that counts as chance to its variance.
+    hopeless_ratio : float
+        Ratio of the squared predicted error to the smallest one from which no wider stretch is tried.
+    residual_ratio : float
+        Growth of the residual in the aperture from which a wider fit does not follow the path.
+    stray_ratio, min_stray_m : float
+        A fix strays from the path by more than this ratio to the median residual, plus this distance [m]. Noise of
+        thousands of fixes reaches a ratio of 4.
+    """
+
+    min_fixes: int = 5
+    noise_fixes: int = 9
+    max_order: int = 8
+    max_pieces: int = 256
+    tried_coefficients: int = 128
+    tried_ratio: int = 4
+    clean_rms_m: float = 1e-5
+    white_sigmas: float = 2.0
+    min_samples: int = 65
+    samples_per_piece: int = 4
+    mode_fraction: float = 1e-9
+    stretch_ratio: float = 1.5
+    widest_ratio: float = 64.0
+    max_fitted_fixes: int = 20_000
+    negligible_noise_m: float = 1e-6
+    chance_factor: float = 2.0
+    hopeless_ratio: float = 9.0
+    residual_ratio: float = 1.1
+    stray_ratio: float = 8.0
+    min_stray_m: float = 1e-3
+
+
+_SETTINGS = SmoothingSettings()
 
 
 NO_MATRIX: Matrix = ((0.0,) * 3,) * 3
@@ -58,9 +109,9 @@ NO_MATRIX: Matrix = ((0.0,) * 3,) * 3
 class PathFileError(Exception):
     """A file that gives no path. The message names the file, and its line, byte or record.
 
-    `accepted` says what a file would have instead, `hint` what may be done. `key` is the one beside that of the file
-    which the file contradicts; empty: the file itself is wrong. `spans` are the times for which the file has places,
-    where it has none for those that were asked for.
+    `accepted` describes an accepted file, `hint` a remedy. `key` is the key of the mission file that the file
+    contradicts; empty: the file itself is wrong. `spans` are the times that the file covers, if it does not cover the
+    requested time.
     """
 
     def __init__(
@@ -75,14 +126,14 @@ class PathFileError(Exception):
         self.accepted, self.hint, self.key, self.spans = accepted, hint, key, spans
 
 
-def hold_to_bytes(data: bytes, most: int, name: str) -> None:
-    """Refuse a log of more bytes than are read; raises `PathFileError`."""
-    if len(data) > most:
-        raise PathFileError(f"{name}: has {len(data) / 1e6:.0f} MB, at most {most / 1e6:.0f} MB are read")
+def hold_to_bytes(data: bytes, max_bytes: int, name: str) -> None:
+    """Refuse a log of more than `max_bytes` bytes; raises `PathFileError`."""
+    if len(data) > max_bytes:
+        raise PathFileError(f"{name}: has {len(data) / 1e6:.0f} MB, at most {max_bytes / 1e6:.0f} MB are read")
 
 
 class PathDoubt(NamedTuple):
-    """How far the truth may be from a path, by what is known of its own source [m], and what that is."""
+    """Largest distance of the truth from a path, from knowledge about its source [m], and the words for the cause."""
 
     size: float
     words: str
@@ -95,11 +146,28 @@ NO_DOUBT = PathDoubt(0.0, "")
 class Orbit:
     """A path that is known at any instant of a span.
 
-    `place` takes an instant and gives Earth-fixed coordinates [m]. `words` says what it is, for reports; `epoch` is
-    that of the elements. `doubt` says at an instant how far the truth may be; `doubts` are warnings of it, where it
-    is more than usual, and `remedy` is what makes it less. An orbit that `is_turned` comes from axes of the stars.
-    `turning_doubt` and `turning_doubts` are the part of both that the Earth's orientation has, not the orbit.
-    `stated` is the accuracy that its file states at an instant, along the axes of the Earth.
+    Attributes
+    ----------
+    place : callable
+        Earth-fixed coordinates at an instant. [m]
+    words : str
+        The orbit in reports.
+    span : tuple of Instant, optional
+        First and last instant.
+    epoch : Instant, optional
+        Epoch of the elements.
+    doubts : callable
+        Warnings at an instant where the doubt is larger than usual.
+    doubt : callable
+        Largest distance of the truth from the path at an instant. [m]
+    remedy : str
+        Words for a way to reduce the doubt.
+    is_turned : bool
+        Whether the orbit comes from axes of the stars.
+    turning_doubt, turning_doubts : callable
+        The share of `doubt` and of `doubts` that comes from the Earth's orientation.
+    stated : callable
+        Accuracy that the file states at an instant, along the axes of the Earth.
     """
 
     place: Callable[[Instant], Vector]
@@ -115,19 +183,19 @@ class Orbit:
     stated: Callable[[Instant], StatedAccuracy | None] = lambda _: None
 
     def as_planned(self) -> "Orbit":
-        """The orbit as the plan, which is flown as it stands: neither its age nor its interpolation is in doubt."""
+        """The orbit as a plan that is flown exactly, without doubts about its age and its interpolation."""
         words = f"{self.words}, flown as planned: its age and its interpolation do not count"
         return replace(self, words=words, doubt=self.turning_doubt, doubts=self.turning_doubts)
 
     def largest_doubt_m(self, instant: Instant) -> float:
-        """How far the truth may be at an instant, by what its file states of itself or by anything else. [m]"""
+        """Largest distance of the truth from the path at an instant, by its doubt and by its stated accuracy. [m]"""
         stated = self.stated(instant)
         return max(self.doubt(instant).size, 0.0 if stated is None else stated.position_m)
 
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """Records of a log that cannot be used: how many usable ones come before each (m,), and messages that say why."""
+    """Unusable records of a log: the number of usable records before each (m,), and a message about each."""
 
     before: NDArray[np.int64]
     faults: Sequence[str]
@@ -135,16 +203,34 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """Measured places (n, 3) [m] at rising times (n,) [s], Earth-fixed or in the scene's axes.
+    """Fixes of a flight.
 
-    Times count from `start`; without one they are those of the log itself: from a midnight of UTC where `clock` is
-    "day", from the begin of a GPS week where it is "week". `words` says what the log is, for reports. `left_out` are
-    records that are not among the places. A file of several tracks, of which no key chooses one, has the log of each
-    in `tracks`; the log itself is then that of the first.
-    `sigmas` (n, 3) are one-sigma errors east, north, up, where the log states them; NaN for those it does not [m].
-    `typical_sigmas` (n,) are those that a fix of the stated quality usually has, on each axis; NaN where the log
-    says no quality [m]. `quality_words` names the quality of the fix of an index: "GGA quality 1, autonomous".
-    `grid` is one step of each coordinate that the log writes, in the axes of the places [m].
+    Attributes
+    ----------
+    times : (n,)
+        Rising times of the fixes since `start`. Without `start` they count on the clock of the log. [s]
+    places : (n, 3)
+        Positions of the fixes, Earth-fixed or in the scene's axes. [m]
+    is_earth_fixed : bool
+        Whether the positions are Earth-fixed.
+    words : str
+        The log in reports.
+    start : Instant, optional
+        Instant of UTC from which times count.
+    sigmas : (n, 3), optional
+        One-sigma errors east, north, up that the log states; NaN at a fix without them. [m]
+    typical_sigmas : (n,), optional
+        Usual one-sigma error of a fix of the stated quality, on each axis; NaN at a fix without a quality. [m]
+    quality_words : callable
+        Quality of the fix of an index, such as "GGA quality 1, autonomous".
+    clock : str
+        "day" if times count from a midnight of UTC, "week" if they count from the begin of a GPS week.
+    left_out : LeftOut, optional
+        Records that cannot be used and are not among the fixes.
+    tracks : tuple of Log
+        Logs of all tracks of a file with several tracks, if no key chooses a track. The log itself is then the first.
+    grid : (3, 3)
+        One step of each coordinate as the log writes it, in the axes of the positions. [m]
     """
 
     times: Floats
@@ -163,17 +249,35 @@ class Log:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A path by polynomials, their order, and how far it is from the file's places, at most and root mean square [m].
+    """A path by polynomials, and its distance from the positions of its file.
 
-    `pieces` is the number of the polynomials: more than one, and they meet with one place and one velocity.
-    `samples` is how many of a log's places they smooth, over `stretch` [s]; none of an orbit, which is interpolated.
-    `missed` is how far the path goes by a place of the log that it does not know, root mean square [m]. `doubts` are
-    warnings.
-    `residual` (3, 3) is the covariance of what the path leaves of the fixes in the aperture [m²], and
-    `correlation_time` that of a Gauss-Markov process which is correlated as they are [s]. `acceleration_noise` (3, 3)
-    is the covariance of the fit's own error of the acceleration [m²/s⁴], with what a wider stretch may have smeared:
-    of one polynomial at mid-aperture, of pieces that of the parabola through their error. `path_noise` is that error
-    over the aperture.
+    Attributes
+    ----------
+    state : PlatformState
+        The path.
+    order : int
+        Order of the polynomials.
+    farthest, rms : float
+        Distance of the path from positions of the file: the largest, and the root mean square. [m]
+    samples : int
+        Number of fixes of a log that the path smooths; 0 for an orbit, which is interpolated.
+    doubts : tuple of str
+        Warnings.
+    stretch : float
+        Duration of the fixes that the path smooths. [s]
+    missed : float
+        Root mean square distance of a fix of the log from the path that is fitted without the fix. [m]
+    residual : (3, 3)
+        Covariance of the residuals of the fixes in the aperture. [m²]
+    correlation_time : float
+        Correlation time of a Gauss-Markov process that is correlated like the residuals. [s]
+    acceleration_noise : (3, 3)
+        Covariance of the error of the acceleration by the noise of the fit and by the smear of a wider stretch: at
+        mid-aperture for one polynomial, and of the parabola through the error for pieces. [m²/s⁴]
+    path_noise : PathNoise, optional
+        The same error over the aperture.
+    pieces : int
+        Number of polynomials. Neighbouring polynomials meet with equal position and velocity.
     """
 
     state: PlatformState
@@ -191,62 +295,77 @@ class Fitted:
     pieces: int = 1
 
 
-def interpolated(places: Callable[[Floats], Floats], aperture_time_s: float, widest_s: float = math.inf) -> Fitted:
-    """Path through places of the scene at Chebyshev points around the aperture.
+def interpolated(
+    positions_at: Callable[[Floats], Floats], aperture_time_s: float, widest_s: float = math.inf
+) -> Fitted:
+    """Path through positions at Chebyshev points around the aperture.
 
     Parameters
     ----------
-    places : callable
-        From slow times (n,) [s] to places (n, 3) in the scene's axes [m].
+    positions_at : callable
+        From slow times (n,) [s] to positions (n, 3) in the scene's axes [m].
     aperture_time_s : float
-        What the path is needed for.
+        Length of the aperture. [s]
     widest_s : float
-        Longest time around the middle in which there are places.
+        Longest time around the middle in which positions are known. [s]
     """
-    half = min(max(aperture_time_s, _LEAST_WINDOW), widest_s) / 2
-    nodes = chebyshev.chebpts1(_NODES)
-    basis = chebyshev.chebvander(nodes, _NODES - 1)
-    series: Floats = np.asarray(np.linalg.solve(basis, places(half * nodes)), dtype=float)
-    series[np.abs(series) <= _UNSEEN_M] = 0.0  # what is below rounding would be divided by high powers of the window
+    half = min(max(aperture_time_s, _MIN_WINDOW_S), widest_s) / 2
+    nodes = chebyshev.chebpts1(_INTERPOLATION_NODES)
+    basis = chebyshev.chebvander(nodes, _INTERPOLATION_NODES - 1)
+    series: Floats = np.asarray(np.linalg.solve(basis, positions_at(half * nodes)), dtype=float)
+    series[np.abs(series) <= _ROUNDING_M] = 0.0  # high powers of the window would magnify rounding
     state = path_of(powers_of(series, half, chebyshev.cheb2poly))
-    times = aperture_time_s / 2 * np.cos(math.pi * np.arange(_NODES + 1) / _NODES)
-    apart = np.linalg.norm(np.stack(state.place(times), axis=1) - places(times), axis=1)
-    farthest, rms = float(apart.max()), math.sqrt(float(np.mean(apart**2)))
+    times = aperture_time_s / 2 * np.cos(math.pi * np.arange(_INTERPOLATION_NODES + 1) / _INTERPOLATION_NODES)
+    distances = np.linalg.norm(np.stack(state.place(times), axis=1) - positions_at(times), axis=1)
+    farthest, rms = float(distances.max()), math.sqrt(float(np.mean(distances**2)))
     doubts: tuple[str, ...] = ()
-    if farthest > _ROUGH_M:
+    if farthest > _MAX_INTERPOLATION_ERROR_M:
         doubts = (f"the polynomial that is flown is up to {farthest:.3g} m from the path",)
     return Fitted(state, len(state.bends) + 2, farthest, rms, doubts=doubts)
 
 
 def stretch_around(times: Floats, aperture_time_s: float) -> float:
-    """Shortest time around the middle of an aperture whose places of a log are smoothed. [s]
+    """Shortest time around the middle of an aperture whose fixes are smoothed. [s]
 
-    It is the aperture, or as much longer as holds nine places: a log at 1 Hz has three in 3 s.
+    The time is the aperture, or longer until it holds nine fixes: a log at 1 Hz has three fixes in 3 s.
     """
-    apart = np.sort(np.abs(times))[:_ENOUGH]
-    return max(aperture_time_s, 2 * float(apart.max(initial=0.0)))
+    distances = np.sort(np.abs(times))[: _SETTINGS.noise_fixes]
+    return max(aperture_time_s, 2 * float(distances.max(initial=0.0)))
 
 
 @dataclass(frozen=True, eq=False)
 class _SmoothFit:
-    """A path through the fixes of a stretch: slow times (n,) [s], and what it leaves of them (n, 3) [m].
+    """A path through the fixes of a stretch: a Legendre series or a spline.
 
-    It is a Legendre series, or a spline. `independent` is how many independent fixes they are worth. `root`
-    (coefficients, coefficients) times its transpose is the covariance of the coefficients, over the variance of white
-    fixes.
+    Attributes
+    ----------
+    half_s : float
+        Half the length of the stretch. [s]
+    times : (n,)
+        Slow times of the fixes. [s]
+    series : (coefficients, 3)
+        Coefficients of the path. [m]
+    residuals : (n, 3)
+        Fixes less the path. [m]
+    independent : float
+        Number of independent fixes with the same information.
+    root : (coefficients, coefficients)
+        Its product with its transpose is the covariance of the coefficients over the variance of white fixes.
+    spline : SplineFit, optional
+        The spline; None for a Legendre series.
     """
 
     half_s: float
     times: Floats
     series: Floats
-    left: Floats
+    residuals: Floats
     independent: float
     root: Floats
     spline: SplineFit | None = None
 
     @classmethod
     def of_spline(cls, half_s: float, times: Floats, spline: SplineFit, independent: float) -> "_SmoothFit":
-        return cls(half_s, times, spline.series, spline.left, independent, spline.root, spline)
+        return cls(half_s, times, spline.series, spline.residuals, independent, spline.root, spline)
 
     @property
     def order(self) -> int:
@@ -258,57 +377,57 @@ class _SmoothFit:
 
     @property
     def covariance(self) -> Floats:
-        """Covariance of the coefficients, over the variance of a fix; correlated fixes count as fewer."""
-        return np.asarray(self.root @ self.root.T * (len(self.left) / self.independent))
+        """Covariance of the coefficients over the variance of a fix. Correlated fixes count as fewer fixes."""
+        return np.asarray(self.root @ self.root.T * (len(self.residuals) / self.independent))
 
     @property
     def variances(self) -> Floats:
         """Variance of a fix on each axis, (3,). [m²]"""
-        found: Floats = (self.left**2).sum(axis=0) / max(len(self.left) - len(self.series), 1)
-        return found
+        variances: Floats = (self.residuals**2).sum(axis=0) / max(len(self.residuals) - len(self.series), 1)
+        return variances
 
     @property
-    def in_common(self) -> tuple[float, float]:
-        """Mean product of a residual and the next one, which white noise has none of, and its standard deviation.
+    def common_motion(self) -> tuple[float, float]:
+        """Mean product of a residual and the next residual, and its standard deviation. White fixes give zero. [m²]
 
-        Of white noise each coefficient takes a part that neighbours have in common; it is given back.
+        A fit removes a common share of white noise from neighbouring residuals. The share is added again.
         """
-        products = (self.left[1:] * self.left[:-1]).sum(axis=1)
-        mean, square = float(products.mean()), float(np.mean(np.sum(self.left**2, axis=1)))
-        taken = len(self.series) / len(self.left) * (square - mean)
+        products = (self.residuals[1:] * self.residuals[:-1]).sum(axis=1)
+        mean, square = float(products.mean()), float(np.mean(np.sum(self.residuals**2, axis=1)))
+        taken = len(self.series) / len(self.residuals) * (square - mean)
         return mean + taken, math.sqrt(float(np.mean(products**2)) / len(products))
 
     @property
     def rms(self) -> float:
-        """Root mean square of what it leaves. [m]"""
-        return math.sqrt(float(np.mean(np.sum(self.left**2, axis=1))))
+        """Root mean square of the residuals. [m]"""
+        return math.sqrt(float(np.mean(np.sum(self.residuals**2, axis=1))))
 
     def basis(self, times: Floats) -> Floats:
-        """Matrix (m, coefficients) from coefficients to places at slow times (m,) [s]."""
+        """Matrix (m, coefficients) from coefficients to positions at slow times (m,) [s]."""
         if self.spline is not None:
             return spline_basis(times, self.spline.edges)
         return np.asarray(legendre.legvander(times / self.half_s, self.order))
 
     def places(self, times: Floats) -> Floats:
-        """Places at slow times [s], (m, 3). [m]"""
-        found: Floats = self.basis(times) @ self.series
-        return found if self.spline is None else found + self.spline.middle
+        """Positions (m, 3) [m] at slow times (m,) [s]."""
+        positions: Floats = self.basis(times) @ self.series
+        return positions if self.spline is None else positions + self.spline.center
 
     def leverage(self, times: Floats) -> Floats:
-        """Variance that the fit has at slow times (m,) [s], over that of a fix."""
+        """Variance of the path at slow times (m,) [s] over the variance of a fix."""
         return np.asarray(np.sum((self.basis(times) @ self.root) ** 2, axis=1))
 
     def state(self) -> PlatformState:
-        """The path that it is."""
+        """The path."""
         return path_of(powers_of(self.series, self.half_s)) if self.spline is None else self.spline.state()
 
-    def looks(self, aperture_time_s: float) -> Floats:
-        """Slow times over an aperture, close enough for the error of the path. [s]"""
-        count = max(_LOOKS, _LOOKS_PER_PIECE * self.pieces + 1)
+    def sample_times(self, aperture_time_s: float) -> Floats:
+        """Slow times over an aperture at which the error of the path is sampled. [s]"""
+        count = max(_SETTINGS.min_samples, _SETTINGS.samples_per_piece * self.pieces + 1)
         return np.asarray(aperture_time_s / 2 * np.linspace(-1, 1, count))
 
     def noise(self, times: Floats, left_out: Floats) -> float:
-        """Mean square of the fit's own error over times (m,), of which a projection (m, m) is left out. [m²]"""
+        """Mean square of the path's error over times (m,) by noise of the fixes, less a projection (m, m). [m²]"""
         basis = self.basis(times)
         basis = basis - left_out @ basis
         return float(np.einsum("mi,ij,mj->", basis, self.covariance, basis) / times.size * self.variances.sum())
@@ -316,29 +435,33 @@ class _SmoothFit:
     def acceleration_noise(self, aperture_time_s: float) -> Floats:
         """Covariance of the error of the acceleration, (3, 3). [m²/s⁴]
 
-        A polynomial's error has it at mid-aperture. Each piece of a spline has an error of its own, of which the
-        bend over the whole aperture counts: that of the parabola through the error.
+        For a polynomial, the error at mid-aperture. The pieces of a spline have different errors, so the acceleration
+        of the parabola through the error over the aperture counts.
         """
         if self.spline is None:
-            bends = np.array([legendre.legval(0.0, legendre.legder(one, 2)) for one in np.eye(self.order + 1)])
+            bends = np.array([legendre.legval(0.0, legendre.legder(series, 2)) for series in np.eye(self.order + 1)])
             scale_s = self.half_s
         else:
-            looks, scale_s = self.looks(aperture_time_s), aperture_time_s / 2
-            parabola = np.linalg.pinv(legendre.legvander(looks / scale_s, 2))[2]
-            bends = 3 * parabola @ self.basis(looks)  # P₂ has the second derivative 3
+            sample_times, scale_s = self.sample_times(aperture_time_s), aperture_time_s / 2
+            parabola = np.linalg.pinv(legendre.legvander(sample_times / scale_s, 2))[2]
+            bends = 3 * parabola @ self.basis(sample_times)  # P₂ has the second derivative 3
         variance = float(bends @ self.covariance @ bends) / scale_s**4
         return np.diag(variance * self.variances)
 
     def path_noise(self, aperture_time_s: float, excess: float) -> PathNoise:
-        """The error of the path over the aperture, its variance times a factor."""
-        looks, half_s = self.looks(aperture_time_s), aperture_time_s / 2
-        through = np.linalg.pinv(legendre.legvander(looks / half_s, _HIGHEST)) @ self.basis(looks)
-        ways, sizes, _ = np.linalg.svd(through @ self.root, full_matrices=False)
-        ways = ways[:, sizes > _SAME * sizes[0]] * sizes[sizes > _SAME * sizes[0]]
-        sigmas = np.sqrt(excess * len(self.left) / self.independent * self.variances)
+        """The error of the path over the aperture by noise of the fixes, with its variance times `excess`."""
+        sample_times, half_s = self.sample_times(aperture_time_s), aperture_time_s / 2
+        through = np.linalg.pinv(legendre.legvander(sample_times / half_s, _SETTINGS.max_order)) @ self.basis(
+            sample_times
+        )
+        shapes, sizes, _ = np.linalg.svd(through @ self.root, full_matrices=False)
+        shapes = (
+            shapes[:, sizes > _SETTINGS.mode_fraction * sizes[0]] * sizes[sizes > _SETTINGS.mode_fraction * sizes[0]]
+        )
+        sigmas = np.sqrt(excess * len(self.residuals) / self.independent * self.variances)
         modes = []
-        for way in ways.T:
-            powers = np.array(legendre.leg2poly(way)) / half_s ** np.arange(len(way))
+        for shape in shapes.T:
+            powers = np.array(legendre.leg2poly(shape)) / half_s ** np.arange(len(shape))
             modes += [
                 tuple(_vector(sigma * power * axis) for power in powers)
                 for sigma, axis in zip(sigmas, np.eye(3), strict=True)
@@ -346,172 +469,184 @@ class _SmoothFit:
         return PathNoise(tuple(modes))
 
 
-def _information(fit_left: Floats, coefficients: int, independent: float) -> float:
-    """Information criterion of a fit by what it leaves (n, 3) [m]: the less, the better.
+def _information(residuals: Floats, coefficients: int, independent: float) -> float:
+    """Information criterion of a fit with residuals (n, 3) [m]: the smaller, the better.
 
-    Each axis has its own noise, and as many coefficients. The last factor is that of AICc (Hurvich & Tsai 1989): a
-    few samples are fitted too well by chance.
+    Each axis has its own noise, and the same number of coefficients. The last factor is the factor of AICc (Hurvich &
+    Tsai 1989): a small number of fixes is fitted too well by chance.
     """
-    count, squares = len(fit_left), (fit_left**2).mean(axis=0) + _UNSEEN_M**2
+    count, squares = len(residuals), (residuals**2).mean(axis=0) + _ROUNDING_M**2
     cost = 3 * coefficients * math.log(independent) * count / (count - coefficients - 1)
     return float(independent * np.log(squares).sum()) + cost
 
 
-def _fit(times: Floats, places: Floats, half_s: float, *, may_have_pieces: bool) -> _SmoothFit:
-    """The path of the least Bayesian information criterion (Schwarz 1978) through the fixes of a stretch."""
+def _fit(times: Floats, log_positions: Floats, half_s: float, *, may_have_pieces: bool) -> _SmoothFit:
+    """The path with the smallest Bayesian information criterion (Schwarz 1978) through the fixes of a stretch."""
     inside = np.abs(times) <= half_s * (1 + 1e-9)
-    used, wanted, count = times[inside], places[inside], int(inside.sum())
-    at = used / half_s
-    fits = [least_squares(at, wanted, order) for order in range(2, min(_HIGHEST, (count - 1) // 2) + 1)]
+    times_inside, positions, count = times[inside], log_positions[inside], int(inside.sum())
+    normalised_times = times_inside / half_s
+    max_order = min(_SETTINGS.max_order, (count - 1) // 2)
+    fits = [least_squares(normalised_times, positions, order) for order in range(2, max_order + 1)]
     independent = _independent(fits[-1][1])
-    series, left = min(fits, key=lambda fit: _information(fit[1], len(fit[0]), independent))
-    triangle = np.linalg.qr(legendre.legvander(at, len(series) - 1))[1]
-    fit = _SmoothFit(half_s, used, series, left, independent, np.linalg.inv(triangle))
-    return _in_pieces(fit, wanted) if may_have_pieces else fit
+    series, residuals = min(fits, key=lambda fit: _information(fit[1], len(fit[0]), independent))
+    triangle = np.linalg.qr(legendre.legvander(normalised_times, len(series) - 1))[1]
+    fit = _SmoothFit(half_s, times_inside, series, residuals, independent, np.linalg.inv(triangle))
+    return _in_pieces(fit, positions) if may_have_pieces else fit
 
 
-def _in_pieces(fit: _SmoothFit, places: Floats) -> _SmoothFit:
-    """The polynomial itself, or a spline through its fixes (n, 3) [m] where that has less information left.
+def _in_pieces(fit: _SmoothFit, positions: Floats) -> _SmoothFit:
+    """The polynomial, or a spline through its fixes (n, 3) [m] if its information criterion is smaller.
 
-    Pieces are halved, see `splines`, as long as residuals have something in common.
+    Pieces are halved, see `splines`, as long as neighbouring residuals are correlated.
     """
-    best = last = fit
+    best = newest = fit
     edges: Floats | None = np.array([-fit.half_s, fit.half_s])
-    while edges is not None and best.rms > _CLEAN_M and last.in_common[0] > _WHITE * last.in_common[1]:
-        coefficients = len(edges) - 1 + ORDER
-        most = min(max(_TRIED, _TRIED_RATIO * len(best.series)), _MOST_PIECES + ORDER, len(places) // 2)
-        if coefficients > most:
+    while edges is not None and best.rms > _SETTINGS.clean_rms_m:
+        motion, motion_sigma = newest.common_motion
+        if motion <= _SETTINGS.white_sigmas * motion_sigma:
             break
-        spline = SplineFit.of(fit.times, places, edges)
-        independent = _independent(spline.left)
-        last = _SmoothFit.of_spline(fit.half_s, fit.times, spline, independent)
-        gain = _information(best.left, len(best.series), independent) - _information(
-            last.left, coefficients, independent
+        coefficients = len(edges) - 1 + ORDER
+        tried_coefficients = max(_SETTINGS.tried_coefficients, _SETTINGS.tried_ratio * len(best.series))
+        max_coefficients = min(tried_coefficients, _SETTINGS.max_pieces + ORDER, len(positions) // 2)
+        if coefficients > max_coefficients:
+            break
+        spline = SplineFit.of(fit.times, positions, edges)
+        independent = _independent(spline.residuals)
+        newest = _SmoothFit.of_spline(fit.half_s, fit.times, spline, independent)
+        gain = _information(best.residuals, len(best.series), independent) - _information(
+            newest.residuals, coefficients, independent
         )
-        falls = last.in_common[0] * coefficients**2 <= best.in_common[0] * len(best.series) ** 2
+        falls = newest.common_motion[0] * coefficients**2 <= best.common_motion[0] * len(best.series) ** 2
         if gain > 0 and falls:
-            best = last
+            best = newest
         edges = spline.halved(fit.times)
     return best
 
 
 def _widened(
-    narrowest: _SmoothFit, times: Floats, places: Floats, aperture_time_s: float, widest_s: float
+    narrowest: _SmoothFit, times: Floats, positions: Floats, aperture_time_s: float, widest_s: float
 ) -> tuple[_SmoothFit, float]:
-    """The fit of the stretch whose path over the aperture has the smallest predicted error; that over its noise.
+    """The fit with the smallest predicted error over the aperture, and that squared error over its squared noise.
 
-    A longer stretch averages more noise: the acceleration of a parabola has an error of σ√(720/(n·T⁴)). It may smear
-    what the platform did, and nobody knows that. What is known is how far the path is from those of narrower
-    stretches: the square of that has the expectation of the smear and of the noise that the wider fit does without.
-    What exceeds that noise is counted as smear (Goldenshluger & Lepski 2011, whose rule this is; Lepski 1991). The
-    error that counts is that beyond a straight line, which defocuses; the whole path must not become worse, and the
-    residual in the aperture must not grow.
+    A longer stretch averages more noise: the acceleration of a parabola has an error of σ√(720/(n·T⁴)). But a longer
+    stretch may smear the motion of the platform, and the smear is unknown. The distance of the path from the paths of
+    narrower stretches is known. The expectation of its square is the square of the smear plus the noise that the
+    wider fit avoids. The excess over that noise counts as smear (rule of Goldenshluger & Lepski 2011; Lepski 1991).
+    The error that counts is the error beyond a straight line, which defocuses. In addition the whole path must not
+    become worse, and the residual in the aperture must not grow.
     """
-    looks, has_pieces = narrowest.looks(aperture_time_s), narrowest.spline is not None
-    straight = np.linalg.qr(np.vander(looks, 2))[0]
-    projection, nothing = straight @ straight.T, np.zeros((looks.size, looks.size))
-    kept = (projection, nothing)  # what is left out of the error that counts, and of the whole
-    reach_s = min(widest_s / 2, max(abs(float(times[0])), abs(float(times[-1]))), _WIDEST_RATIO * narrowest.half_s)
+    sample_times, has_pieces = narrowest.sample_times(aperture_time_s), narrowest.spline is not None
+    straight = np.linalg.qr(np.vander(sample_times, 2))[0]
+    line_projection, no_projection = straight @ straight.T, np.zeros((sample_times.size, sample_times.size))
+    projections = (line_projection, no_projection)  # for the error beyond a straight line, and for the whole error
+    max_half_s = min(
+        widest_s / 2, max(abs(float(times[0])), abs(float(times[-1]))), _SETTINGS.widest_ratio * narrowest.half_s
+    )
     if has_pieces:  # noise of distant fixes does not reach the aperture: only its ends gain
-        reach_s = min(reach_s, _GROWTH * narrowest.half_s)
-    candidates, half_s = [(narrowest, [narrowest.noise(looks, one) for one in kept])], narrowest.half_s
-    best, least = narrowest, candidates[0][1][0]
+        max_half_s = min(max_half_s, _SETTINGS.stretch_ratio * narrowest.half_s)
+    half_s = narrowest.half_s
+    candidates = [(narrowest, [narrowest.noise(sample_times, projection) for projection in projections])]
+    best, least_error = narrowest, candidates[0][1][0]
     residual = _residual_within(narrowest, aperture_time_s)
-    while least > _SETTLED_M**2 and half_s < reach_s * (1 - 1e-9):
-        half_s = min(half_s * _GROWTH, reach_s)
-        if np.searchsorted(times, half_s, "right") - np.searchsorted(times, -half_s) > _MOST_FITTED:
+    while least_error > _SETTINGS.negligible_noise_m**2 and half_s < max_half_s * (1 - 1e-9):
+        half_s = min(half_s * _SETTINGS.stretch_ratio, max_half_s)
+        if np.searchsorted(times, half_s, "right") - np.searchsorted(times, -half_s) > _SETTINGS.max_fitted_fixes:
             break
-        fit = _fit(times, places, half_s, may_have_pieces=has_pieces)
-        noises = [fit.noise(looks, one) for one in kept]
+        fit = _fit(times, positions, half_s, may_have_pieces=has_pieces)
+        noises = [fit.noise(sample_times, projection) for projection in projections]
         smears = [0.0, 0.0]
-        for other, of_other in candidates:
-            apart = fit.places(looks) - other.places(looks)
-            for place, left_out in enumerate(kept):
-                square = float(np.mean(np.sum((apart - left_out @ apart) ** 2, axis=1)))
-                smears[place] = max(smears[place], square - _CHANCE * max(of_other[place] - noises[place], 0.0))
+        for candidate, candidate_noises in candidates:
+            differences = fit.places(sample_times) - candidate.places(sample_times)
+            for index, projection in enumerate(projections):
+                square = float(np.mean(np.sum((differences - projection @ differences) ** 2, axis=1)))
+                chance = _SETTINGS.chance_factor * max(candidate_noises[index] - noises[index], 0.0)
+                smears[index] = max(smears[index], square - chance)
         candidates.append((fit, noises))
         errors = [noise + smear for noise, smear in zip(noises, smears, strict=True)]
-        grows = _residual_within(fit, aperture_time_s) > _RESIDUAL_GROWTH**2 * residual
-        if grows or errors[0] > _HOPELESS * least:
+        grows = _residual_within(fit, aperture_time_s) > _SETTINGS.residual_ratio**2 * residual
+        if grows or errors[0] > _SETTINGS.hopeless_ratio * least_error:
             break
-        if errors[0] < least and errors[1] <= candidates[0][1][1]:
-            best, least = fit, errors[0]
-    own = best.noise(looks, projection)
-    return best, least / own if own > 0 else 1.0
+        if errors[0] < least_error and errors[1] <= candidates[0][1][1]:
+            best, least_error = fit, errors[0]
+    noise = best.noise(sample_times, line_projection)
+    return best, least_error / noise if noise > 0 else 1.0
 
 
 def _residual_within(fit: _SmoothFit, aperture_time_s: float) -> float:
-    """Mean square of what a fit leaves of the fixes in the aperture, or of all where it has few. [m²]"""
+    """Mean square of the residuals in the aperture, or of all residuals if the aperture has too few fixes. [m²]"""
     inside = np.abs(fit.times) <= aperture_time_s / 2 * (1 + 1e-9)
-    left = fit.left[inside] if inside.sum() >= _ENOUGH else fit.left
-    count, coefficients = len(fit.left), len(fit.series)
-    return float(np.mean(np.sum(left**2, axis=1))) * count / max(count - coefficients, 1)
+    residuals = fit.residuals[inside] if inside.sum() >= _SETTINGS.noise_fixes else fit.residuals
+    count, coefficients = len(fit.residuals), len(fit.series)
+    return float(np.mean(np.sum(residuals**2, axis=1))) * count / max(count - coefficients, 1)
 
 
-def smoothed(times: Floats, places: Floats, aperture_time_s: float, widest_s: float = 0.0) -> Fitted:
-    """Path that fits the places of a log around the aperture by least squares.
+def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s: float = 0.0) -> Fitted:
+    """Path that fits the fixes of a log around the aperture by least squares.
 
-    The order is that of the least Bayesian information criterion (Schwarz 1978), to 8 at most and to half the
-    samples. Where one polynomial leaves motion, the path is a spline of as many pieces as the same criterion asks
-    for, see `splines`. What a platform does faster is in the log's noise, or is vibration. Samples with correlated
-    residuals count as fewer. A slow error of the log, which looks like motion, is then not fitted as if it were white
-    noise.
+    The order has the smallest Bayesian information criterion (Schwarz 1978), and is at most 8 and at most half the
+    number of fixes. If one polynomial leaves motion, the path is a spline, and the same criterion chooses the number
+    of its pieces, see `splines`. Faster motion of a platform is noise of the log, or vibration. Fixes with correlated
+    residuals count as fewer fixes. A slow error of the log, which looks like motion, is then not fitted as if it were
+    white noise.
 
-    The stretch is that around the aperture, or as much longer as makes the predicted error of the path least, see
-    `_widened`: noise of the log is an acceleration of the path, by which allowables are wrong.
+    The stretch is the shortest stretch around the aperture, or a longer stretch with a smaller predicted error of the
+    path, see `_widened`: noise of the log is an acceleration of the path, and makes allowables wrong.
 
-    `missed` leaves out each place in the aperture, and the ones next to it, in turn (Allen 1974): that is noise, what
-    the polynomial does not follow, and what the platform did between two places, of which a log that is slow for its
-    motion says nothing. Where the fit makes more of noise than a place has, as in a gap, it is that much more.
+    `missed` leaves out each fix in the aperture, and the fixes next to it, in turn (Allen 1974). It holds the noise,
+    the motion that the polynomial does not follow, and the motion between two fixes, which a log that is slow for its
+    motion does not show. Where the path has more noise than a fix, as in a gap, `missed` is larger by that ratio.
 
     Parameters
     ----------
     times : (n,) ndarray
-        Slow time, rising; what is outside the stretch is not used. [s]
-    places : (n, 3) ndarray
-        In the scene's axes. [m]
+        Slow time, rising; fixes outside the stretch are not used. [s]
+    positions : (n, 3) ndarray
+        Positions of the fixes in the scene's axes. [m]
     aperture_time_s : float
-        Length of the aperture.
+        Length of the aperture. [s]
     widest_s : float
-        Longest time around the middle whose places may be smoothed; omitted: the shortest stretch that is needed.
+        Longest time around the middle whose fixes may be smoothed; omitted: the shortest stretch that is needed. [s]
 
     Raises
     ------
     PathFileError
-        Fewer than five places in all.
+        Fewer than five fixes in all.
 
     Notes
     -----
-    A residual r of a place of the leverage h is r/(1 - h) of the fit without it (Belsley, Kuh & Welsch 1980, 2.1).
+    A fix with the residual r and the leverage h is r/(1 - h) off the path that is fitted without the fix (Belsley,
+    Kuh & Welsch 1980, 2.1).
     """
     half = stretch_around(times, aperture_time_s) / 2
     count = int((np.abs(times) <= half * (1 + 1e-9)).sum())
-    if count < _FEWEST:
+    if count < _SETTINGS.min_fixes:
         raise PathFileError(
-            f"has {count} places around the aperture of {aperture_time_s:g} s, at least {_FEWEST} are needed; keep"
-            " more of the log"
+            f"has {count} places around the aperture of {aperture_time_s:g} s, at least {_SETTINGS.min_fixes} are "
+            "needed; keep more of the log"
         )
-    fit, excess = _widened(_fit(times, places, half, may_have_pieces=True), times, places, aperture_time_s, widest_s)
-    used, left, count = fit.times, fit.left, len(fit.times)
-    rms = math.sqrt(float((left**2).sum()) / max(count - len(fit.series), 1))
-    apart = np.linalg.norm(left, axis=1)
-    farthest, usual = float(apart.max()), float(np.median(apart))
+    fit, excess = _widened(
+        _fit(times, positions, half, may_have_pieces=True), times, positions, aperture_time_s, widest_s
+    )
+    times_used, residuals, count = fit.times, fit.residuals, len(fit.times)
+    rms = math.sqrt(float((residuals**2).sum()) / max(count - len(fit.series), 1))
+    distances = np.linalg.norm(residuals, axis=1)
+    farthest, median_distance = float(distances.max()), float(np.median(distances))
     doubts: tuple[str, ...] = ()
-    if farthest > _STRAY * usual + _TRIFLE_M:
-        when = float(used[apart.argmax()])
+    if farthest > _SETTINGS.stray_ratio * median_distance + _SETTINGS.min_stray_m:
+        stray_time = float(times_used[distances.argmax()])
         doubts = (
-            f"a place of the log, {when:+.4g} s from mid-aperture, is {farthest:.3g} m from the smooth path; half of "
-            f"the places are within {usual:.2g} m",
+            f"a place of the log, {stray_time:+.4g} s from mid-aperture, is {farthest:.3g} m from the smooth path; "
+            f"half of the places are within {median_distance:.2g} m",
         )
-    first = max(int(np.searchsorted(used, -aperture_time_s / 2)) - 1, 0)
-    near = slice(first, int(np.searchsorted(used, aperture_time_s / 2, "right")) + 1)
-    own = np.minimum(fit.leverage(used), 1 - 1e-9)  # at a place: its own part in the fit
-    missed = float(np.sqrt(np.mean((apart / (1 - own))[near] ** 2)))
-    # Noise of places beside a gap may be more in it.
-    widest = fit.leverage(fit.looks(aperture_time_s))
-    missed *= max(1.0, math.sqrt(float(widest.max())))
-    of_aperture = left[near]
-    residual = of_aperture.T @ of_aperture / len(of_aperture) * (count / max(count - len(fit.series), 1))
+    first = max(int(np.searchsorted(times_used, -aperture_time_s / 2)) - 1, 0)
+    near_aperture = slice(first, int(np.searchsorted(times_used, aperture_time_s / 2, "right")) + 1)
+    leverage = np.minimum(fit.leverage(times_used), 1 - 1e-9)  # influence of a fix on the path there
+    missed = float(np.sqrt(np.mean((distances / (1 - leverage))[near_aperture] ** 2)))
+    # In a gap the path may have more noise than at the fixes around the gap.
+    leverage_between = fit.leverage(fit.sample_times(aperture_time_s))
+    missed *= max(1.0, math.sqrt(float(leverage_between.max())))
+    near_residuals = residuals[near_aperture]
+    residual = near_residuals.T @ near_residuals / len(near_residuals) * (count / max(count - len(fit.series), 1))
     return Fitted(
         fit.state(),
         fit.order,
@@ -522,7 +657,7 @@ def smoothed(times: Floats, places: Floats, aperture_time_s: float, widest_s: fl
         2 * fit.half_s,
         missed,
         as_matrix(residual),
-        float(used[-1] - used[0]) / max(count - 1, 1) * count / fit.independent / 2,
+        float(times_used[-1] - times_used[0]) / max(count - 1, 1) * count / fit.independent / 2,
         as_matrix(excess * fit.acceleration_noise(aperture_time_s)),
         fit.path_noise(aperture_time_s, excess),
         fit.pieces,
@@ -530,9 +665,10 @@ def smoothed(times: Floats, places: Floats, aperture_time_s: float, widest_s: fl
 
 
 def around_aperture(times: Floats, aperture_time_s: float) -> slice:
-    """Which places are in the aperture or next to it, of slow times (n,) [s].
+    """Indices of the fixes in the aperture or next to it, from slow times (n,) [s].
 
-    The largest sigma of them counts: a mean would declare less error than the log has at some time of the aperture.
+    The largest sigma of these fixes counts. Their mean would declare a smaller error than the log has at some time of
+    the aperture.
     """
     half = aperture_time_s / 2
     first = max(int(np.searchsorted(times, -half, "right")) - 1, 0)
@@ -542,20 +678,20 @@ def around_aperture(times: Floats, aperture_time_s: float) -> slice:
 def slow_times(
     log: Log, center: Instant | None, center_seconds: float | None, aperture_time_s: float, name: str
 ) -> Floats:
-    """Slow time of each sample of a log that has what the aperture needs.
+    """Slow time of each fix of a log that covers the aperture.
 
     Parameters
     ----------
     log : Log
-        Any samples before and behind the aperture are kept.
+        The log. Fixes before and after the aperture are kept.
     center : Instant or None
-        Middle of the aperture, for a log in UTC; not looked at for another.
+        Middle of the aperture, for a log in UTC; ignored for any other log.
     center_seconds : float or None
         Middle of the aperture on the clock of a log that is not in UTC; None is 0 s. [s]
     aperture_time_s : float
         Length of the aperture. [s]
     name : str
-        What messages call the file.
+        The file in messages.
 
     Returns
     -------
@@ -565,8 +701,9 @@ def slow_times(
     Raises
     ------
     PathFileError
-        The log does not cover the aperture, give or take one sample, or has a gap in it of more than five usual
-        intervals: medians, in the aperture or of the log. Or the middle is on a clock that the log does not have.
+        The log does not cover the aperture, give or take one fix. Or it has a gap in the aperture of more than five
+        times the median interval, in the aperture or in the log. Or the middle is on a clock that the log does not
+        have.
     """
     times, start = log.times, log.start
     _hold_to_clock(log, center, center_seconds, name)
@@ -579,42 +716,43 @@ def slow_times(
             raise PathFileError(f"{name}: is in UTC; give the middle of the aperture in UTC")
     middle = center.since(start) if center is not None and start is not None else center_seconds or 0.0
 
-    def said(slow: float) -> str:
+    def time_text(slow: float) -> str:
         return start.after(slow + middle).as_text() if start is not None else f"{slow + middle:.12g} s"
 
     slow, half = times - middle, aperture_time_s / 2
 
-    def cause(place: int) -> str:
-        """Why there is no sample before that of a place, where there are records that cannot be used."""
-        if log.left_out is None or place not in log.left_out.before:
+    def cause(index: int) -> str:
+        """Message about an unusable record directly before the fix of an index; empty without such a record."""
+        if log.left_out is None or index not in log.left_out.before:
             return ""
-        return f"; {log.left_out.faults[int((log.left_out.before == place).argmax())]}"
+        return f"; {log.left_out.faults[int((log.left_out.before == index).argmax())]}"
 
-    # The interval before the aperture and the one behind it lead into it.
-    inside = slow[around_aperture(slow, aperture_time_s)]
-    steps = np.diff(inside)
-    # A gap as long as the aperture is the only step in it.
-    usual = min(float(np.median(steps)), float(np.median(np.diff(slow)))) if steps.size else 0.0
-    spare = usual * _ROUNDED
-    if slow[0] > -half + spare or slow[-1] < half - spare:
+    # The interval before the aperture and the interval after it lead into it.
+    near_times = slow[around_aperture(slow, aperture_time_s)]
+    steps = np.diff(near_times)
+    # A gap that is as long as the aperture is the only step in it, so the median step of the log counts too.
+    usual_step = min(float(np.median(steps)), float(np.median(np.diff(slow)))) if steps.size else 0.0
+    longest_step = usual_step * _ROUNDING_FACTOR
+    if slow[0] > -half + longest_step or slow[-1] < half - longest_step:
         is_own_clock = start is None and center_seconds is None
         raise PathFileError(
-            f"{name}: covers {said(float(slow[0]))} to {said(float(slow[-1]))}, "
-            f"the aperture needs {said(-half)} to {said(half)}" + cause(0 if slow[0] > -half + spare else len(slow)),
+            f"{name}: covers {time_text(float(slow[0]))} to {time_text(float(slow[-1]))}, "
+            f"the aperture needs {time_text(-half)} to {time_text(half)}"
+            + cause(0 if slow[0] > -half + longest_step else len(slow)),
             hint="trajectory.center says which time of the log is the middle of the aperture" if is_own_clock else "",
         )
-    if steps.size and steps.max() > _WIDEST_GAP * spare:
-        at = int(steps.argmax())
+    if steps.size and steps.max() > _MAX_GAP_RATIO * longest_step:
+        gap = int(steps.argmax())
         raise PathFileError(
-            f"{name}: has a gap of {steps[at]:.4g} s after {said(float(inside[at]))}, in the aperture; "
-            f"{usual:.4g} s is usual, at most {_WIDEST_GAP * usual:.4g} s are bridged"
-            + cause(int(np.searchsorted(slow, inside[at], "right")))
+            f"{name}: has a gap of {steps[gap]:.4g} s after {time_text(float(near_times[gap]))}, in the aperture; "
+            f"{usual_step:.4g} s is usual, at most {_MAX_GAP_RATIO * usual_step:.4g} s are bridged"
+            + cause(int(np.searchsorted(slow, near_times[gap], "right")))
         )
     return slow
 
 
 def _hold_to_clock(log: Log, center: Instant | None, center_seconds: float | None, name: str) -> None:
-    """Refuse a middle of the aperture on a clock from which a log without a date, or a week, has no way."""
+    """Refuse an aperture with a middle in UTC for a log of times of day without a date, or of an unknown week."""
     if log.start is not None or center_seconds is not None:
         return
     if log.clock == "day":
@@ -633,11 +771,11 @@ def _hold_to_clock(log: Log, center: Instant | None, center_seconds: float | Non
 
 
 def dated(log: Log, center: Instant | None) -> Log:
-    """A log of times of day with the date that puts it nearest to the middle of the aperture; others as they are."""
+    """A log of times of day with the date nearest to the middle of the aperture. Any other log is unchanged."""
     if log.clock != "day" or log.start is not None or center is None:
         return log
-    middle = float(log.times[len(log.times) // 2])
-    midnight = Instant(center.day + round((center.seconds - middle) / DAY), 0.0)
+    middle_time = float(log.times[len(log.times) // 2])
+    midnight = Instant(center.day + round((center.seconds - middle_time) / DAY), 0.0)
     words = f"{log.words}, date by collection.center_time: {midnight.as_text()[:10]}"
     return replace(log, start=midnight, words=words)
 
@@ -645,12 +783,14 @@ def dated(log: Log, center: Instant | None) -> Log:
 def track_around(
     log: Log, center: Instant | None, center_seconds: float | None, aperture_time_s: float, name: str
 ) -> Log:
-    """The log itself, or of several tracks the one that covers the aperture; all else is as in `slow_times`.
+    """The log itself, or the track that covers the aperture in a log of several tracks.
+
+    Parameters are as in `slow_times`.
 
     Raises
     ------
     PathFileError
-        None or several of the tracks do.
+        No track covers the aperture, or several tracks do.
     """
     if not log.tracks:
         return log
@@ -665,34 +805,35 @@ def track_around(
     if len(covering) == 1:
         return covering[0]
     if covering:
-        listed = "; ".join(track.words for track in covering[:_LISTED]) + "; …" * (len(covering) > _LISTED)
+        ellipsis = "; …" * (len(covering) > _NAMED_TRACKS)
+        listed = "; ".join(track.words for track in covering[:_NAMED_TRACKS]) + ellipsis
         raise PathFileError(
             f"{name}: has {len(covering)} tracks that cover the aperture: {listed}",
             "accepted: trajectory.track: the name or the number of one",
         )
     raise PathFileError(
         f"{name}: has {len(log.tracks)} tracks, and none covers the aperture; "
-        + "; ".join(fault.removeprefix(f"{name}: ") for fault in faults[:_LISTED])
-        + "; …" * (len(faults) > _LISTED)
+        + "; ".join(fault.removeprefix(f"{name}: ") for fault in faults[:_NAMED_TRACKS])
+        + "; …" * (len(faults) > _NAMED_TRACKS)
     )
 
 
 def hold_to_usable_records(log: Log, times: Floats, stretch_s: float) -> None:
-    """Refuse a log of which a record that cannot be used lies within the stretch that is fitted.
+    """Refuse a log with an unusable record within the stretch that is fitted.
 
     Parameters
     ----------
     log : Log
-        Its records that are left out lie between usable ones of which one is in the stretch.
+        The log. A left-out record lies in the stretch if the usable record before or after it does.
     times : (n,) ndarray
         Slow times of the log. [s]
     stretch_s : float
-        Time around the middle of the aperture whose places are used. [s]
+        Time around the middle of the aperture whose fixes are used. [s]
 
     Raises
     ------
     PathFileError
-        Names the first such record.
+        The stretch has an unusable record. The message names the first.
     """
     if log.left_out is None:
         return
@@ -708,75 +849,77 @@ def hold_to_usable_records(log: Log, times: Floats, stretch_s: float) -> None:
 
 
 def widest_stretch(log: Log, times: Floats, aperture_time_s: float) -> float:
-    """Longest time around the middle of an aperture within which a log has all its fixes. [s]
+    """Longest time around the middle of an aperture within which a log is complete. [s]
 
-    It ends before a record that cannot be used, and before a gap of more than five usual intervals: neither refuses a
-    log outside the stretch that it needs, and nothing is known of the path in them.
+    It ends before an unusable record, and before a gap of more than five median intervals. Outside the stretch that
+    the path needs, neither makes the log unusable, but the path within them is unknown.
 
     Parameters
     ----------
     log : Log
-        Its records that are left out lie between usable ones.
+        The log. A left-out record lies between the usable records around it.
     times : (n,) ndarray
         Slow times of the log. [s]
     aperture_time_s : float
         Length of the aperture. [s]
     """
     steps = np.diff(times)
-    is_gap = steps > _WIDEST_GAP * _ROUNDED * float(np.median(steps)) if steps.size else np.zeros(0, dtype=bool)
+    is_gap = (
+        steps > _MAX_GAP_RATIO * _ROUNDING_FACTOR * float(np.median(steps)) if steps.size else np.zeros(0, dtype=bool)
+    )
     earlier, later = times[:-1][is_gap], times[1:][is_gap]
     if log.left_out is not None:
         edges = np.concatenate([[-np.inf], times, [np.inf]])
         earlier = np.concatenate([earlier, edges[log.left_out.before]])
         later = np.concatenate([later, edges[log.left_out.before + 1]])
-    # A fix at the edge of what is lost is left out too: rounding must not put it inside.
-    reach = np.maximum(earlier, -later) / _ROUNDED
+    # A fix at the edge of a gap is left out too, so that rounding cannot put it inside.
+    reach = np.maximum(earlier, -later) / _ROUNDING_FACTOR
     return max(stretch_around(times, aperture_time_s), 2 * float(reach.min(initial=np.inf)))
 
 
-def _independent(left: Floats) -> float:
-    """How many independent samples residuals (n, 3) are worth: n over the sum of their correlation to its first zero.
+def _independent(residuals: Floats) -> float:
+    """Number of independent samples with the information of residuals (n, 3).
 
-    White noise is worth all its samples. Each axis counts alike.
+    It is n over the sum of the autocorrelation up to its first zero, and n for white noise. All axes count equally.
     """
-    count = len(left)
-    spectrum = np.abs(np.fft.rfft(left, 2 * count, axis=0)) ** 2
+    count = len(residuals)
+    spectrum = np.abs(np.fft.rfft(residuals, 2 * count, axis=0)) ** 2
     correlation = np.fft.irfft(spectrum, axis=0)[:count]
-    correlation = (correlation / np.maximum(correlation[0], _UNSEEN_M**2)).mean(axis=1)
+    correlation = (correlation / np.maximum(correlation[0], _ROUNDING_M**2)).mean(axis=1)
     ends = int(np.argmax(correlation <= 0)) or count
     return max(2.0, count / float(1 + 2 * correlation[1:ends].sum()))
 
 
 # ---------------------------------------------------------------------- polynomials of slow time
-def least_squares(at: Floats, places: Floats, order: int) -> tuple[Floats, Floats]:
-    """Legendre series of an order through places, and what it leaves of them.
+def least_squares(normalised_times: Floats, positions: Floats, order: int) -> tuple[Floats, Floats]:
+    """Legendre series of an order that fits positions, and its residuals.
 
     Parameters
     ----------
-    at : (n,) ndarray
-        Where the places are, -1 … 1.
-    places : (n, 3) ndarray
+    normalised_times : (n,) ndarray
+        Times of the positions, scaled to -1 … 1.
+    positions : (n, 3) ndarray
         [m]
 
     Returns
     -------
     (order + 1, 3) ndarray, (n, 3) ndarray
-        Coefficients, and places less the series. [m]
+        Coefficients, and positions less the series. [m]
     """
-    basis = legendre.legvander(at, order)
-    coefficients: Floats = np.asarray(np.linalg.lstsq(basis, places, rcond=None)[0], dtype=float)
-    return coefficients, places - basis @ coefficients
+    basis = legendre.legvander(normalised_times, order)
+    coefficients: Floats = np.asarray(np.linalg.lstsq(basis, positions, rcond=None)[0], dtype=float)
+    return coefficients, positions - basis @ coefficients
 
 
 def powers_of(coefficients: Floats, half_s: float, convert: Callable[..., Any] = legendre.leg2poly) -> Floats:
     """Coefficients (order + 1, 3) of τ⁰, τ¹, … of a series over -`half_s` … `half_s`. [m], [m/s], …
 
-    `convert` turns coefficients of the series into those of powers; omitted: of a Legendre series.
+    `convert` turns coefficients of the series into coefficients of powers; omitted: from a Legendre series.
     """
     powers = np.zeros_like(coefficients)
     for axis in range(3):
-        found = convert(coefficients[:, axis])  # without the highest that are zero
-        powers[: len(found), axis] = found
+        polynomial = convert(coefficients[:, axis])  # without the highest powers if they are zero
+        powers[: len(polynomial), axis] = polynomial
     return powers / half_s ** np.arange(len(powers))[:, None]
 
 
@@ -786,7 +929,7 @@ def _vector(values: Floats) -> Vector:
 
 
 def path_of(powers: Iterable[Iterable[float]]) -> PlatformState:
-    """A path from its coefficients of τ⁰, τ¹, …, at least two; the highest bends that are zero are left out."""
+    """A path from its coefficients of τ⁰, τ¹, …, at least two. The highest coefficients are left out if zero."""
     vectors: list[Vector] = [(float(x), float(y), float(z)) for x, y, z in powers]
     position, velocity, (x, y, z), *bends = vectors if len(vectors) > 2 else [*vectors, STRAIGHT]
     while bends and bends[-1] == STRAIGHT:
@@ -794,7 +937,7 @@ def path_of(powers: Iterable[Iterable[float]]) -> PlatformState:
     return PlatformState(position=position, velocity=velocity, acceleration=(2 * x, 2 * y, 2 * z), bends=tuple(bends))
 
 
-# ---------------------------------------------------------------------- places between those of a table
+# ---------------------------------------------------------------------- positions between the samples of a table
 class Sample(NamedTuple):
     """A time of days without leap seconds, and position and velocity. [m], [m/s]"""
 
@@ -804,38 +947,38 @@ class Sample(NamedTuple):
 
 
 def interpolate(samples: Sequence[Sample], time: Instant, count: int, is_hermite: bool) -> Vector:
-    """Place at a time, from the samples around it. [m]
+    """Position at a time, from the samples around it. [m]
 
-    The samples are the same throughout an interval between two of them. Neighbouring intervals, where the count is
-    even or not, share the sample between them: the path has no jumps.
+    All times between two neighbouring samples use the same samples. Neighbouring intervals share the sample between
+    them, for even and odd counts: the path has no jumps.
     """
-    after = bisect_right(samples, time, key=lambda one: one.time)
+    after = bisect_right(samples, time, key=lambda sample: sample.time)
     first = min(max(after - (count + 1) // 2, 0), len(samples) - count)
     near = samples[first : first + count]
-    return _through(near, [one.time.since(time) for one in near], is_hermite)
+    return _through(near, [sample.time.since(time) for sample in near], is_hermite)
 
 
-def _through(near: Sequence[Sample], times: Sequence[float], is_hermite: bool) -> Vector:
-    """Value at time 0 of the polynomial of Lagrange through places, or that of Hermite through velocities too.
+def _through(samples: Sequence[Sample], times: Sequence[float], is_hermite: bool) -> Vector:
+    """Value at time 0 of Lagrange's polynomial through positions, or of Hermite's through velocities too.
 
     Sources: Abramowitz & Stegun, equations 25.2.1 and 25.2.2; Burden & Faires, Numerical Analysis, theorem 3.9.
     """
     terms: list[list[float]] = [[], [], []]
-    for j, sample in enumerate(near):
-        others = [times[j] - one for n, one in enumerate(times) if n != j]
-        basis = math.prod(-one / (times[j] - one) for n, one in enumerate(times) if n != j)
+    for j, sample in enumerate(samples):
+        differences = [times[j] - time for n, time in enumerate(times) if n != j]
+        basis = math.prod(-time / (times[j] - time) for n, time in enumerate(times) if n != j)
         if is_hermite:
             square = basis * basis
-            slope = math.fsum(1 / one for one in others)
-            of_place, of_velocity = (1 + 2 * times[j] * slope) * square, -times[j] * square
+            slope = math.fsum(1 / time for time in differences)
+            position_weight, velocity_weight = (1 + 2 * times[j] * slope) * square, -times[j] * square
         else:
-            of_place, of_velocity = basis, 0.0
+            position_weight, velocity_weight = basis, 0.0
         for axis in range(3):
-            terms[axis].append(of_place * sample.place[axis])
-            if of_velocity:
-                terms[axis].append(of_velocity * sample.velocity[axis])
+            terms[axis].append(position_weight * sample.place[axis])
+            if velocity_weight:
+                terms[axis].append(velocity_weight * sample.velocity[axis])
     try:
         x, y, z = (math.fsum(axis) for axis in terms)
-    except (OverflowError, ValueError):  # samples that are much nearer to each other than others
+    except (OverflowError, ValueError):  # two samples are much closer to each other than all further samples
         return (math.nan, math.nan, math.nan)
     return (x, y, z)

@@ -31,9 +31,9 @@ from bisar_budget.faults import InvalidValueError, fault_words, shown
 from bisar_budget.paths.accuracy_columns import ACCEPTED, BESIDE, UNCLEAR, meaning_of
 from bisar_budget.paths.earth import Floats, Geodetic, axes_at, earth_fixed_places, geodetic_places
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
-from bisar_budget.paths.instant import DAY, GPS_EPOCH, SCALES, WEEK, Instant, parse_instant
+from bisar_budget.paths.instant import DAY, GPS_EPOCH_DAY, SCALES, WEEK_S, Instant, parse_instant
 from bisar_budget.paths.log_places import (
-    NOTHING_SAID,
+    NO_KEYS,
     LogKeys,
     LogRecords,
     counted,
@@ -51,8 +51,8 @@ from bisar_budget.paths.log_places import (
     usable_log,
 )
 
-LARGEST = 200_000_000  # bytes; four hours at 200 Hz
-_CHUNK = 1 << 16  # lines that are text and numbers at once
+MAX_CSV_BYTES = 200_000_000  # bytes; four hours at 200 Hz
+_CHUNK_LINES = 1 << 16  # lines that are text and numbers at once
 _FARTHEST_M = 1e9  # of a place; beyond the Moon
 _LATEST_S = 1e11  # of a time; 3000 years, so that Unix time is one
 _DEEPEST_M = 6.2e6  # m from the Earth's centre; the poles are at 6.357e6
@@ -164,8 +164,8 @@ def is_csv(data: bytes) -> bool:
     return _vendor_of(cells) is not None or any(names.issuperset(kind[:2]) for kind in _KINDS)
 
 
-def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
-    """Read a log of a flight, UTF-8 of at most `LARGEST` bytes, as every reader of `LOG_FORMATS` does.
+def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
+    """Read a log of a flight, UTF-8 of at most `MAX_CSV_BYTES` bytes, as every reader of `LOG_FORMATS` does.
 
     Geodetic places become Earth-fixed ones. Instants become seconds after the first of them.
     """
@@ -262,8 +262,8 @@ def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats,
             lambda i: f"GPS week must be a whole number from 0 to 9999 (got {weeks[i]:g})",
         )
         first = records.first
-        start = Instant(GPS_EPOCH + 7 * int(weeks[first]), 0.0).after(float(counted_s[first]))
-        return (weeks - weeks[first]) * WEEK + (counted_s - counted_s[first]), start, ""
+        start = Instant(GPS_EPOCH_DAY + 7 * int(weeks[first]), 0.0).after(float(counted_s[first]))
+        return (weeks - weeks[first]) * WEEK_S + (counted_s - counted_s[first]), start, ""
     if header.stamp is None:
         return counted_s, None, ""
     minutes, seconds = table.minutes, table.seconds
@@ -407,7 +407,7 @@ def _level_axes(fixed: Floats, header: _Header, places: Floats) -> Floats:
 
 def _text(data: bytes, name: str) -> str:
     """Text of the file, with a line feed at the end of each line."""
-    hold_to_bytes(data, LARGEST, name)
+    hold_to_bytes(data, MAX_CSV_BYTES, name)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise PathFileError(f"{name}:1: is in UTF-16; save it in UTF-8")
     zero = data.find(b"\0")
@@ -660,8 +660,8 @@ def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
     empty = _Table(np.zeros(0, dtype=np.int64), np.zeros((0, len(header.columns))), nothing, nothing)
     rows = _Rows([empty], {}, most_left_out(len(lines) - header.line))
     is_any = False
-    for first in range(header.line, len(lines), _CHUNK):
-        chunk = lines[first : first + _CHUNK]
+    for first in range(header.line, len(lines), _CHUNK_LINES):
+        chunk = lines[first : first + _CHUNK_LINES]
         kept = [n for n, line in enumerate(chunk) if line[:1] > "#" or _is_said(line)]  # numbers begin behind #
         if kept:
             is_any = True

@@ -1,13 +1,13 @@
-"""Tracks of GPX 1.0 and 1.1: points with time and elevation, of one segment or of several whose times rise.
+"""Tracks of GPX 1.0 and 1.1: points with time and elevation, in one segment or in several with rising times.
 
     <trkpt lat="48.086600" lon="11.279700"><ele>2953.1</ele><time>2026-06-01T05:20:01.250Z</time>
     <geoidheight>46.9</geoidheight></trkpt>
 
 An elevation is above mean sea level; `geoidheight` is the height of the geoid above the ellipsoid. Times are in UTC,
-or have an offset from it. A `fix` of none or 2d states that a point has no place or no height.
+or have an offset from UTC. A `fix` of none or 2d states that a point has no position or no height.
 
-Source: http://www.topografix.com/GPX/1/1/, types wptType and trkType. The tree is that of `messages.parse_markup`: it
-refuses document types, bounds sizes and knows lines, where gpxpy does not.
+Source: http://www.topografix.com/GPX/1/1/, types wptType and trkType. `messages.parse_markup` builds the tree: unlike
+gpxpy it refuses document types, bounds sizes and keeps line numbers.
 """
 
 import math
@@ -30,25 +30,26 @@ from bisar_budget.paths.log_places import (
 )
 from bisar_budget.paths.messages import MessageElement, hold_to_size, number_in, parse_markup
 
-_ROOT = re.compile(rb"<(?:[\w.-]+:)?gpx[\s>]")
-_OFFSET = re.compile(
+_ROOT_ELEMENT = re.compile(rb"<(?:[\w.-]+:)?gpx[\s>]")
+_STAMP_WITH_OFFSET = re.compile(
     r"([\d-]{10}T[\d:.]{8,21})([+-])(\d\d)(?::?([0-5]\d))?", re.ASCII
 )  # extended, or basic form of ISO 8601
-_WITHOUT_HEIGHT = ("none", "2d")
-_LISTED = 10  # tracks that an error names
+_FIXES_WITHOUT_HEIGHT = ("none", "2d")
+_NAMED_TRACKS = 10  # tracks that an error names
 
 
 def is_gpx(data: bytes) -> bool:
-    """Whether a file is XML whose root is that of GPX."""
+    """Whether a file is XML with the root element of GPX."""
     head = data[:10_000]
-    return head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and bool(_ROOT.search(head))
+    return head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and bool(_ROOT_ELEMENT.search(head))
 
 
 def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read the track of a file, as every reader of `LOG_FORMATS` does; by the time scale utc a time needs no zone.
+    """Read the track of a file, as every reader of `LOG_FORMATS` does.
 
-    Of several tracks the mission file chooses one, by its name or number. Where it does not, the log has all `tracks`
-    that can be read; a track of which that is not so is no flight.
+    If the mission file states the time scale utc, times need no zone. If there are several tracks, the mission file
+    may choose one by its name or number. Otherwise the log has all `tracks` that can be read; any further track is no
+    flight.
     """
     hold_to_scale("utc", keys, name)
     hold_to_size(len(data), name, "track")
@@ -74,17 +75,19 @@ def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
     return replace(logs[0], tracks=tuple(logs)) if len(logs) > 1 else logs[0]
 
 
-def _chosen(tracks: Sequence[MessageElement], wanted: str, name: str) -> int:
+def _chosen(tracks: Sequence[MessageElement], track_name: str, name: str) -> int:
     """Index of the track of a name, or else of a number, from 1."""
-    named = [number for number, track in enumerate(tracks) if _name_of(track) == wanted.strip()]
-    if len(named) == 1:
-        return named[0]
-    listed = ", ".join(_track_words(tracks, number) for number in range(min(len(tracks), _LISTED)))
-    listed += ", …" * (len(tracks) > _LISTED)
-    if named:
-        raise PathFileError(f"{name}: has {len(named)} tracks of that name: {listed}; choose by number", key="track")
-    if wanted.strip().isascii() and wanted.strip().isdigit() and 0 < int(wanted[:9]) <= len(tracks):
-        return int(wanted) - 1
+    matches = [number for number, track in enumerate(tracks) if _name_of(track) == track_name.strip()]
+    if len(matches) == 1:
+        return matches[0]
+    listed = ", ".join(_track_words(tracks, number) for number in range(min(len(tracks), _NAMED_TRACKS)))
+    listed += ", …" * (len(tracks) > _NAMED_TRACKS)
+    if matches:
+        raise PathFileError(
+            f"{name}: has {len(matches)} tracks of that name: {listed}; choose by number", key="track"
+        )
+    if track_name.strip().isascii() and track_name.strip().isdigit() and 0 < int(track_name[:9]) <= len(tracks):
+        return int(track_name) - 1
     raise PathFileError(f"{name}: has no track of that name or number; it has {listed}", key="track")
 
 
@@ -94,50 +97,52 @@ def _name_of(track: MessageElement) -> str:
 
 def _track_words(tracks: Sequence[MessageElement], index: int) -> str:
     """A track's number and name."""
-    named = _name_of(tracks[index])
-    return f"{index + 1} of {len(tracks)}" + (f" ({shown(named)})" if named else "")
+    track_name = _name_of(tracks[index])
+    return f"{index + 1} of {len(tracks)}" + (f" ({shown(track_name)})" if track_name else "")
 
 
-def _read_track(track: MessageElement, said: str, name: str, keys: LogKeys) -> Log:
-    """The log of a track; a point that cannot be used, or has no fix in three dimensions, is left out."""
-    read, lines, broken, without_fix = [], [], {}, 0
+def _read_track(track: MessageElement, track_words: str, name: str, keys: LogKeys) -> Log:
+    """The log of a track. Points without a fix in three dimensions, and points that cannot be used, are left out."""
+    points, lines, broken, without_fix = [], [], {}, 0
     for point in track.all("trkpt"):
-        if any(child.name == "fix" and child.text.strip().lower() in _WITHOUT_HEIGHT for child in point.children):
+        if any(
+            child.name == "fix" and child.text.strip().lower() in _FIXES_WITHOUT_HEIGHT for child in point.children
+        ):
             without_fix += 1
             continue
         try:
-            read.append(_point(point, name, keys))
+            points.append(_point(point, name, keys))
             lines.append(point.line)
         except PathFileError as fault:
             broken[point.line] = fault
     if not lines:
         raise broken[min(broken)] if broken else PathFileError(f"{name}: has no point with a fix in three dimensions")
     records = LogRecords(name, len(lines), lines, {line: str(fault) for line, fault in broken.items()})
-    instants = [instant for instant, _ in read]
+    instants = [instant for instant, _ in points]
     start = instants[0]
-    degrees_north, degrees_east, elevations, own = np.array([numbers for _, numbers in read]).T
-    has_none = np.isnan(own)
-    if not has_none.all():
-        records.leave_out(has_none, lambda _: "the point has no geoidheight, others have one")
-    heights = from_sea_level(elevations, None if has_none.all() else own, keys, name)
+    degrees_north, degrees_east, elevations, separations = np.array([numbers for _, numbers in points]).T
+    lacks_separation = np.isnan(separations)
+    if not lacks_separation.all():
+        records.leave_out(lacks_separation, lambda _: "the point has no geoidheight, others have one")
+    heights = from_sea_level(elevations, None if lacks_separation.all() else separations, keys, name)
     segments = sum(1 for segment in track.all("trkseg") if any(segment.all("trkpt")))
-    words = f"GPX track{said}" + (f" of {segments} segments" if segments > 1 else "")
+    words = f"GPX track{track_words}" + (f" of {segments} segments" if segments > 1 else "")
     if without_fix:
         words += f", {counted(without_fix, 'point')} without a fix in three dimensions left out"
     times = np.array([instant.since(start) for instant in instants])
-    places = (np.radians(degrees_north), np.radians(degrees_east), heights)
-    return geodetic_log(records, words, times, start, "utc", places)
+    coordinates = (np.radians(degrees_north), np.radians(degrees_east), heights)
+    return geodetic_log(records, words, times, start, "utc", coordinates)
 
 
 def _point(point: MessageElement, name: str, keys: LogKeys) -> tuple[Instant, tuple[float, float, float, float]]:
     """Instant, latitude, longitude, elevation and geoid separation of a point; NaN without a separation."""
     instant = _instant(point, name, keys)
-    has_own = any(child.name == "geoidheight" for child in point.children)
+    has_separation = any(child.name == "geoidheight" for child in point.children)
     return instant, (
         _degrees(point, "lat", name),
         _degrees(point, "lon", name),
         _metres(point, "ele", name),
-        _metres(point, "geoidheight", name) if has_own else math.nan,
+        _metres(point, "geoidheight", name) if has_separation else math.nan,
     )
 
 
@@ -149,33 +154,33 @@ def _metres(point: MessageElement, key: str, name: str) -> float:
     return _number(_text(point, key, name), f"{name}:{point.line}: {key} must be a number of metres")
 
 
-def _number(given: str, otherwise: str) -> float:
-    value = number_in(given)
+def _number(text: str, problem: str) -> float:
+    value = number_in(text)
     if value is None:
-        raise PathFileError(f"{otherwise} (got {shown(given)!r})")
+        raise PathFileError(f"{problem} (got {shown(text)!r})")
     return value
 
 
 def _text(point: MessageElement, key: str, name: str) -> str:
-    found = next((child.text.strip() for child in point.children if child.name == key), None)
-    if found is None:
+    text = next((child.text.strip() for child in point.children if child.name == key), None)
+    if text is None:
         raise PathFileError(f"{name}:{point.line}: the point has no {key}")
-    return found
+    return text
 
 
 def _instant(point: MessageElement, name: str, keys: LogKeys) -> Instant:
-    given = _text(point, "time", name)
-    offset = _OFFSET.fullmatch(given)
+    text = _text(point, "time", name)
+    offset = _STAMP_WITH_OFFSET.fullmatch(text)
     if offset is not None:
         local = parse_stamp(offset[1], needs_zone=False)
         seconds = int(offset[3]) * 3600.0 + int(offset[4] or 0) * 60.0
-        found = None if local is None else local.after(-seconds if offset[2] == "+" else seconds)
+        instant = None if local is None else local.after(-seconds if offset[2] == "+" else seconds)
     else:
-        found = parse_stamp(given, needs_zone=keys.time_scale is None)
-    if found is None:
-        is_zone_missing = parse_stamp(given, needs_zone=False) is not None
+        instant = parse_stamp(text, needs_zone=keys.time_scale is None)
+    if instant is None:
+        is_zone_missing = parse_stamp(text, needs_zone=False) is not None
         raise PathFileError(
-            f"{name}:{point.line}: time must be an instant like 2026-06-01T05:20:01.250Z (got {shown(given)!r})",
+            f"{name}:{point.line}: time must be an instant like 2026-06-01T05:20:01.250Z (got {shown(text)!r})",
             hint="trajectory.time_scale: utc reads times without a zone" if is_zone_missing else "",
         )
-    return found
+    return instant

@@ -7,15 +7,15 @@ from datetime import UTC, date, datetime, timedelta
 from typing import NamedTuple
 
 DAY = 86400.0  # s
-WEEK = 604800.0  # s
-GPS_EPOCH = 44244  # MJD of 1980-01-06
-UNIX_EPOCH = 40587  # MJD of 1970-01-01
-_MJD_OF_ORDINAL = 678576  # date.toordinal() less the modified Julian day
-_ROUNDED = re.compile(r"(.*:)60((?:[.,]0{1,12})?(?:Z|[+-]\d\d:?\d\d)?)", re.ASCII)
-_FORM = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,12}))?(Z|[+-]\d\d:?\d\d)?", re.ASCII)
-
-
-_FARTHEST_OFFSET_H = 18  # of a local time from UTC, as in ISO 8601's users
+WEEK_S = 604800.0  # s
+GPS_EPOCH_DAY = 44244  # MJD of 1980-01-06
+UNIX_EPOCH_DAY = 40587  # MJD of 1970-01-01
+_MJD_EPOCH_DAY = 678576  # the ordinal of the date of day 0, which `date.toordinal` counts
+_ROUNDED_MINUTE = re.compile(r"(.*:)60((?:[.,]0{1,12})?(?:Z|[+-]\d\d:?\d\d)?)", re.ASCII)
+_ISO_8601 = re.compile(
+    r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,12}))?(Z|[+-]\d\d:?\d\d)?", re.ASCII
+)
+_MAX_OFFSET_HOURS = 18  # of a local time from UTC, as in users of ISO 8601
 
 
 class Instant(NamedTuple):
@@ -25,12 +25,12 @@ class Instant(NamedTuple):
     seconds: float
 
     def after(self, seconds: float) -> "Instant":
-        """So many seconds later."""
-        days, rest = divmod(self.seconds + seconds, DAY)
-        return Instant(self.day + int(days), rest)
+        """The instant after a number of seconds, without leap seconds."""
+        days, remainder = divmod(self.seconds + seconds, DAY)
+        return Instant(self.day + int(days), remainder)
 
     def since(self, other: "Instant") -> float:
-        """Seconds since another one, leap seconds not counted. [s]"""
+        """Seconds since another instant, without leap seconds. [s]"""
         return (self.day - other.day) * DAY + (self.seconds - other.seconds)
 
     def as_text(self) -> str:
@@ -42,35 +42,35 @@ class Instant(NamedTuple):
         return moment.strftime("%Y-%m-%dT%H:%M:%S.") + f"{moment.microsecond // 1000:03d}Z"
 
     def as_datetime(self) -> datetime:
-        """The same to a microsecond; raises `OverflowError` outside the years 1 to 9999."""
+        """The instant to a microsecond; raises `OverflowError` outside the years 1 to 9999."""
         return datetime(1858, 11, 17, tzinfo=UTC) + timedelta(days=self.day, seconds=self.seconds)
 
 
 def day_of_year(year: int, day: int) -> int | None:
-    """Modified Julian day of a day of a year, counted from 1; None where the year has no such day."""
-    return date(year, 1, 1).toordinal() - _MJD_OF_ORDINAL + day - 1 if 1 <= day <= 365 + isleap(year) else None
+    """Modified Julian day of a day of a year, counted from 1; None if the year has no such day."""
+    return date(year, 1, 1).toordinal() - _MJD_EPOCH_DAY + day - 1 if 1 <= day <= 365 + isleap(year) else None
 
 
 def parse_instant(text: str, *, needs_zone: bool = True) -> Instant | None:
-    """Read 2026-06-01T05:20:31.250Z, or with an offset from UTC such as +01:00; None where it is something else.
+    """Read an instant like 2026-06-01T05:20:31.250Z, or with an offset from UTC such as +01:00; None for other text.
 
-    `needs_zone`: without a Z, an hour is nobody's.
+    With `needs_zone`, a text without a zone is refused.
     """
-    match = _FORM.fullmatch(text.strip())
+    match = _ISO_8601.fullmatch(text.strip())
     if match is None or (needs_zone and not match[8]):
         return None
-    year, month, day, hour, minute, second = (int(part) for part in match.groups()[:6])
+    year, month, day, hour, minute, second = (int(field) for field in match.groups()[:6])
     if hour > 23 or minute > 59 or second > 59:
         return None
     try:
         ordinal = date(year, month, day).toordinal()
     except ValueError:
         return None
-    local = Instant(ordinal - _MJD_OF_ORDINAL, hour * 3600 + minute * 60 + second + float(f"0.{match[7] or 0}"))
+    local = Instant(ordinal - _MJD_EPOCH_DAY, hour * 3600 + minute * 60 + second + float(f"0.{match[7] or 0}"))
     if match[8] in (None, "Z"):
         return local
     hours, minutes = int(match[8][1:3]), int(match[8][-2:])
-    if hours > _FARTHEST_OFFSET_H or minutes > 59:
+    if hours > _MAX_OFFSET_HOURS or minutes > 59:
         return None
     ahead = 3600 * hours + 60 * minutes
     return local.after(ahead if match[8][0] == "-" else -ahead)
@@ -81,7 +81,7 @@ def parse_stamp(text: str, *, needs_zone: bool = True) -> Instant | None:
 
     Receivers round 59.996 s to 60.00 s: the second 60 is the first of the next minute.
     """
-    rounded = _ROUNDED.fullmatch(text.strip())
+    rounded = _ROUNDED_MINUTE.fullmatch(text.strip())
     if rounded is None:
         return parse_instant(text, needs_zone=needs_zone)
     instant = parse_instant(f"{rounded[1]}59{rounded[2]}", needs_zone=needs_zone)
@@ -92,50 +92,50 @@ def parse_stamp(text: str, *, needs_zone: bool = True) -> Instant | None:
 # TAI - UTC: table of the Earth orientation centre of the IERS, Bulletin C 52 (2016-07-06) and before. No leap second
 # came after that of 2016-12-31; one that is announced later needs a line here.
 # The month from which a difference holds; it grew by one second each time, from 10 s on.
-_LEAPS = (
+_LEAP_MONTHS = (
     "1972-01 1972-07 1973-01 1974-01 1975-01 1976-01 1977-01 1978-01 1979-01 1980-01 1981-07 1982-07 1983-07 1985-07 "
     "1988-01 1990-01 1991-01 1992-07 1993-07 1994-07 1996-01 1997-07 1999-01 2006-01 2009-01 2012-07 2015-07 2017-01"
 )
-_DAYS = tuple(date.fromisoformat(f"{month}-01").toordinal() - _MJD_OF_ORDINAL for month in _LEAPS.split())
-FIRST_DAY = _DAYS[0]  # before it UTC ran at another rate than TAI
+_LEAP_DAYS = tuple(date.fromisoformat(f"{month}-01").toordinal() - _MJD_EPOCH_DAY for month in _LEAP_MONTHS.split())
+FIRST_UTC_DAY = _LEAP_DAYS[0]  # before it UTC ran at another rate than TAI
 
-SCALES = {"utc": "UTC", "gps": "GPST", "tai": "TAI"}  # as the mission file has them, and as logs do
-# What TAI is ahead. GPS: IS-GPS-200, 20.3.3.5.2.4, 19 leap seconds at its epoch. TT: IAU 1991, Recommendation IV.
+SCALES = {"utc": "UTC", "gps": "GPST", "tai": "TAI"}  # names in logs by names in the mission file
+# TAI less a system [s]. GPS: IS-GPS-200, 20.3.3.5.2.4, 19 leap seconds at its epoch. TT: IAU 1991, Recommendation IV.
 TAI_LESS = {"TAI": 0.0, "GPS": 19.0, "TT": -32.184}
 
 
 def tai_less_utc(day: int) -> int:
     """TAI - UTC on a day of UTC, from 1972 on. [s]"""
-    return 9 + max(bisect_right(_DAYS, day), 1)
+    return 9 + max(bisect_right(_LEAP_DAYS, day), 1)
 
 
 def has_leap_second(day: int) -> bool:
     """Whether a day of UTC has a second 23:59:60."""
-    return day + 1 in _DAYS[1:]
+    return day + 1 in _LEAP_DAYS[1:]
 
 
 def gps_week(instant: Instant) -> int:
     """Week of GPS at an instant of UTC, not rolled over."""
-    return (tai(instant).after(-TAI_LESS["GPS"]).day - GPS_EPOCH) // 7
+    return (tai(instant).after(-TAI_LESS["GPS"]).day - GPS_EPOCH_DAY) // 7
 
 
 def tai(instant: Instant) -> Instant:
-    """The day and seconds of TAI at an instant of UTC."""
+    """Day and seconds of TAI at an instant of UTC."""
     return instant.after(tai_less_utc(instant.day))
 
 
 def later(instant: Instant, seconds: float) -> Instant:
-    """The instant of UTC so many seconds later, leap seconds counted: time that runs on, as a satellite flies."""
-    found = instant.after(seconds)
-    if tai_less_utc(found.day) == tai_less_utc(instant.day):
-        return found  # adding the difference to TAI and taking it off would round twice
+    """The instant of UTC after a number of elapsed seconds, leap seconds included."""
+    without_leaps = instant.after(seconds)
+    if tai_less_utc(without_leaps.day) == tai_less_utc(instant.day):
+        return without_leaps  # a way through TAI would round twice
     return utc(tai(instant).after(seconds))
 
 
-def utc(of_tai: Instant) -> Instant:
-    """The instant of UTC at a day and seconds of TAI; within a leap second, 86400 s and more of the day before it."""
-    found = of_tai.after(-tai_less_utc(of_tai.day))
-    earlier = of_tai.after(-tai_less_utc(found.day))
-    if earlier.day > found.day:
-        return Instant(found.day, earlier.seconds + DAY)
+def utc(tai_instant: Instant) -> Instant:
+    """The instant of UTC at an instant of TAI. A leap second is 86400 s and more of its day."""
+    instant = tai_instant.after(-tai_less_utc(tai_instant.day))
+    earlier = tai_instant.after(-tai_less_utc(instant.day))
+    if earlier.day > instant.day:
+        return Instant(instant.day, earlier.seconds + DAY)
     return earlier

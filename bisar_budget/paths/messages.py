@@ -1,6 +1,6 @@
 """Files of orbits and logs: texts, times and numbers, and XML as a tree whose elements know their lines.
 
-XML is that of others: no reference is followed, no entity is expanded.
+XML comes from strangers: no reference is followed, no entity is expanded.
 """
 
 import math
@@ -15,16 +15,16 @@ from bisar_budget.faults import shown
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import Instant, day_of_year, parse_instant
 
-LARGEST_BYTES = 32_000_000  # a day of an ephemeris at 1 Hz has 26 MB as XML
-EARLIEST, LATEST = 36112, 124593  # modified Julian days of 1957-10-01 and 2200-01-01, for which there are orbits
-_FARTHEST = 1e9  # of a place, in m or km, and of a velocity
+MAX_MARKUP_BYTES = 32_000_000  # a day of an ephemeris at 1 Hz has 26 MB as XML
+FIRST_ORBIT_DAY, LAST_ORBIT_DAY = 36112, 124593  # modified Julian days, 1957-10-01 and 2200-01-01
+_MAX_COORDINATE_LEVEL = 1e9  # of a position or a velocity, in the unit of its file
 _NUMBER = re.compile(r"\s*[+-]?(\d+(?:\.\d*)?|\.\d+)([eEdD][+-]?\d+)?\s*", re.ASCII)
 
 
 def hold_to_size(size: int, name: str, part: str = "objects") -> None:
-    """Refuse a file that is too large, and say what to keep of it."""
-    if size > LARGEST_BYTES:
-        raise PathFileError(f"{name}: is larger than {LARGEST_BYTES // 1_000_000} MB; keep the {part} needed")
+    """Refuse a file that is too large; `part` names the content to keep."""
+    if size > MAX_MARKUP_BYTES:
+        raise PathFileError(f"{name}: is larger than {MAX_MARKUP_BYTES // 1_000_000} MB; keep the {part} needed")
 
 
 def decoded(data: bytes, name: str) -> str:
@@ -67,21 +67,21 @@ def number_in(text: object) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def coordinate_in(text: str, where: str, says: str) -> float:
-    """A number of a place or a velocity from a text; refused with what is said where it is none, or beyond 1e9."""
+def coordinate_in(text: str, location: str, requirement: str) -> float:
+    """A coordinate of a position or velocity from a text; `requirement` is the message for no number, or over 1e9."""
     number = number_in(text)
-    if number is None or abs(number) > _FARTHEST:
-        raise PathFileError(f"{where}: {says} (got {shown(text.strip())})")
+    if number is None or abs(number) > _MAX_COORDINATE_LEVEL:
+        raise PathFileError(f"{location}: {requirement} (got {shown(text.strip())})")
     return number
 
 
 # ---------------------------------------------------------------------- objects
-_LISTED = 10  # objects that an error names
-_LONGEST_LIST = 400  # characters
+_NAMED_OBJECTS = 10  # objects that an error names
+_MAX_LIST_CHARACTERS = 400
 
 
 class _Named(Protocol):
-    """An object of a file: how messages call it, and the names that a mission may choose it by."""
+    """An object of a file: its name in messages, and the names by which a mission may choose it."""
 
     @property
     def object(self) -> str: ...
@@ -94,48 +94,48 @@ _Candidate = TypeVar("_Candidate", bound=_Named)
 
 
 def object_key(text: str) -> str:
-    """A name or number as it is compared: neither case nor spaces, and a number without its leading zeros."""
+    """A name or number for comparisons: without case and extra spaces, and a number without leading zeros."""
     text = " ".join(text.split()).casefold()
     return text.lstrip("0") or "0" if text.isdecimal() and text.isascii() else text
 
 
 def one_object(
-    found: Sequence[_Candidate], name: str, wanted: str | None, number: str = "OBJECT_ID"
+    blocks: Sequence[_Candidate], name: str, object_name: str | None, number: str = "OBJECT_ID"
 ) -> Sequence[_Candidate]:
-    """Blocks of a file about the object that is wanted, or about the only one.
+    """Blocks of a file about the object of a name, or about the only object.
 
-    The last of an object's `names` is its own alone; `number` is what messages call it.
+    The last of an object's `names` is unique to the object; `number` is the word for it in messages.
     """
-    if wanted is not None:
-        key = object_key(wanted)
-        ours = [one for one in found if key in one.names]
-        if not ours:
-            raise PathFileError(f"{name}: has no object {shown(wanted)}; it has {_listed(found)}")
-        found = ours
-    count = len({one.names[-1] for one in found})
+    if object_name is not None:
+        key = object_key(object_name)
+        matching = [block for block in blocks if key in block.names]
+        if not matching:
+            raise PathFileError(f"{name}: has no object {shown(object_name)}; it has {_listed(blocks)}")
+        blocks = matching
+    count = len({block.names[-1] for block in blocks})
     if count > 1:
-        said = "objects" if wanted is None else "objects of that name"
-        by = number if wanted is not None else f"name or {number}"
-        raise PathFileError(f"{name}: has {count} {said}: {_listed(found)}; choose one by its {by}")
-    return found
+        noun = "objects" if object_name is None else "objects of that name"
+        name_words = number if object_name is not None else f"name or {number}"
+        raise PathFileError(f"{name}: has {count} {noun}: {_listed(blocks)}; choose one by its {name_words}")
+    return blocks
 
 
-def _listed(found: Sequence[_Named]) -> str:
-    names = list(dict.fromkeys(one.object for one in found))
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    return cut(", ".join(names[:_LISTED])) + more
+def _listed(objects: Sequence[_Named]) -> str:
+    names = list(dict.fromkeys(candidate.object for candidate in objects))
+    more = f" and {len(names) - _NAMED_OBJECTS} more" if len(names) > _NAMED_OBJECTS else ""
+    return cut(", ".join(names[:_NAMED_OBJECTS])) + more
 
 
 def cut(text: str) -> str:
-    """A list that a message can hold."""
-    return text if len(text) <= _LONGEST_LIST else f"{text[:_LONGEST_LIST]}..."
+    """A list, cut to a length that fits into a message."""
+    return text if len(text) <= _MAX_LIST_CHARACTERS else f"{text[:_MAX_LIST_CHARACTERS]}..."
 
 
 # ---------------------------------------------------------------------- XML
-_NONE: Mapping[str, str] = {}
-_MOST = 2_000_000  # elements; a day of an ephemeris at 1 Hz has 0.7 million
-_DEEPEST = 32
-_LONGEST = 10_000  # characters of an element's own text
+_NO_ATTRIBUTES: Mapping[str, str] = {}
+_MAX_ELEMENTS_COUNT = 2_000_000  # a day of an ephemeris at 1 Hz has 0.7 million
+_MAX_NESTING_LEVEL = 32
+_MAX_TEXT_CHARACTERS = 10_000  # in the text of an element
 
 
 @dataclass(eq=False, slots=True)
@@ -147,7 +147,7 @@ class MessageElement:
     units: str = ""
     text: str = ""
     children: list["MessageElement"] = field(default_factory=list)
-    attributes: Mapping[str, str] = field(default_factory=lambda: _NONE)
+    attributes: Mapping[str, str] = field(default_factory=lambda: _NO_ATTRIBUTES)
 
     def all(self, name: str) -> Iterator["MessageElement"]:
         """Elements of a name anywhere below, in the order of the file."""
@@ -169,39 +169,39 @@ def parse_markup(data: bytes, name: str) -> MessageElement:
     parser = expat.ParserCreate()
     parser.buffer_text = True
     top = MessageElement("", 1)
-    open_ones = [top]
+    open_elements = [top]
     count = 0
 
-    def here(problem: str) -> PathFileError:
+    def fault(problem: str) -> PathFileError:
         return PathFileError(f"{name}:{parser.CurrentLineNumber}: {problem}")
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal count
         count += 1
-        if count > _MOST or len(open_ones) > _DEEPEST:
-            raise here(f"has more than {_MOST} elements, or {_DEEPEST} in each other")
-        one = MessageElement(
+        if count > _MAX_ELEMENTS_COUNT or len(open_elements) > _MAX_NESTING_LEVEL:
+            raise fault(f"has more than {_MAX_ELEMENTS_COUNT} elements, or {_MAX_NESTING_LEVEL} in each other")
+        element = MessageElement(
             intern(tag.rpartition(":")[2]),
             parser.CurrentLineNumber,
-            intern(attributes.get("units") or attributes.get("unit", "")),  # as CCSDS has it, and ESA
+            intern(attributes.get("units") or attributes.get("unit", "")),  # in files of CCSDS, and of ESA
         )
         if attributes:
-            one.attributes = attributes
-        open_ones[-1].children.append(one)
-        open_ones.append(one)
+            element.attributes = attributes
+        open_elements[-1].children.append(element)
+        open_elements.append(element)
 
     def end(_: str) -> None:
-        open_ones.pop()
+        open_elements.pop()
 
-    def text(found: str) -> None:
-        one = open_ones[-1]
-        if found.strip():
-            one.text += found
-            if len(one.text) > _LONGEST:
-                raise here(f"has a text of more than {_LONGEST} characters")
+    def text(piece: str) -> None:
+        element = open_elements[-1]
+        if piece.strip():
+            element.text += piece
+            if len(element.text) > _MAX_TEXT_CHARACTERS:
+                raise fault(f"has a text of more than {_MAX_TEXT_CHARACTERS} characters")
 
     def doctype(*_: object) -> None:
-        raise here("declares a document type (DOCTYPE), which is not read; take it out")
+        raise fault("declares a document type (DOCTYPE), which is not read; take it out")
 
     parser.StartElementHandler = start
     parser.EndElementHandler = end
@@ -211,6 +211,6 @@ def parse_markup(data: bytes, name: str) -> MessageElement:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         raise PathFileError(f"{name}:{error.lineno}: is not XML: {expat.ErrorString(error.code)}") from None
-    except (LookupError, ValueError) as error:  # an encoding that nobody has
+    except (LookupError, ValueError) as error:  # an unknown encoding
         raise PathFileError(f"{name}:1: is not XML: {shown(str(error))}") from None
     return top

@@ -28,7 +28,7 @@ import numpy as np
 
 from bisar_budget.extras import install_command
 from bisar_budget.faults import shown
-from bisar_budget.paths.earth import EQUATORIAL_RADIUS, Floats
+from bisar_budget.paths.earth import EQUATORIAL_RADIUS_M, Floats
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, Instant, parse_instant
 from bisar_budget.paths.log_places import (
@@ -108,9 +108,9 @@ class _Fix(NamedTuple):
 
     def distance(self, other: "_Fix") -> float:
         """Distance of another place, a short one. [m]"""
-        north = EQUATORIAL_RADIUS * (self.latitude - other.latitude)
+        north = EQUATORIAL_RADIUS_M * (self.latitude - other.latitude)
         turned = math.remainder(self.longitude - other.longitude, 2 * math.pi)
-        return math.hypot(north, EQUATORIAL_RADIUS * math.cos(self.latitude) * turned, self.height - other.height)
+        return math.hypot(north, EQUATORIAL_RADIUS_M * math.cos(self.latitude) * turned, self.height - other.height)
 
 
 class _Accuracy(NamedTuple):

@@ -11,18 +11,18 @@ import numpy as np
 from bisar_budget.faults import shown
 from bisar_budget.paths.accuracy import CovarianceError, EpochCovariance, held_to_covariance, local_axes
 from bisar_budget.paths.ephemeris import (
-    APART,
-    OWN_VELOCITY,
-    USUAL_DEGREE,
+    DEFAULT_DEGREE,
+    MAX_VELOCITY_ERROR_RATIO,
+    MIN_SAMPLE_STEP_S,
     Interpolation,
     Segment,
     orbit_through,
-    velocity_off,
+    velocity_error,
 )
 from bisar_budget.paths.flight import Orbit, PathFileError, Sample
-from bisar_budget.paths.instant import DAY, FIRST_DAY, TAI_LESS, Instant, has_leap_second, tai_less_utc, utc
+from bisar_budget.paths.instant import DAY, FIRST_UTC_DAY, TAI_LESS, Instant, has_leap_second, tai_less_utc, utc
 from bisar_budget.paths.messages import (
-    LATEST,
+    LAST_ORBIT_DAY,
     MessageElement,
     coordinate_in,
     decoded,
@@ -35,20 +35,22 @@ from bisar_budget.paths.messages import (
 )
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, Turn, celestial_turn, from_teme
 
-_EARTH_FIXED = re.compile(r"ITRF[- ]?(\d\d|\d{4})?|WGS[- ]?84")
+_EARTH_FIXED_FRAME = re.compile(r"ITRF[- ]?(\d\d|\d{4})?|WGS[- ]?84")
 _CELESTIAL = {"GCRF": False, "ICRF": False, "EME2000": True, "J2000": True}
 _EQUINOX_OF_DATE = ("TEME", "TEMEOFDATE")
 _SECONDS = re.compile(r"\d\d(\.\d{1,12})?Z?", re.ASCII)
-_SYSTEMS = ("UTC", *TAI_LESS)
-_HIGHEST_DEGREE = 31
-_VECTOR = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
-_TRIANGLE = [[f"C{row}_{column}" for column in _VECTOR[: index + 1]] for index, row in enumerate(_VECTOR)]
+_TIME_SYSTEMS = ("UTC", *TAI_LESS)
+_MAX_DEGREE = 31
+_STATE_KEYWORDS = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
+_TRIANGLE_KEYWORDS = [
+    [f"C{row}_{column}" for column in _STATE_KEYWORDS[: index + 1]] for index, row in enumerate(_STATE_KEYWORDS)
+]
 _CELESTIAL_AXES = (*_EQUINOX_OF_DATE, *_CELESTIAL)
 
 
 @dataclass
 class CovarianceBlock:
-    """Covariance of a message: its line, epoch, reference frame (empty: the ephemeris') and rows of its triangle."""
+    """A covariance as written in a message: line, epoch, frame (empty: as the ephemeris) and rows of its triangle."""
 
     line: int
     epoch: str
@@ -58,9 +60,18 @@ class CovarianceBlock:
 
 @dataclass(frozen=True)
 class _EphemerisBlock:
-    """Metadata of a segment: keyword to line and value; its ephemeris: line, epoch and numbers of each sample.
+    """A segment as written in a message.
 
-    `covariances` are those of the segment, as they are written.
+    Attributes
+    ----------
+    line : int
+        First line.
+    metadata : mapping
+        Line and value by keyword.
+    rows : sequence
+        Line, epoch and numbers of each sample.
+    covariances : sequence of CovarianceBlock
+        Covariances of the segment.
     """
 
     line: int
@@ -70,39 +81,39 @@ class _EphemerisBlock:
 
 
 def read_oem(
-    data: bytes, name: str, wanted: str | None, center: Instant, orientation: Orientation = UNKNOWN
+    data: bytes, name: str, object_name: str | None, center: Instant, orientation: Orientation = UNKNOWN
 ) -> Orbit:
     """Orbit from an orbit ephemeris message, as every reader of `ORBIT_FORMATS` gives it.
 
-    A message that names no interpolation is interpolated after Hermite, degree 7, where its velocities are those of
-    its places, and otherwise after Lagrange, degree 7. An interpolation of degree n goes through n + 1 places of
-    Lagrange, or half as many of Hermite.
+    A message that names no interpolation is interpolated by Hermite's polynomial of degree 7 if its velocities agree
+    with its positions, and otherwise by Lagrange's polynomial of degree 7. A polynomial of degree n goes through n +
+    1 samples for Lagrange, and through half that number for Hermite.
 
-    An object is named by OBJECT_NAME or OBJECT_ID.
+    `object_name` is an OBJECT_NAME or an OBJECT_ID.
     """
     hold_to_size(len(data), name, "time")
     blocks = list(_from_markup(data, name) if is_markup(data) else _from_keywords(decoded(data, name), name))
     if not blocks:
         raise PathFileError(f"{name}: has no segment of an orbit ephemeris message")
     segments = [_segment(block, name, orientation) for block in blocks]
-    return orbit_through(segments, name, wanted, center, orientation)
+    return orbit_through(segments, name, object_name, center, orientation)
 
 
-def _turn(frame: str, orientation: Orientation, where: str) -> Turn | None:
-    if _EARTH_FIXED.fullmatch(frame):
+def _turn(frame: str, orientation: Orientation, location: str) -> Turn | None:
+    if _EARTH_FIXED_FRAME.fullmatch(frame):
         return None
     if frame in _EQUINOX_OF_DATE:
         return lambda place, instant: from_teme(place, instant, orientation)
     try:
         return celestial_turn(_CELESTIAL[frame], orientation)
     except PathFileError as error:
-        raise PathFileError(f"{where}: REF_FRAME {frame} {error}") from None
+        raise PathFileError(f"{location}: REF_FRAME {frame} {error}") from None
 
 
 def _segment(block: _EphemerisBlock, name: str, orientation: Orientation) -> Segment:
     metadata = block.metadata
 
-    def where(key: str) -> str:
+    def location(key: str) -> str:
         return f"{name}:{metadata[key][0] if key in metadata else block.line}"
 
     def text(key: str) -> str:
@@ -114,63 +125,65 @@ def _segment(block: _EphemerisBlock, name: str, orientation: Orientation) -> Seg
         return text(key).upper()
 
     if choice("CENTER_NAME") != "EARTH":
-        raise PathFileError(f"{where('CENTER_NAME')}: CENTER_NAME must be EARTH (got {shown(text('CENTER_NAME'))})")
-    system = choice("TIME_SYSTEM")
-    if system not in _SYSTEMS:
         raise PathFileError(
-            f"{where('TIME_SYSTEM')}: TIME_SYSTEM {shown(text('TIME_SYSTEM'))} is not known; accepted: "
-            f"{', '.join(_SYSTEMS)}"
+            f"{location('CENTER_NAME')}: CENTER_NAME must be EARTH (got {shown(text('CENTER_NAME'))})"
+        )
+    system = choice("TIME_SYSTEM")
+    if system not in _TIME_SYSTEMS:
+        raise PathFileError(
+            f"{location('TIME_SYSTEM')}: TIME_SYSTEM {shown(text('TIME_SYSTEM'))} is not known; accepted: "
+            f"{', '.join(_TIME_SYSTEMS)}"
         )
     frame = choice("REF_FRAME")
-    if not _EARTH_FIXED.fullmatch(frame) and frame not in (*_EQUINOX_OF_DATE, *_CELESTIAL):
+    if not _EARTH_FIXED_FRAME.fullmatch(frame) and frame not in (*_EQUINOX_OF_DATE, *_CELESTIAL):
         raise PathFileError(
-            f"{where('REF_FRAME')}: REF_FRAME {shown(text('REF_FRAME'))} is not known; accepted: ITRF with or without"
-            f" its year, WGS84, TEME, {', '.join(_CELESTIAL)}"
+            f"{location('REF_FRAME')}: REF_FRAME {shown(text('REF_FRAME'))} is not known; accepted: ITRF with or"
+            f" without its year, WGS84, TEME, {', '.join(_CELESTIAL)}"
         )
     if frame in _EQUINOX_OF_DATE and "REF_FRAME_EPOCH" in metadata:
-        raise PathFileError(f"{where('REF_FRAME_EPOCH')}: TEME is read as of date, not of one epoch")
+        raise PathFileError(f"{location('REF_FRAME_EPOCH')}: TEME is read as of date, not of one epoch")
 
     samples = [_sample(*row, system, name) for row in block.rows]
-    for (line, epoch, _), before, one in zip(block.rows[1:], samples, samples[1:], strict=False):
-        step = one.time.since(before.time)
-        if step < APART:
-            said = "is there twice" if abs(step) < APART else "is earlier than the one before it"
-            raise PathFileError(f"{name}:{line}: the time {shown(epoch)} {said}; times must rise")
+    for (line, epoch, _), previous, sample in zip(block.rows[1:], samples, samples[1:], strict=False):
+        step = sample.time.since(previous.time)
+        if step < MIN_SAMPLE_STEP_S:
+            fault = "is there twice" if abs(step) < MIN_SAMPLE_STEP_S else "is earlier than the one before it"
+            raise PathFileError(f"{name}:{line}: the time {shown(epoch)} {fault}; times must rise")
     if not samples:
         raise PathFileError(f"{name}:{block.line}: the segment has no ephemeris")
 
     interpolation = _interpolation(metadata, samples, name, block.line)
-    limits = {key: _time(*metadata[key], system, name) for key in _LIMITS if key in metadata}
+    limits = {key: _time(*metadata[key], system, name) for key in _TIME_LIMITS if key in metadata}
     for key in ("START_TIME", "STOP_TIME"):
         text(key)
     first = max(samples[0].time, limits.get("USEABLE_START_TIME", limits["START_TIME"]))
     last = min(samples[-1].time, limits.get("USEABLE_STOP_TIME", limits["STOP_TIME"]))
-    for key, end, beside in (("START_TIME", samples[0], samples[1]), ("STOP_TIME", samples[-1], samples[-2])):
-        # A file that was cut off between two lines has all it needs, but the time that it promises.
-        step = end.time.since(beside.time)
+    for key, end, neighbour in (("START_TIME", samples[0], samples[1]), ("STOP_TIME", samples[-1], samples[-2])):
+        # A file that was cut off between two lines is readable, but ends before the time that it promises.
+        step = end.time.since(neighbour.time)
         if limits[key].since(end.time) * math.copysign(1, step) > abs(step):
             raise PathFileError(
-                f"{where(key)}: {key} is {shown(text(key))}, the ephemeris has nothing beyond"
+                f"{location(key)}: {key} is {shown(text(key))}, the ephemeris has nothing beyond"
                 f" {utc(end.time).as_text()}"
             )
     if last.since(first) <= 0:
         raise PathFileError(f"{name}:{block.line}: the useable time of the segment has no ephemeris")
     object_name, object_id = (shown(" ".join(text(key).split())) for key in ("OBJECT_NAME", "OBJECT_ID"))
-    at_line = f"{name}:{block.line}"
+    segment_location = f"{name}:{block.line}"
     return Segment(
         object=f"{object_name} ({object_id})",
         names=(object_key(object_name), object_key(object_id)),
         samples=samples,
         first=first,
         last=last,
-        where=at_line,
+        where=segment_location,
         words=f"OEM of {object_name}, {frame}, {interpolation.words}" + _not_stated(metadata),
         interpolation=interpolation,
         axes=frame,
-        turn=_turn(frame, orientation, at_line),
+        turn=_turn(frame, orientation, segment_location),
         covariances=[
-            read_covariance(one, _time(one.line, one.epoch, system, name), frame, orientation, name)
-            for one in block.covariances
+            read_covariance(sample, _time(sample.line, sample.epoch, system, name), frame, orientation, name)
+            for sample in block.covariances
         ],
     )
 
@@ -178,78 +191,80 @@ def _segment(block: _EphemerisBlock, name: str, orientation: Orientation) -> Seg
 def read_covariance(
     block: CovarianceBlock, time: Instant, frame: str, orientation: Orientation, name: str
 ) -> EpochCovariance:
-    """A covariance of a message of CCSDS at a time of TAI, in metres and seconds; `frame` is that of the message."""
-    where = f"{name}:{block.line}" if block.line else name
+    """A covariance of a message of CCSDS at a time of TAI, in metres and seconds. `frame` is the message's frame."""
+    location = f"{name}:{block.line}" if block.line else name
     if [len(cells) for _, cells in block.rows] != list(range(1, 7)):
-        said = ", ".join(str(len(cells)) for _, cells in block.rows) or "no"
+        counts = ", ".join(str(len(cells)) for _, cells in block.rows) or "no"
         raise PathFileError(
-            f"{where}: a covariance must be a lower triangle of 6 rows with 1 to 6 numbers (has {said} numbers)"
+            f"{location}: a covariance must be a lower triangle of 6 rows with 1 to 6 numbers (has {counts} numbers)"
         )
     values = np.zeros((6, 6))
     for index, (line, cells) in enumerate(block.rows):
         for column, cell in enumerate(cells):
             number = number_in(cell)
             if number is None or not math.isfinite(number):
-                at = f"{name}:{line}" if line else name
-                raise PathFileError(f"{at}: must be a number of km**2, km**2/s or km**2/s**2 (got {shown(cell)})")
+                cell_location = f"{name}:{line}" if line else name
+                raise PathFileError(
+                    f"{cell_location}: must be a number of km**2, km**2/s or km**2/s**2 (got {shown(cell)})"
+                )
             values[index, column] = values[column, index] = 1e6 * number
     try:
         values = held_to_covariance(values)
     except CovarianceError as error:
-        raise PathFileError(f"{where}: the covariance {error}") from None
-    own = block.frame.upper() or frame
-    turn, axes = None, local_axes(own)
-    if axes is None and _EARTH_FIXED.fullmatch(own):
+        raise PathFileError(f"{location}: the covariance {error}") from None
+    covariance_frame = block.frame.upper() or frame
+    turn, axes = None, local_axes(covariance_frame)
+    if axes is None and _EARTH_FIXED_FRAME.fullmatch(covariance_frame):
         axes = "earth"
-    elif axes is None and own in _CELESTIAL_AXES:
-        axes, turn = "stars", _turn(own, orientation, where)
+    elif axes is None and covariance_frame in _CELESTIAL_AXES:
+        axes, turn = "stars", _turn(covariance_frame, orientation, location)
     return EpochCovariance(time, values, axes, turn)
 
 
 def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
-    """Words on the part of the interpolation that is our choice, since the message does not say it."""
+    """Words for an interpolation, or a degree, that is chosen here because the message does not state it."""
     kind, degree = (metadata.get(key, (0, ""))[1].upper() for key in ("INTERPOLATION", "INTERPOLATION_DEGREE"))
     if not kind:
         return " (the file states no interpolation)"
     return "" if degree or kind == "LINEAR" else " (the file states no degree)"
 
 
-_LIMITS = ("START_TIME", "STOP_TIME", "USEABLE_START_TIME", "USEABLE_STOP_TIME")
+_TIME_LIMITS = ("START_TIME", "STOP_TIME", "USEABLE_START_TIME", "USEABLE_STOP_TIME")
 
 
 def _interpolation(
     metadata: Mapping[str, tuple[int, str]], samples: Sequence[Sample], name: str, line: int
 ) -> Interpolation:
-    said_at, said = metadata.get("INTERPOLATION", (line, ""))
-    if said.upper() not in ("", "HERMITE", "LAGRANGE", "LINEAR"):
+    kind_line, kind = metadata.get("INTERPOLATION", (line, ""))
+    if kind.upper() not in ("", "HERMITE", "LAGRANGE", "LINEAR"):
         raise PathFileError(
-            f"{name}:{said_at}: INTERPOLATION {shown(said)} is not known; accepted: HERMITE, LAGRANGE, LINEAR"
+            f"{name}:{kind_line}: INTERPOLATION {shown(kind)} is not known; accepted: HERMITE, LAGRANGE, LINEAR"
         )
-    degree_at, written = metadata.get("INTERPOLATION_DEGREE", (said_at, ""))
-    if written and not (re.fullmatch(r"\d{1,3}", written, re.ASCII) and 1 <= int(written) <= _HIGHEST_DEGREE):
+    degree_line, degree_text = metadata.get("INTERPOLATION_DEGREE", (kind_line, ""))
+    if degree_text and not (re.fullmatch(r"\d{1,3}", degree_text, re.ASCII) and 1 <= int(degree_text) <= _MAX_DEGREE):
         raise PathFileError(
-            f"{name}:{degree_at}: INTERPOLATION_DEGREE must be a whole number from 1 to {_HIGHEST_DEGREE}"
-            f" (got {shown(written)})"
+            f"{name}:{degree_line}: INTERPOLATION_DEGREE must be a whole number from 1 to {_MAX_DEGREE}"
+            f" (got {shown(degree_text)})"
         )
-    degree = int(written) if written else 1 if said.upper() == "LINEAR" else USUAL_DEGREE
-    if said.upper() == "LINEAR" and degree != 1:
-        raise PathFileError(f"{name}:{degree_at}: INTERPOLATION_DEGREE of LINEAR must be 1 (got {degree})")
-    off = velocity_off(samples)
-    if said.upper() == "HERMITE" and not off <= OWN_VELOCITY:
+    degree = int(degree_text) if degree_text else 1 if kind.upper() == "LINEAR" else DEFAULT_DEGREE
+    if kind.upper() == "LINEAR" and degree != 1:
+        raise PathFileError(f"{name}:{degree_line}: INTERPOLATION_DEGREE of LINEAR must be 1 (got {degree})")
+    error_ratio = velocity_error(samples)
+    if kind.upper() == "HERMITE" and not error_ratio <= MAX_VELOCITY_ERROR_RATIO:
         raise PathFileError(
-            f"{name}:{said_at}: INTERPOLATION HERMITE needs the velocities of the places; those of the segment are"
-            f" {100 * off:.2g} % off what the places do"
+            f"{name}:{kind_line}: INTERPOLATION HERMITE needs the velocities of the places; those of the segment are"
+            f" {100 * error_ratio:.2g} % off what the places do"
         )
-    is_hermite = said.upper() == "HERMITE" or (not said and off <= OWN_VELOCITY)
+    is_hermite = kind.upper() == "HERMITE" or (not kind and error_ratio <= MAX_VELOCITY_ERROR_RATIO)
     if is_hermite:
-        degree = max(degree | 1, 3)  # places and velocities of n samples give 2n coefficients; one would give jumps
-    found = Interpolation(is_hermite, degree)
-    if len(samples) < found.nodes:
+        degree = max(degree | 1, 3)  # n samples give 2n coefficients; a single sample would give jumps
+    interpolation = Interpolation(is_hermite, degree)
+    if len(samples) < interpolation.nodes:
         raise PathFileError(
             f"{name}:{line}: the segment has {len(samples)} place{'s' * (len(samples) != 1)};"
-            f" {'Hermite' if is_hermite else 'Lagrange'} of degree {degree} needs {found.nodes}"
+            f" {'Hermite' if is_hermite else 'Lagrange'} of degree {degree} needs {interpolation.nodes}"
         )
-    return found
+    return interpolation
 
 
 def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str) -> Sample:
@@ -259,15 +274,15 @@ def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str
 
 
 def _time(line: int, text: str, system: str, name: str) -> Instant:
-    """A time of the message, as TAI."""
+    """A time of TAI from a time of the message."""
     head, _, seconds = text.rpartition(":")
     minute = _minute(head)
-    # The second that some days of UTC have more is part of their last minute.
+    # A leap second is part of the last minute of its day.
     is_last = minute is not None and minute.seconds == DAY - 60
     longest = 60 + (minute is not None and is_last and system == "UTC" and has_leap_second(minute.day))
     if minute is None or not _SECONDS.fullmatch(seconds) or (past := float(seconds.rstrip("Z"))) >= longest:
         raise PathFileError(f"{name}:{line}: must be a time such as 2026-05-31T10:12:13.123 (got {shown(text)})")
-    if not FIRST_DAY < minute.day < LATEST:
+    if not FIRST_UTC_DAY < minute.day < LAST_ORBIT_DAY:
         raise PathFileError(f"{name}:{line}: times must be after 1972-01-01 and before 2200 (got {shown(text)})")
     # Seconds are added once: adding twice would round twice.
     return minute.after(past + (tai_less_utc(minute.day) if system == "UTC" else TAI_LESS[system]))
@@ -279,27 +294,27 @@ def _minute(text: str) -> Instant | None:
 
 
 def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:
-    """Segments of a message that has a keyword and a value in each line."""
+    """Segments of a message as text, with a keyword and a value in each line."""
     text = text.rstrip()
-    lines = ((at, line.strip()) for at, line in enumerate(text.split("\n"), 1))
+    lines = ((number, line.strip()) for number, line in enumerate(text.split("\n"), 1))
     rows: list[tuple[int, str, Sequence[str]]] = []
     metadata: dict[str, tuple[int, str]] | None = None
     covariances: list[CovarianceBlock] = []
-    began = 0
+    first_line = 0
     state = "nothing"
-    for at, line in lines:
+    for number, line in lines:
         if not line or line.startswith("COMMENT"):
             continue
-        key, equals, value = (part.strip() for part in line.partition("="))
-        where = f"{name}:{at}"
+        key, equals, value = (piece.strip() for piece in line.partition("="))
+        location = f"{name}:{number}"
         if state == "nothing":
             if key != "CCSDS_OEM_VERS":
-                raise PathFileError(f"{where}: must begin with CCSDS_OEM_VERS (got {shown(line)})")
+                raise PathFileError(f"{location}: must begin with CCSDS_OEM_VERS (got {shown(line)})")
             state = "header"
         elif line == "META_START" and state in ("header", "ephemeris"):
             if metadata is not None:
-                yield _EphemerisBlock(began, metadata, rows, covariances)
-            metadata, rows, covariances, began, state = {}, [], [], at, "metadata"
+                yield _EphemerisBlock(first_line, metadata, rows, covariances)
+            metadata, rows, covariances, first_line, state = {}, [], [], number, "metadata"
         elif line == "META_STOP" and state == "metadata":
             state = "ephemeris"
         elif line == "COVARIANCE_START" and state == "ephemeris":
@@ -307,40 +322,40 @@ def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:
         elif line == "COVARIANCE_STOP" and state == "covariance":
             state = "ephemeris"
         elif state == "covariance":
-            _add_to_covariances(covariances, at, line, name)
+            _add_to_covariances(covariances, number, line, name)
         elif state == "metadata" and equals and metadata is not None:
             if key in metadata:
-                raise PathFileError(f"{where}: {shown(key)} is there twice; before in line {metadata[key][0]}")
-            metadata[key] = (at, value)
+                raise PathFileError(f"{location}: {shown(key)} is there twice; before in line {metadata[key][0]}")
+            metadata[key] = (number, value)
         elif state == "ephemeris":
             epoch, *values = line.split()
             if len(values) not in (6, 9):
                 raise PathFileError(
-                    f"{where}: must be a time with 6 numbers, or 9 with accelerations (has {len(values)}:"
+                    f"{location}: must be a time with 6 numbers, or 9 with accelerations (has {len(values)}:"
                     f" {shown(line)})"
                 )
-            rows.append((at, epoch, values))
+            rows.append((number, epoch, values))
         elif state == "metadata" or (state == "header" and not equals):
-            raise PathFileError(f"{where}: must be a keyword, = and its value (got {shown(line)})")
+            raise PathFileError(f"{location}: must be a keyword, = and its value (got {shown(line)})")
     if state in ("metadata", "covariance"):
         last = text.count("\n") + 1
         raise PathFileError(f"{name}:{last}: ends within {'metadata' if state == 'metadata' else 'a covariance'}")
     if metadata is not None:
-        yield _EphemerisBlock(began, metadata, rows, covariances)
+        yield _EphemerisBlock(first_line, metadata, rows, covariances)
 
 
-def _add_to_covariances(found: list[CovarianceBlock], at: int, line: str, name: str) -> None:
-    """Take a line between COVARIANCE_START and COVARIANCE_STOP: an epoch, a frame or a row of a triangle."""
-    key, equals, value = (part.strip() for part in line.partition("="))
+def _add_to_covariances(covariances: list[CovarianceBlock], number: int, line: str, name: str) -> None:
+    """Add a line between COVARIANCE_START and COVARIANCE_STOP: an epoch, a frame or a row of a triangle."""
+    key, equals, value = (piece.strip() for piece in line.partition("="))
     if key == "EPOCH" and equals:
-        found.append(CovarianceBlock(at, value))
-    elif not found:
-        raise PathFileError(f"{name}:{at}: a covariance must begin with EPOCH (got {shown(line)})")
+        covariances.append(CovarianceBlock(number, value))
+    elif not covariances:
+        raise PathFileError(f"{name}:{number}: a covariance must begin with EPOCH (got {shown(line)})")
     elif equals:
         if key == "COV_REF_FRAME":
-            found[-1].frame = value
+            covariances[-1].frame = value
     else:
-        found[-1].rows.append((at, line.split()))
+        covariances[-1].rows.append((number, line.split()))
 
 
 def _from_markup(data: bytes, name: str) -> Iterator[_EphemerisBlock]:
@@ -348,36 +363,38 @@ def _from_markup(data: bytes, name: str) -> Iterator[_EphemerisBlock]:
     for message in parse_markup(data, name).all("oem"):
         for segment in message.all("segment"):
             metadata = {
-                one.name: (one.line, one.text.strip())
+                element.name: (element.line, element.text.strip())
                 for block in segment.all("metadata")
-                for one in block.children
-                if one.name != "COMMENT"
+                for element in block.children
+                if element.name != "COMMENT"
             }
             rows = [_state(state, name) for block in segment.all("data") for state in block.all("stateVector")]
-            covariances = [_matrix(one) for block in segment.all("data") for one in block.all("covarianceMatrix")]
+            covariances = [
+                _matrix(element) for block in segment.all("data") for element in block.all("covarianceMatrix")
+            ]
             yield _EphemerisBlock(segment.line, metadata, rows, covariances)
 
 
 def _matrix(matrix: MessageElement) -> CovarianceBlock:
-    """A covariance of XML, which names each element of the lower triangle: CX_X, CY_X, CY_Y, …"""
-    return named_covariance({one.name: one.text.strip() for one in matrix.children}, matrix.line)
+    """A covariance of XML, with a name for each element of the lower triangle: CX_X, CY_X, CY_Y, …"""
+    return named_covariance({element.name: element.text.strip() for element in matrix.children}, matrix.line)
 
 
 def named_covariance(leaves: Mapping[str, str], line: int) -> CovarianceBlock:
-    """A covariance whose elements have keywords of their own; an element that is empty is not there."""
+    """A covariance from elements by their keywords. An empty element counts as missing."""
     rows: list[tuple[int, Sequence[str]]] = [
-        (line, [leaves[key] for key in of_row if leaves.get(key)]) for of_row in _TRIANGLE
+        (line, [leaves[key] for key in keywords if leaves.get(key)]) for keywords in _TRIANGLE_KEYWORDS
     ]
     return CovarianceBlock(line, leaves.get("EPOCH", ""), leaves.get("COV_REF_FRAME", ""), rows)
 
 
 def _state(state: MessageElement, name: str) -> tuple[int, str, Sequence[str]]:
-    where = f"{name}:{state.line}"
-    parts = {one.name: one for one in state.children}
-    for key in ("EPOCH", *_VECTOR):
-        if key not in parts:
-            raise PathFileError(f"{where}: the state vector has no {key}")
+    location = f"{name}:{state.line}"
+    elements = {element.name: element for element in state.children}
+    for key in ("EPOCH", *_STATE_KEYWORDS):
+        if key not in elements:
+            raise PathFileError(f"{location}: the state vector has no {key}")
         unit = "km/s" if key.endswith("_DOT") else "km"
-        if key != "EPOCH" and parts[key].units not in ("", unit):
-            raise PathFileError(f"{where}: {key} must be in {unit} (got {shown(parts[key].units)})")
-    return state.line, parts["EPOCH"].text.strip(), [parts[key].text.strip() for key in _VECTOR]
+        if key != "EPOCH" and elements[key].units not in ("", unit):
+            raise PathFileError(f"{location}: {key} must be in {unit} (got {shown(elements[key].units)})")
+    return state.line, elements["EPOCH"].text.strip(), [elements[key].text.strip() for key in _STATE_KEYWORDS]

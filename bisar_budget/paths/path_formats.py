@@ -1,4 +1,4 @@
-"""Formats of orbits and of logs: how each is told by its content, what messages call it, and who reads it."""
+"""Formats of orbits and of logs: the content that identifies a format, its name in messages, and its reader."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -22,12 +22,21 @@ from bisar_budget.paths.ulog import is_ulog, read_ulog
 
 
 class OrbitFormat(NamedTuple):
-    """A format: its words, what its files show within their first lines, as text and as XML, and its reader.
+    """A format of orbits.
 
-    The reader takes the bytes of a whole file, what messages call it, the object that is wanted (needed where there
-    are several), the middle of the aperture, and the orientation that axes of the stars are turned to the Earth with.
-    A `PathFileError` of it says what in the file is not as its format asks for, that it has several objects or none
-    of the name, or no place at the middle of the aperture.
+    Attributes
+    ----------
+    words : str
+        The format in messages.
+    sign : re.Pattern
+        Content of the first lines that identifies the format, in text.
+    element : bytes
+        Name of an element that identifies the format, in XML; empty for a format that is not XML.
+    read : callable
+        Reader: takes the bytes of a file, the name of the file in messages, the name of the object (needed if there
+        are several), the middle of the aperture, and the orientation for turning axes of the stars to the Earth.
+        Raises `PathFileError` if the file breaks its format, has several objects or no object of the name, or has no
+        position at the middle of the aperture.
     """
 
     words: str
@@ -51,10 +60,10 @@ ORBIT_FORMATS: Mapping[str, OrbitFormat] = {
     "eof": OrbitFormat("an Earth Explorer orbit file (EOF)", re.compile(rb"(?!)"), b"Earth_Explorer_File", read_eof),
     "sp3": OrbitFormat("an orbit in SP3", re.compile(rb"\A#[abcd][PV]\d{4} "), b"", read_sp3),
 }
-# What is often taken for an orbit and cannot be read: its words, and what to do.
+# Formats that users often take for an orbit and that cannot be read: content, words, and a remedy.
 _WRITE_OEM = "Write it as an OEM of CCSDS"
 _EXPORT_GPX = "Write its track as GPX, with times and heights"
-_OTHERS = (
+_UNREADABLE_FORMATS = (
     (re.compile(rb"\A(\x1f\x8b|\x1f\x9d|PK\x03\x04|BZh|\xfd7zXZ)"), "a compressed file", "Unpack it"),
     (re.compile(rb"\A.{60}RINEX VERSION / TYPE"), "a RINEX file", "A precise orbit comes as SP3"),
     (re.compile(rb"\A\s*CCSDS_(OPM|OCM|TDM|AEM|APM|CDM)_VERS"), "another message of CCSDS", ""),
@@ -77,61 +86,61 @@ _OTHERS = (
     ),
 )
 _UBX = "messages of u-blox (UBX)"
-_FROM_UBX = "Write it as a solution of RTKLIB, or as sentences of NMEA 0183"
-_BEGINNING = 4096  # bytes that tell a format
+_CONVERT_UBX = "Write it as a solution of RTKLIB, or as sentences of NMEA 0183"
+_EXAMINED_BYTES = 4096  # that identify a format
 
 
 def orbit_format(data: bytes) -> str | None:
-    """Key of an orbit's format by its content; None where it is none of `ORBIT_FORMATS`."""
-    begins = data[:_BEGINNING].removeprefix(b"\xef\xbb\xbf")
-    if is_markup(begins):
-        names = re.findall(rb"<(?:\w+:)?(\w+)[\s>]", begins)
-        return next((key for key, one in ORBIT_FORMATS.items() if one.element in names and one.element), None)
-    return next((key for key, one in ORBIT_FORMATS.items() if one.sign.search(begins)), None)
+    """Key of an orbit's format in `ORBIT_FORMATS` by its content; None for any further content."""
+    beginning = data[:_EXAMINED_BYTES].removeprefix(b"\xef\xbb\xbf")
+    if is_markup(beginning):
+        names = re.findall(rb"<(?:\w+:)?(\w+)[\s>]", beginning)
+        return next((key for key, form in ORBIT_FORMATS.items() if form.element in names and form.element), None)
+    return next((key for key, form in ORBIT_FORMATS.items() if form.sign.search(beginning)), None)
 
 
 def hold_to_format(data: bytes, name: str, form: str) -> None:
-    """Refuse a file that is known to be of another format than an orbit's, and say which key reads that."""
-    found = orbit_format(data)
-    if found == form:
+    """Refuse a file of another format than `form`; the message names the key that reads it."""
+    actual = orbit_format(data)
+    if actual == form:
         return
     accepted = f"accepted: {ORBIT_FORMATS[form].words}"
-    _refuse(data, name, found, accepted)
+    _refuse(data, name, actual, accepted)
     log = log_format(data)
     if log is not None:
         raise PathFileError(f"{name}: is {LOG_FORMATS[log].words}", accepted, "trajectory.file reads it")
 
 
 def hold_to_log(data: bytes, name: str) -> None:
-    """Refuse a file that is known to be no log of a flight, and say which key reads it."""
+    """Refuse a file that is known to be no log of a flight; the message names the key that reads it."""
     _refuse(data, name, orbit_format(data), f"accepted: a log of a flight, {_words_of_logs()}")
 
 
 def _words_of_logs() -> str:
-    """Formats of logs that are read, each with its word."""
-    return ", ".join(f"{format.words} ({one})" for one, format in LOG_FORMATS.items())
+    """Formats of logs, each with its word in the mission file."""
+    return ", ".join(f"{format.words} ({key})" for key, format in LOG_FORMATS.items())
 
 
-def _refuse(data: bytes, name: str, found: str | None, accepted: str) -> None:
-    """Refuse a file that is an orbit of a format that was found, or something else that is known and not wanted."""
-    if found is not None:
-        key = f"orbit: {{{found}: …}} reads it"
-        raise PathFileError(f"{name}: is {ORBIT_FORMATS[found].words}", accepted, key)
-    for sign, words, remedy in _OTHERS:
-        if sign.search(data[:_BEGINNING].removeprefix(b"\xef\xbb\xbf")):
+def _refuse(data: bytes, name: str, actual: str | None, accepted: str) -> None:
+    """Refuse an orbit of another format, or a file of a format that cannot be read."""
+    if actual is not None:
+        key = f"orbit: {{{actual}: …}} reads it"
+        raise PathFileError(f"{name}: is {ORBIT_FORMATS[actual].words}", accepted, key)
+    for sign, words, remedy in _UNREADABLE_FORMATS:
+        if sign.search(data[:_EXAMINED_BYTES].removeprefix(b"\xef\xbb\xbf")):
             raise PathFileError(f"{name}: is {words}", accepted, remedy)
-    if _has_ubx(data[:_BEGINNING]) and log_format(data) is None:
-        raise PathFileError(f"{name}: is {_UBX}", accepted, _FROM_UBX)
+    if _has_ubx(data[:_EXAMINED_BYTES]) and log_format(data) is None:
+        raise PathFileError(f"{name}: is {_UBX}", accepted, _CONVERT_UBX)
 
 
 def _has_ubx(data: bytes) -> bool:
-    """Whether bytes have a whole message of u-blox: two bytes of sync, class, id, length, payload, two sums."""
-    at = data.find(b"\xb5b")
-    while at >= 0:
-        end = at + 6 + int.from_bytes(data[at + 4 : at + 6], "little")
-        if data[end : end + 2] == _ubx_sums(data[at + 2 : end]) or (at == 0 and end + 2 > len(data) >= 6):
+    """Whether bytes have a complete message of u-blox: two bytes of sync, class, id, length, payload, two sums."""
+    start = data.find(b"\xb5b")
+    while start >= 0:
+        end = start + 6 + int.from_bytes(data[start + 4 : start + 6], "little")
+        if data[end : end + 2] == _ubx_sums(data[start + 2 : end]) or (start == 0 and end + 2 > len(data) >= 6):
             return True
-        at = data.find(b"\xb5b", at + 1)
+        start = data.find(b"\xb5b", start + 1)
     return False
 
 
@@ -146,19 +155,28 @@ def _ubx_sums(data: bytes) -> bytes:
 
 # ---------------------------------------------------------------------- logs of flights
 class LogFormat(NamedTuple):
-    """A format: its words, endings of names of its files, whether bytes are one, and its reader.
+    """A format of logs.
 
-    The reader takes the bytes, what messages call the file, and what the mission file says of it. A `PathFileError`
-    of it names the file and the line, byte or record of the fault.
+    Attributes
+    ----------
+    words : str
+        The format in messages.
+    endings : tuple of str
+        Endings of the names of its files.
+    is_format : callable
+        Whether bytes have the format.
+    read : callable
+        Reader: takes the bytes of a file, the name of the file in messages, and the keys of the mission file about
+        the log. Raises `PathFileError` with the line, byte or record of a fault.
     """
 
     words: str
     endings: tuple[str, ...]
-    is_one: Callable[[bytes], bool]
+    is_format: Callable[[bytes], bool]
     read: Callable[[bytes, str, LogKeys], Log]
 
 
-# By the word of the mission file, in the order of the schema. What is told by more stands behind.
+# By the word of the mission file, in the order of the schema. Formats with more specific content come last.
 LOG_FORMATS: dict[str, LogFormat] = {
     "csv": LogFormat("CSV with a header", (".csv",), is_csv, read_csv),
     "sbet": LogFormat("an SBET of records of 136 bytes", (".out", ".sbet"), is_sbet, read_sbet),
@@ -167,7 +185,7 @@ LOG_FORMATS: dict[str, LogFormat] = {
     "gpx": LogFormat("a GPX track", (".gpx",), is_gpx, read_gpx),
     "ulog": LogFormat("a PX4 ULog", (".ulg",), is_ulog, read_ulog),
 }
-# Keys of a mission file that are for some formats alone: which, and what messages call a log of them.
+# Keys of a mission file for certain formats only: the formats, and words for a log of these formats.
 _KEYS_OF_FORMATS = {
     "week": (("sbet",), "an SBET"),
     "talker": (("nmea",), "an NMEA log"),
@@ -177,43 +195,43 @@ _KEYS_OF_FORMATS = {
 
 
 def log_format(data: bytes) -> str | None:
-    """Format of a log by its content; None where it is none of `LOG_FORMATS`."""
-    return next((name for name in reversed(LOG_FORMATS) if LOG_FORMATS[name].is_one(data)), None)
+    """Key of a log's format in `LOG_FORMATS` by its content; None for any further content."""
+    return next((name for name in reversed(LOG_FORMATS) if LOG_FORMATS[name].is_format(data)), None)
 
 
-def read_log(data: bytes, name: str, stated: str | None, keys: LogKeys) -> Log:
-    """Read a log of the format that the mission file states; None: by its content, or else by the ending of its name.
+def read_log(data: bytes, name: str, stated_format: str | None, keys: LogKeys) -> Log:
+    """Read a log of the format that the mission file states.
 
-    All else are arguments of its reader. A `PathFileError` says that the content is that of another format, or of
-    none; or what the reader says.
+    If `stated_format` is None, the content decides, or else the ending of the name. The remaining arguments are those
+    of the reader. Raises `PathFileError` for content of another format or of no format, and for faults of the reader.
     """
-    found = log_format(data)
-    if found is None and is_accuracy(data):
+    actual = log_format(data)
+    if actual is None and is_accuracy(data):
         raise PathFileError(
             f"{name}: is the accuracy file of an SBET (smrmsg), records of ten doubles, 80 bytes",
             "accepted: a log of a flight",
             "trajectory.accuracy reads it; trajectory.file names the SBET",
         )
-    if stated is not None and found not in (None, stated):
+    if stated_format is not None and actual not in (None, stated_format):
         raise PathFileError(
-            f"{name}: is {LOG_FORMATS[found].words}",
-            f"accepted: {LOG_FORMATS[stated].words}",
-            f"trajectory.format: {found} reads it",
+            f"{name}: is {LOG_FORMATS[actual].words}",
+            f"accepted: {LOG_FORMATS[stated_format].words}",
+            f"trajectory.format: {actual} reads it",
             key="format",
         )
-    by_ending = (one for one, format in LOG_FORMATS.items() if name.lower().endswith(format.endings))
-    chosen = stated or found or next(by_ending, None)
-    if chosen is None:
+    by_ending = (key for key, format in LOG_FORMATS.items() if name.lower().endswith(format.endings))
+    key_of_log = stated_format or actual or next(by_ending, None)
+    if key_of_log is None:
         raise PathFileError(
             f"{name}: is no log that is known by its content",
             f"accepted: {_words_of_logs()}",
             "trajectory.format: csv says what is wrong with a header" if b"\0" not in data[:10_000] else "",
         )
     for key, (formats, words) in _KEYS_OF_FORMATS.items():
-        if getattr(keys, key) is not None and chosen not in formats:
+        if getattr(keys, key) is not None and key_of_log not in formats:
             raise PathFileError(
-                f"is for {words}; {name} is {LOG_FORMATS[chosen].words}",
+                f"is for {words}; {name} is {LOG_FORMATS[key_of_log].words}",
                 hint=f"Leave trajectory.{key} out",
                 key=key,
             )
-    return LOG_FORMATS[chosen].read(data, name, keys)
+    return LOG_FORMATS[key_of_log].read(data, name, keys)

@@ -1,9 +1,9 @@
-"""The grid on which a log writes its fixes: a position is known to a step of it, however good its receiver is.
+"""The grid on which a log writes its fixes: a position is known to a step of the grid, for a receiver of any quality.
 
-Degrees, minutes and metres are written with some number of decimals. The coarsest decimal step on which all fixes lie
-is found from the numbers: zeros at the end of a cell say nothing. It is a grid only where the fixes leave a smooth
-path by about as much as rounding would: those of a platform that was made up, at rest or at a round speed, lie on any
-grid.
+A log writes degrees, minutes and metres with a number of decimals. The grid is the coarsest decimal step on which all
+fixes lie, from the numbers alone: zeros at the end of a cell are not evidence. The step counts as a grid only if the
+fixes deviate from a smooth path by about the rounding to the step. Fixes of an invented platform, at rest or at a
+round speed, lie on any grid.
 """
 
 import math
@@ -16,74 +16,74 @@ from bisar_budget.paths.accuracy import Matrix
 from bisar_budget.paths.earth import Floats, earth_fixed_places
 
 _ARC_UNITS_RAD = (math.pi / 180, math.pi / 10_800, math.pi / 648_000)  # degree, minute, second
-_METRE = (1.0,)
-_COARSEST, _FINEST = -3, 12  # decimals
-_FEWEST = 12  # fixes that tell a grid
-_MOST_LOOKED_AT = 4096  # fixes
-_ORDER = 8  # of the smooth path that exact numbers may follow
-_ROUNDS_TO = 0.1  # of a step: the least that rounding leaves, root mean square; it is 0.29 of one
-_ULPS = 16  # by which a number may be off its decimal, and the same for the first
-_VISIBLE = 0.05  # of a step that rounding of binary numbers may be, where a grid can be told
+_LENGTH_UNITS_M = (1.0,)
+_DECIMAL_DIGITS = range(-3, 13)
+_MIN_FIXES = 12  # that tell a grid
+_MAX_FIXES = 4096  # that are examined
+_PATH_ORDER = 8  # of the smooth path that exact numbers may follow
+_MIN_ROUGHNESS_RATIO = 0.1  # of the root mean square deviation to a step; rounding to the step gives 0.29
+_BINARY_ROUNDING_FACTOR = 16  # times the machine epsilon: rounding of a number and of the first number
+_MAX_ROUNDING_RATIO = 0.05  # of binary rounding to a step; with more, no grid can be told
 
 
 def decimal_step(times: Floats, values: Floats, units: Sequence[float]) -> float:
-    """The largest decimal step, of one of some units, on which all values lie; 0 where they lie on none.
+    """The largest decimal step of a unit on which all values lie; 0 if there is no such step.
 
     Parameters
     ----------
     times : (n,) ndarray
-        Rising. [s]
+        Rising times. [s]
     values : (n,) ndarray
-        Of a coordinate. [SI]
+        Values of a coordinate. [SI]
     units : sequence of float
-        In which the coordinate may be written. [SI]
+        Units in which the log may write the coordinate. [SI]
     """
-    stride = -(-len(values) // _MOST_LOOKED_AT)
+    stride = -(-len(values) // _MAX_FIXES)
     values, times = values[::stride], times[::stride]
-    if len(values) < _FEWEST or not np.ptp(values):
+    if len(values) < _MIN_FIXES or not np.ptp(values):
         return 0.0
     from_first, largest = values - values[0], float(np.abs(values).max())
     steps = []
     for unit in units:
-        for decimals in range(_COARSEST, _FINEST + 1):
+        for decimals in _DECIMAL_DIGITS:
             step = unit * 10.0**-decimals
-            doubt = _ULPS * np.finfo(float).eps * largest / step
-            if doubt > _VISIBLE:
+            rounding = _BINARY_ROUNDING_FACTOR * np.finfo(float).eps * largest / step
+            if rounding > _MAX_ROUNDING_RATIO:
                 break
             count = from_first / step
-            if np.abs(count - np.round(count)).max() <= doubt:
+            if np.abs(count - np.round(count)).max() <= rounding:
                 steps.append(step)
                 break
     step = max(steps, default=0.0)
-    return step if step and _roughness(times, values) >= _ROUNDS_TO * step else 0.0
+    return step if step and _roughness(times, values) >= _MIN_ROUGHNESS_RATIO * step else 0.0
 
 
 def _roughness(times: Floats, values: Floats) -> float:
-    """Root mean square of what a polynomial leaves of values."""
-    at = 2 * (times - times[0]) / (times[-1] - times[0]) - 1
-    basis = chebyshev.chebvander(at, min(_ORDER, len(values) // 3))
+    """Root mean square deviation of values from a polynomial that fits them."""
+    normalised_times = 2 * (times - times[0]) / (times[-1] - times[0]) - 1
+    basis = chebyshev.chebvander(normalised_times, min(_PATH_ORDER, len(values) // 3))
     centred = values - values.mean()
-    left = centred - basis @ np.linalg.lstsq(basis, centred, rcond=None)[0]
-    return float(np.sqrt(np.mean(left**2)))
+    residuals = centred - basis @ np.linalg.lstsq(basis, centred, rcond=None)[0]
+    return float(np.sqrt(np.mean(residuals**2)))
 
 
 def geodetic_grid(times: Floats, latitude: Floats, longitude: Floats, height: Floats) -> Matrix:
-    """One step north, east and up, each in the axes of the Earth; zeros where a coordinate has no grid. [m]"""
+    """One step north, east and up, each in the axes of the Earth; zeros for a coordinate without a grid. [m]"""
     middle = len(times) // 2
-    here = np.array([latitude[middle], longitude[middle], height[middle]])
-    units = (_ARC_UNITS_RAD, _ARC_UNITS_RAD, _METRE)
+    middle_fix = np.array([latitude[middle], longitude[middle], height[middle]])
+    units = (_ARC_UNITS_RAD, _ARC_UNITS_RAD, _LENGTH_UNITS_M)
     steps = [
         decimal_step(times, values, unit) for values, unit in zip((latitude, longitude, height), units, strict=True)
     ]
-    sides = [here, *(here + step * axis for step, axis in zip(steps, np.eye(3), strict=True))]
-    first, *others = earth_fixed_places(*np.array(sides).T)
+    corners = [middle_fix, *(middle_fix + step * axis for step, axis in zip(steps, np.eye(3), strict=True))]
+    origin, *neighbours = earth_fixed_places(*np.array(corners).T)
     return tuple(
-        tuple((other - first).tolist()) if step else (0.0, 0.0, 0.0)
-        for other, step in zip(others, steps, strict=True)
+        tuple((neighbour - origin).tolist()) if step else (0.0, 0.0, 0.0)
+        for neighbour, step in zip(neighbours, steps, strict=True)
     )
 
 
-def cartesian_grid(times: Floats, places: Floats) -> Matrix:
-    """One step along each axis of places (n, 3); zeros where a coordinate has no grid. [m]"""
-    steps = [decimal_step(times, values, _METRE) for values in places.T]
+def cartesian_grid(times: Floats, positions: Floats) -> Matrix:
+    """One step along each axis of positions (n, 3); zeros for a coordinate without a grid. [m]"""
+    steps = [decimal_step(times, values, _LENGTH_UNITS_M) for values in positions.T]
     return tuple(tuple(row) for row in np.diag(steps).tolist())

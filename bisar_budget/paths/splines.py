@@ -1,12 +1,12 @@
-"""Splines through the fixes of a log: as many polynomials as a long path needs, each over a piece of time.
+"""Splines through the fixes of a log: a long path as several polynomials, each over a piece of time.
 
-A spline of order 5 is continuous in place and in four derivatives; only the fifth jumps where pieces meet. Pieces are
-halved where the fit leaves motion: a turn gets short pieces, the straight legs beside it long ones.
+A spline of order 5 is continuous in position and in four derivatives; only the fifth jumps where pieces meet. Pieces
+are halved where the fit leaves motion: a turn gets short pieces, the straight legs before and after it long pieces.
 
-Motion is told from noise by two rules. The information criterion counts coefficients against independent fixes, so
-that white noise is not fitted. And what neighbouring residuals have in common must fall by the square of the number
-of coefficients at least. Motion by finite forces does: even acceleration that is white noise leaves a residual of
-variance h³ in pieces of length h. Noise of a receiver that wanders (Gauss-Markov) leaves h.
+Two rules tell motion from noise. The information criterion counts coefficients against independent fixes, so that
+white noise is not fitted. And the mean product of neighbouring residuals must fall at least by the square of the
+number of coefficients. For motion by finite forces it does: even acceleration that is white noise leaves a residual
+of variance h³ in pieces of length h. Noise of a receiver that wanders (Gauss-Markov) leaves h.
 """
 
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ from bisar_budget.geometry import Pieces, PlatformState, Vector
 Floats = NDArray[np.float64]
 
 ORDER = 5
-SHORTEST_S = 1.0  # of a piece; what bends a path faster than that is vibration, which has rows of its own
-_FEWEST_FIXES = 3  # in each half of a piece that is halved
-_OUTSTANDING = 0.5  # of the largest motion that a piece leaves: pieces with more are halved together
+MIN_PIECE_S = 1.0  # faster motion is vibration, which has rows of its own
+_MIN_HALF_FIXES = 3  # in each half of a piece that is halved
+_HALVED_MOTION_FRACTION = 0.5  # pieces with more than this fraction of the largest motion are halved together
 
 
 def basis(times: Floats, edges: Floats) -> Floats:
@@ -33,78 +33,87 @@ def basis(times: Floats, edges: Floats) -> Floats:
     """
     pieces = len(edges) - 1
     knots = np.concatenate([np.full(ORDER, edges[0]), edges, np.full(ORDER, edges[-1])])
-    which = np.clip(np.searchsorted(edges, times, "right") - 1, 0, pieces - 1)
-    # Only ORDER + 1 of them differ from zero in a piece: `near` holds those, and none is 0/0.
-    near = np.ones((len(times), 1))
+    piece = np.clip(np.searchsorted(edges, times, "right") - 1, 0, pieces - 1)
+    # Only ORDER + 1 of the B-splines differ from zero in a piece: `nonzero` has their values, and no 0/0 occurs.
+    nonzero = np.ones((len(times), 1))
     for order in range(1, ORDER + 1):
-        after = knots[which[:, None] + ORDER + 1 + np.arange(order)]
-        before = knots[which[:, None] + ORDER + 1 - order + np.arange(order)]
-        share = near / (after - before)
-        near = np.zeros((len(times), order + 1))
-        near[:, :-1] = (after - times[:, None]) * share
-        near[:, 1:] += (times[:, None] - before) * share
-    found = np.zeros((len(times), pieces + ORDER))
-    np.put_along_axis(found, which[:, None] + np.arange(ORDER + 1), near, axis=1)
-    return found
+        after = knots[piece[:, None] + ORDER + 1 + np.arange(order)]
+        before = knots[piece[:, None] + ORDER + 1 - order + np.arange(order)]
+        share = nonzero / (after - before)
+        nonzero = np.zeros((len(times), order + 1))
+        nonzero[:, :-1] = (after - times[:, None]) * share
+        nonzero[:, 1:] += (times[:, None] - before) * share
+    matrix = np.zeros((len(times), pieces + ORDER))
+    np.put_along_axis(matrix, piece[:, None] + np.arange(ORDER + 1), nonzero, axis=1)
+    return matrix
 
 
 @dataclass(frozen=True, eq=False)
 class SplineFit:
-    """A spline of pieces between edges (m + 1,) [s] by least squares: coefficients, and what it leaves of fixes [m].
+    """A spline that fits fixes by least squares.
 
-    The coefficients are those of the way from a `middle` (3,): digits of a far place are not lost in it. `root`
-    (coefficients, coefficients) times its transpose is the covariance of the coefficients, over the variance of white
-    fixes.
+    Attributes
+    ----------
+    edges : (m + 1,)
+        Times at which pieces begin and end. [s]
+    center : (3,)
+        Mean position of the fixes. The spline is relative to it, so that a distant position loses no digits. [m]
+    series : (coefficients, 3)
+        Coefficients of the spline. [m]
+    residuals : (n, 3)
+        Fixes less the spline. [m]
+    root : (coefficients, coefficients)
+        Its product with its transpose is the covariance of the coefficients over the variance of white fixes.
     """
 
     edges: Floats
-    middle: Floats
+    center: Floats
     series: Floats
-    left: Floats
+    residuals: Floats
     root: Floats
 
     @classmethod
-    def of(cls, times: Floats, places: Floats, edges: Floats) -> "SplineFit":
+    def of(cls, times: Floats, positions: Floats, edges: Floats) -> "SplineFit":
         """Fit fixes (n, 3) [m] at times (n,) [s]."""
         design = basis(times, edges)
         root = np.linalg.inv(np.linalg.cholesky(design.T @ design)).T
-        middle = places.mean(axis=0)
-        series = root @ (root.T @ (design.T @ (places - middle)))
-        left = places - middle - design @ series
+        center = positions.mean(axis=0)
+        series = root @ (root.T @ (design.T @ (positions - center)))
+        residuals = positions - center - design @ series
         # Normal equations square the condition of the basis; the second step gives the digits back.
-        series += root @ (root.T @ (design.T @ left))
-        return cls(edges, middle, series, places - middle - design @ series, root)
+        series += root @ (root.T @ (design.T @ residuals))
+        return cls(edges, center, series, positions - center - design @ series, root)
 
     @cached_property
     def motion(self) -> Floats:
-        """Product of the residual of each fix and the next one, (n - 1,): white noise has none in the mean. [m²]"""
-        return np.asarray((self.left[1:] * self.left[:-1]).sum(axis=1))
+        """Product of the residuals of each fix and the next fix, (n - 1,); its mean is 0 for white noise. [m²]"""
+        return np.asarray((self.residuals[1:] * self.residuals[:-1]).sum(axis=1))
 
     def halved(self, times: Floats) -> Floats | None:
-        """Edges with the pieces halved that leave the most motion; None where none leaves any, or can be halved."""
+        """Edges after the pieces with the most motion are halved; None if no piece with motion can be halved."""
         lengths, middles = np.diff(self.edges), (self.edges[1:] + self.edges[:-1]) / 2
-        which = np.clip(np.searchsorted(self.edges, times, "right") - 1, 0, len(middles) - 1)
-        early = np.bincount(which, times < middles[which], len(middles))
-        late = np.bincount(which, minlength=len(middles)) - early
-        can_be = (lengths >= 2 * SHORTEST_S) & (np.minimum(early, late) >= _FEWEST_FIXES)
-        left = np.where(can_be, np.bincount(which[:-1], self.motion, len(middles)), 0.0)
-        if not left.max() > 0:
+        piece = np.clip(np.searchsorted(self.edges, times, "right") - 1, 0, len(middles) - 1)
+        early = np.bincount(piece, times < middles[piece], len(middles))
+        late = np.bincount(piece, minlength=len(middles)) - early
+        is_divisible = (lengths >= 2 * MIN_PIECE_S) & (np.minimum(early, late) >= _MIN_HALF_FIXES)
+        motion = np.where(is_divisible, np.bincount(piece[:-1], self.motion, len(middles)), 0.0)
+        if not motion.max() > 0:
             return None
-        return np.sort(np.concatenate([self.edges, middles[left >= _OUTSTANDING * left.max()]]))
+        return np.sort(np.concatenate([self.edges, middles[motion >= _HALVED_MOTION_FRACTION * motion.max()]]))
 
     def state(self) -> PlatformState:
-        """The path that it is, from whose midpoint time counts."""
-        # Powers of the time from the middle of a piece, by values in as many places: exact but for rounding.
+        """The path of the spline."""
+        # Powers of the time from the middle of a piece, from values at ORDER + 1 nodes: exact but for rounding.
         middles, halves = (self.edges[1:] + self.edges[:-1]) / 2, np.diff(self.edges) / 2
-        places = np.cos(np.pi * (np.arange(ORDER + 1) + 0.5) / (ORDER + 1))
-        values = (basis((middles[:, None] + halves[:, None] * places).ravel(), self.edges) @ self.series).reshape(
+        nodes = np.cos(np.pi * (np.arange(ORDER + 1) + 0.5) / (ORDER + 1))
+        values = (basis((middles[:, None] + halves[:, None] * nodes).ravel(), self.edges) @ self.series).reshape(
             len(middles), ORDER + 1, 3
         )
-        powers = np.linalg.solve(np.vander(places, ORDER + 1, increasing=True), values)
+        powers = np.linalg.solve(np.vander(nodes, ORDER + 1, increasing=True), values)
         powers /= halves[:, None, None] ** np.arange(ORDER + 1)[:, None]
-        powers[:, 0] += self.middle
-        here = min(max(int(np.searchsorted(self.edges, 0.0, "right")) - 1, 0), len(middles) - 1)
-        position, velocity, (x, y, z), *bends = _shifted(powers[here], -middles[here])
+        powers[:, 0] += self.center
+        middle_piece = min(max(int(np.searchsorted(self.edges, 0.0, "right")) - 1, 0), len(middles) - 1)
+        position, velocity, (x, y, z), *bends = _shifted(powers[middle_piece], -middles[middle_piece])
         vectors = [[_vector(power) for power in piece] for piece in powers]
         return PlatformState(
             position=position,
@@ -122,8 +131,8 @@ def _vector(values: Any) -> Vector:
 
 def _shifted(powers: Floats, by_s: float) -> list[Vector]:
     """Coefficients about another time: Taylor's series by repeated synthetic division."""
-    found = powers.copy()
-    for first in range(len(found) - 1):
-        for power in range(len(found) - 2, first - 1, -1):
-            found[power] += by_s * found[power + 1]
-    return [_vector(power) for power in found]
+    shifted = powers.copy()
+    for first in range(len(shifted) - 1):
+        for power in range(len(shifted) - 2, first - 1, -1):
+            shifted[power] += by_s * shifted[power + 1]
+    return [_vector(power) for power in shifted]

@@ -1,17 +1,17 @@
-"""When a satellite is above an elevation at a place: rise, culmination and set, and where it has a squint.
+"""Times at which a satellite is above an elevation at a scene: rise, culmination and set, and times of a squint.
 
-An orbit is sampled each two minutes in the axes of the scene, and read between by Lagrange's polynomials through
-eight places: they leave centimetres of a low orbit, and less than a metre at the perigee of a transfer orbit. All
-that is looked for is then found on arrays. The rate of the elevation is looked at each half minute, and each extremum
-found where it changes its sign. From one extremum to the next a low orbit makes about half a turn. Between two of
-them the elevation only rises or only falls, so that no pass is missed, however short, and none is there twice.
+An orbit is sampled each two minutes in the axes of the scene, and interpolated by Lagrange's polynomials through
+eight samples. Their error is centimetres in a low orbit, and less than a metre at the perigee of a transfer orbit.
+All searches then run on arrays. The rate of the elevation is evaluated each half minute, and an extremum of the
+elevation lies where the rate changes its sign. A low orbit makes about half a turn from one extremum to the next.
+Between two extrema the elevation only rises or only falls, so that even the shortest pass is found, and found once.
 """
 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -22,21 +22,21 @@ from bisar_budget.paths.earth import Floats, SceneAxes
 from bisar_budget.paths.flight import Orbit, PathFileError
 from bisar_budget.paths.instant import Instant
 
-STEP = 120.0  # s between places
-_NODES = 8
-_FINE = 4  # times as many places are looked at
-_HALVINGS = 40  # of a bracket, to 1e-10 s
-_APART = 1e-3  # s to which it is found where one orbit ends and the next begins
-_TOUCHING = 5 * _APART
-_LOOKED_FOR = 16  # parts of a span in which an orbit is looked for, where a file does not say when it has one
-_SHORTEST = 3600.0  # s; shorter parts are not looked into
-# Powers of a place between two nodes to the weights of the places around: the inverse of Vandermonde's matrix.
-_WEIGHTS = np.linalg.inv(np.vander(np.arange(_NODES, dtype=float), increasing=True))
-_POWERS = np.arange(_NODES)
+SAMPLE_STEP_S = 120.0
+_INTERPOLATION_NODES = 8
+_FINE_RATIO = 4  # of evaluated times to samples
+_HALVING_ROUNDS = 40  # of a bracket, to 1e-10 s
+_CHANGE_ERROR_S = 1e-3  # of the time at which an orbit ends and the next begins
+_MAX_TOUCHING_GAP_S = 5 * _CHANGE_ERROR_S
+_SEARCH_STEPS = 16  # of a span, in the search for orbits in a file that does not state its times
+_MIN_SEARCH_STEP_S = 3600.0
+# From powers of the position between two nodes to weights of the samples: the inverse of Vandermonde's matrix.
+_WEIGHTS = np.linalg.inv(np.vander(np.arange(_INTERPOLATION_NODES, dtype=float), increasing=True))
+_POWERS = np.arange(_INTERPOLATION_NODES)
 
 
 class OrbitGap(NamedTuple):
-    """A part of a span in which nothing is known of where a satellite is, and why. [s]"""
+    """A part of a span in which the position of a satellite is unknown, and the reason. [s]"""
 
     start: float
     stop: float
@@ -46,7 +46,7 @@ class OrbitGap(NamedTuple):
 class Stretch(NamedTuple):
     """A part of a span in which a satellite is above an elevation. [s]
 
-    `rises` and `sets` are false where it is above at the beginning, or the end, of what is known.
+    `rises` and `sets` are false for a satellite above the elevation at the beginning, or at the end, of known orbits.
     """
 
     start: float
@@ -56,40 +56,41 @@ class Stretch(NamedTuple):
 
 
 class _Sampled:
-    """Places of one orbit in the axes of a scene, each two minutes from `start` to `stop` or a little closer. [s]"""
+    """Samples of an orbit in the axes of a scene, every two minutes or slightly less from `start` to `stop`. [s]"""
 
     def __init__(self, orbit: Orbit, axes: SceneAxes, origin: Instant, start: float, stop: float) -> None:
         self.orbit, self.start, self.reason = orbit, start, ""
-        count = max(math.ceil((stop - start) / STEP), _NODES - 1)
+        count = max(math.ceil((stop - start) / SAMPLE_STEP_S), _INTERPOLATION_NODES - 1)
         self.step = (stop - start) / count
-        places = []
+        positions = []
         for n in range(count + 1):
             try:
-                places.append(orbit.place(origin.after(start + n * self.step)))
+                positions.append(orbit.place(origin.after(start + n * self.step)))
             except PathFileError as error:  # it has decayed
                 self.reason = str(error)
                 break
-        self.stop = start + (len(places) - 1) * self.step
-        self.places: Floats = axes.places(np.array(places)) if places else np.empty((0, 3))
+        self.stop = start + (len(positions) - 1) * self.step
+        self.positions: Floats = axes.places(np.array(positions)) if positions else np.empty((0, 3))
 
     def at(self, times: Floats) -> tuple[Floats, Floats]:
-        """Places and velocities (n, 3) at times (n,) within. [m], [m/s]"""
-        where = (times - self.start) / self.step
-        first = np.clip(where.astype(int) - (_NODES // 2 - 1), 0, len(self.places) - _NODES)
-        past = (where - first)[:, None]
-        powers = past**_POWERS
-        rates = np.hstack([np.zeros_like(past), powers[:, :-1] * _POWERS[1:]])
-        near = self.places[first[:, None] + _POWERS]
+        """Positions and velocities (n, 3) at times (n,) within the span. [m], [m/s]"""
+        sample_number = (times - self.start) / self.step
+        last = len(self.positions) - _INTERPOLATION_NODES
+        first = np.clip(sample_number.astype(int) - (_INTERPOLATION_NODES // 2 - 1), 0, last)
+        offset = (sample_number - first)[:, None]
+        powers = offset**_POWERS
+        rates = np.hstack([np.zeros_like(offset), powers[:, :-1] * _POWERS[1:]])
+        samples = self.positions[first[:, None] + _POWERS]
         weights, slopes = powers @ _WEIGHTS, rates @ _WEIGHTS / self.step
-        return np.einsum("nk,nkx->nx", weights, near), np.einsum("nk,nkx->nx", slopes, near)
+        return np.einsum("nk,nkx->nx", weights, samples), np.einsum("nk,nkx->nx", slopes, samples)
 
 
 @dataclass(frozen=True, eq=False)
 class Watched:
-    """A satellite as it is seen from the origin of a scene over a span of time, and the parts without an orbit.
+    """A satellite as seen from the origin of a scene over a span of time, and the parts without an orbit.
 
-    Times are seconds after `origin`. Where a file has several element sets, or segments, each is flown where it is
-    nearest, as `orbits_of` a mission has it.
+    Times are seconds after `origin`. If a file has several element sets, or segments, the nearest counts at each
+    time, as in `orbits_of` a mission.
     """
 
     origin: Instant
@@ -100,7 +101,7 @@ class Watched:
     def over(
         cls, orbit_at: Callable[[Instant], Orbit], axes: SceneAxes, origin: Instant, duration_s: float
     ) -> "Watched":
-        """Sample the orbits of a span from `origin` on; `orbit_at` raises `PathFileError` where there is none."""
+        """Sample the orbits of a span from `origin` on; `orbit_at` raises `PathFileError` if there is no orbit."""
         pieces: list[_Sampled] = []
         gaps: list[OrbitGap] = []
         for start, stop, orbit in _orbits(orbit_at, origin, duration_s):
@@ -108,7 +109,7 @@ class Watched:
                 gaps.append(OrbitGap(start, stop, str(orbit)))
                 continue
             piece = _Sampled(orbit, axes, origin, start, stop)
-            if len(piece.places) >= _NODES:
+            if len(piece.positions) >= _INTERPOLATION_NODES:
                 pieces.append(piece)
                 start = piece.stop
             if piece.reason:
@@ -120,22 +121,22 @@ class Watched:
         return np.array([piece.start for piece in self.pieces])
 
     def _of(self, times: Floats) -> NDArray[np.intp]:
-        """Number of the piece that each time is in."""
+        """Number of the piece of each time."""
         return np.maximum(np.searchsorted(self._starts, times, "right") - 1, 0)
 
     def at(self, times: Floats) -> tuple[Floats, Floats]:
-        """Places and velocities (n, 3) in the scene's axes at times (n,) that have an orbit. [m], [m/s]"""
-        place, velocity = np.empty((2, times.size, 3))
-        which = self._of(times)
-        for number in np.unique(which).tolist():
-            same = which == number
-            place[same], velocity[same] = self.pieces[number].at(times[same])
-        return place, velocity
+        """Positions and velocities (n, 3) in the scene's axes at times (n,) with an orbit. [m], [m/s]"""
+        position, velocity = np.empty((2, times.size, 3))
+        piece_numbers = self._of(times)
+        for number in np.unique(piece_numbers).tolist():
+            is_in_piece = piece_numbers == number
+            position[is_in_piece], velocity[is_in_piece] = self.pieces[number].at(times[is_in_piece])
+        return position, velocity
 
     def state(self, time: float) -> PlatformState:
-        """Place and velocity at a time."""
-        (place,), (velocity,) = self.at(np.array([time]))
-        return PlatformState(position=tuple(place.tolist()), velocity=tuple(velocity.tolist()))
+        """Position and velocity at a time."""
+        (position,), (velocity,) = self.at(np.array([time]))
+        return PlatformState(position=tuple(position.tolist()), velocity=tuple(velocity.tolist()))
 
     def orbit(self, time: float) -> Orbit:
         """The orbit that is flown at a time."""
@@ -143,88 +144,90 @@ class Watched:
 
     def sine_of_elevation(self, times: Floats) -> Floats:
         """Sine of the elevation (n,)."""
-        place, _ = self.at(times)
-        sine: Floats = place[:, 2] / np.linalg.norm(place, axis=1)
+        position, _ = self.at(times)
+        sine: Floats = position[:, 2] / np.linalg.norm(position, axis=1)
         return sine
 
     def _rate(self, times: Floats) -> Floats:
         """Rate of the sine of the elevation (n,), times the slant range. [m/s]"""
-        place, velocity = self.at(times)
-        square = np.sum(place**2, axis=1)
-        rate: Floats = velocity[:, 2] - place[:, 2] * np.sum(place * velocity, axis=1) / square
+        position, velocity = self.at(times)
+        square = np.sum(position**2, axis=1)
+        rate: Floats = velocity[:, 2] - position[:, 2] * np.sum(position * velocity, axis=1) / square
         return rate
 
     def squint(self, times: Floats) -> Floats:
-        """Squint (n,) of `PlatformState.squint`, of many times. [rad]"""
-        place, velocity = self.at(times)
-        lengths = np.linalg.norm(place, axis=1) * np.linalg.norm(velocity, axis=1)
+        """Squint (n,) at times (n,), as in `PlatformState.squint`. [rad]"""
+        position, velocity = self.at(times)
+        lengths = np.linalg.norm(position, axis=1) * np.linalg.norm(velocity, axis=1)
         with np.errstate(invalid="ignore"):
-            sine = -np.sum(place * velocity, axis=1) / lengths
+            sine = -np.sum(position * velocity, axis=1) / lengths
         angle: Floats = np.arcsin(np.clip(sine, -1.0, 1.0))
         return angle
 
     def above(self, elevation: float) -> list[Stretch]:
-        """Stretches of time above an elevation [rad], in their order."""
-        least = math.sin(elevation)
-        found: list[Stretch] = []
+        """Stretches of time above an elevation [rad], in order."""
+        min_sine = math.sin(elevation)
+        stretches: list[Stretch] = []
         for piece in self.pieces:
             times = _times(piece.start, piece.stop)
             times = np.sort(np.concatenate([times, _roots(self._rate, times)]))
-            crossings = _roots(lambda at: self.sine_of_elevation(at) - least, times)
+            crossings = _roots(lambda at: self.sine_of_elevation(at) - min_sine, times)
             edges = [piece.start, *crossings.tolist(), piece.stop]
-            middles = np.array([(a + b) / 2 for a, b in pairwise(edges)])
+            middles = np.array([(low + high) / 2 for low, high in pairwise(edges)])
             for (start, stop), is_above in zip(
-                pairwise(edges), (self.sine_of_elevation(middles) > least).tolist(), strict=True
+                pairwise(edges), (self.sine_of_elevation(middles) > min_sine).tolist(), strict=True
             ):
                 if not is_above:
                     continue
                 stretch = Stretch(start, stop, start > piece.start, stop < piece.stop)
-                before = found[-1] if found else None
-                if before is not None and start - before.stop < _TOUCHING:  # the next elements, or a grazed edge
-                    found[-1] = before._replace(stop=stop, sets=stretch.sets)
+                previous = stretches[-1] if stretches else None
+                # Stretches touch at a change of elements, or at a grazed edge.
+                if previous is not None and start - previous.stop < _MAX_TOUCHING_GAP_S:
+                    stretches[-1] = previous._replace(stop=stop, sets=stretch.sets)
                 else:
-                    found.append(stretch)
-        return found
+                    stretches.append(stretch)
+        return stretches
 
     def culmination(self, stretch: Stretch) -> float:
-        """Time within a stretch at which the satellite stands highest. [s]"""
+        """Time within a stretch with the highest elevation. [s]"""
         times = _times(stretch.start, stretch.stop)
         times = np.concatenate([times, _roots(self._rate, times)])
         return float(times[self.sine_of_elevation(times).argmax()])
 
     def with_squint(self, stretch: Stretch, squint: float) -> float | None:
-        """Time within a stretch at which it has a squint [rad], of several the one where it stands highest. [s]"""
-        found = _roots(lambda at: self.squint(at) - squint, _times(stretch.start, stretch.stop))
-        return float(found[self.sine_of_elevation(found).argmax()]) if found.size else None
+        """Time within a stretch with a squint [rad], the time with the highest elevation if there are several. [s]"""
+        squint_times = _roots(lambda at: self.squint(at) - squint, _times(stretch.start, stretch.stop))
+        return float(squint_times[self.sine_of_elevation(squint_times).argmax()]) if squint_times.size else None
 
 
-def shared(some: Sequence[Stretch], others: Sequence[Stretch]) -> list[Stretch]:
-    """Stretches in which both are above."""
-    found = []
-    for one in some:
-        for other in others:
-            first, last = (one if one.start >= other.start else other), (one if one.stop <= other.stop else other)
-            if first.start < last.stop:
-                found.append(Stretch(first.start, last.stop, first.rises, last.sets))
-    return found
+def shared(of_transmitter: Sequence[Stretch], of_receiver: Sequence[Stretch]) -> list[Stretch]:
+    """Overlaps of two lists of stretches."""
+    overlaps = []
+    for transmitter, receiver in product(of_transmitter, of_receiver):
+        first = transmitter if transmitter.start >= receiver.start else receiver
+        last = transmitter if transmitter.stop <= receiver.stop else receiver
+        if first.start < last.stop:
+            overlaps.append(Stretch(first.start, last.stop, first.rises, last.sets))
+    return overlaps
 
 
 def _times(start: float, stop: float) -> Floats:
     """Times from a beginning to an end, half a minute apart or closer."""
-    times: Floats = np.linspace(start, stop, max(math.ceil(_FINE * (stop - start) / STEP), _NODES) + 1)
+    steps = max(math.ceil(_FINE_RATIO * (stop - start) / SAMPLE_STEP_S), _INTERPOLATION_NODES)
+    times: Floats = np.linspace(start, stop, steps + 1)
     return times
 
 
 def _roots(function: Callable[[Floats], Floats], times: Floats) -> Floats:
-    """Times at which a function changes its sign, of which there is at most one between two of the given ones."""
+    """Times at which a function changes its sign, which it does at most once between two neighbours of `times`."""
     values = function(times)
     is_above = values > 0
-    places = np.flatnonzero(is_above[1:] != is_above[:-1])
-    low, high, rises = times[places], times[places + 1], is_above[places + 1]
-    for _ in range(_HALVINGS if places.size else 0):
+    brackets = np.flatnonzero(is_above[1:] != is_above[:-1])
+    low, high, rises = times[brackets], times[brackets + 1], is_above[brackets + 1]
+    for _ in range(_HALVING_ROUNDS if brackets.size else 0):
         middle = (low + high) / 2
-        is_behind = (function(middle) > 0) == rises
-        low, high = np.where(is_behind, low, middle), np.where(is_behind, middle, high)
+        is_after = (function(middle) > 0) == rises
+        low, high = np.where(is_after, low, middle), np.where(is_after, middle, high)
     return (low + high) / 2
 
 
@@ -232,61 +235,67 @@ def _roots(function: Callable[[Floats], Floats], times: Floats) -> Floats:
 def _orbits(
     orbit_at: Callable[[Instant], Orbit], origin: Instant, duration_s: float
 ) -> Iterator[tuple[float, float, Orbit | PathFileError]]:
-    """Beginning and end of each part of a span in which one orbit is flown, or none, and why. [s]
+    """Beginning and end of each part of a span, with its orbit or with the reason for its absence. [s]
 
-    Of element sets the nearest is flown, of segments the one that has most around: either has one part of the time.
+    The nearest element set counts, or the segment that reaches farthest around a time. So each element set, and each
+    segment, has one part of the span.
     """
-    known: dict[float, Orbit | PathFileError] = {}
+    orbits: dict[float, Orbit | PathFileError] = {}
 
     def at(time: float) -> Orbit | PathFileError:
-        if time not in known:
+        if time not in orbits:
             try:
-                known[time] = orbit_at(origin.after(time))
+                orbits[time] = orbit_at(origin.after(time))
             except PathFileError as error:
-                known[time] = error
-        return known[time]
+                orbits[time] = error
+        return orbits[time]
 
-    def look(start: float, stop: float) -> None:
-        """Find all that differ between two times."""
-        a, b = at(start), at(stop)
-        if stop - start <= _APART or (_are_one(a, b) and not _is_gap(a)):
+    def search(start: float, stop: float) -> None:
+        """Find all changes of the orbit between two times."""
+        orbit, next_orbit = at(start), at(stop)
+        if stop - start <= _CHANGE_ERROR_S or (_are_same_orbit(orbit, next_orbit) and not _is_gap(orbit)):
             return
-        inside = [time for time in _changes(a, b, origin) if start < time < stop]
-        if _is_gap(a) and _is_gap(b) and not inside:
-            is_known = str(a) == str(b) or any(isinstance(one, PathFileError) and one.spans for one in (a, b))
-            if is_known or stop - start < max(_SHORTEST, duration_s / _LOOKED_FOR):
+        inside = [time for time in _changes(orbit, next_orbit, origin) if start < time < stop]
+        if _is_gap(orbit) and _is_gap(next_orbit) and not inside:
+            has_spans = any(isinstance(gap, PathFileError) and gap.spans for gap in (orbit, next_orbit))
+            is_explained = str(orbit) == str(next_orbit) or has_spans
+            if is_explained or stop - start < max(_MIN_SEARCH_STEP_S, duration_s / _SEARCH_STEPS):
                 return
-        for c, d in pairwise([start, *(inside or [(start + stop) / 2]), stop]):
-            look(c, d)
+        for begin_part, end_part in pairwise([start, *(inside or [(start + stop) / 2]), stop]):
+            search(begin_part, end_part)
 
-    look(0.0, duration_s)
-    times = sorted(known)
+    search(0.0, duration_s)
+    times = sorted(orbits)
     begin = times[0]
     for before, time in pairwise(times):
-        if not _are_one(known[before], known[time]):
-            yield begin, before, known[begin]
+        if not _are_same_orbit(orbits[before], orbits[time]):
+            yield begin, before, orbits[begin]
             begin = time
-    yield begin, times[-1], known[begin]
+    yield begin, times[-1], orbits[begin]
 
 
 def _is_gap(orbit: Orbit | PathFileError) -> bool:
     return isinstance(orbit, PathFileError)
 
 
-def _are_one(a: Orbit | PathFileError, b: Orbit | PathFileError) -> bool:
-    """Whether two orbits are of one epoch or span, or neither is there."""
-    if isinstance(a, PathFileError) or isinstance(b, PathFileError):
-        return _is_gap(a) and _is_gap(b)
-    return (a.epoch, a.span) == (b.epoch, b.span)
+def _are_same_orbit(orbit: Orbit | PathFileError, next_orbit: Orbit | PathFileError) -> bool:
+    """Whether two orbits have the same epoch and span, or both are absent."""
+    if isinstance(orbit, PathFileError) or isinstance(next_orbit, PathFileError):
+        return _is_gap(orbit) and _is_gap(next_orbit)
+    return (orbit.epoch, orbit.span) == (next_orbit.epoch, next_orbit.span)
 
 
-def _changes(a: Orbit | PathFileError, b: Orbit | PathFileError, origin: Instant) -> list[float]:
-    """Times around which one is likely to give way to another: ends of spans, the middle of two epochs. [s]"""
+def _changes(orbit: Orbit | PathFileError, next_orbit: Orbit | PathFileError, origin: Instant) -> list[float]:
+    """Times at which an orbit is likely to follow another: ends of spans, and the middle of two epochs. [s]"""
     ends: list[Instant] = []
-    for one in (a, b):
-        spans = one.spans if isinstance(one, PathFileError) else [one.span] if one.span is not None else []
-        ends += [end for span in spans for end in span]
+    for candidate in (orbit, next_orbit):
+        if isinstance(candidate, PathFileError):
+            ends += [end for span in candidate.spans for end in span]
+        elif candidate.span is not None:
+            ends += candidate.span
     times = [end.since(origin) for end in ends]
-    if isinstance(a, Orbit) and isinstance(b, Orbit) and a.epoch is not None and b.epoch is not None:
-        times.append((a.epoch.since(origin) + b.epoch.since(origin)) / 2)
-    return sorted({time + side for time in times for side in (-_APART / 2, _APART / 2)})
+    epochs = [candidate.epoch for candidate in (orbit, next_orbit) if isinstance(candidate, Orbit)]
+    known_epochs = [epoch.since(origin) for epoch in epochs if epoch is not None]
+    if len(known_epochs) == 2:
+        times.append(sum(known_epochs) / 2)
+    return sorted({time + side for time in times for side in (-_CHANGE_ERROR_S / 2, _CHANGE_ERROR_S / 2)})

@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 # Draws held at once, the same for every number of draws: results depend on the seed alone. All that is summed are
 # a few megabytes and stay in a cache.
-BLOCK = 1 << 15
-CHUNK = 1 << 22  # draws of one stream; a second or so
-EXACT_PIECE = 1 << 18  # of a chunk, which it divides, where each draw goes through exact ranges: as long
+BLOCK_DRAWS = 1 << 15
+CHUNK_DRAWS = 1 << 22  # draws of one stream; a second or so
+EXACT_PIECE_DRAWS = 1 << 18  # of a chunk, which it divides, where each draw goes through exact ranges: as long
 _ORDER = {"m": 0, "m/s": 1, "m/s^2": 2}
 _SAMPLE = 512  # draws that decide whether exact ranges are needed
 _DIFFERENT = 0.01  # of a limit
 _AFTER_BYTES = 256
-_WORTH_COMPILING = 1 << 30  # normal numbers; then Numba saves more seconds than it takes
+_MIN_COMPILED_DRAWS = 1 << 30  # normal numbers; then Numba saves more seconds than it takes
 
 
 class Variable(NamedTuple):
@@ -95,7 +95,7 @@ class Drawing(NamedTuple):
 
     def pieces(self) -> Iterator[DrawsPiece]:
         """Cut the draws into pieces, always the same ones; none where they are held to nothing."""
-        size = min(EXACT_PIECE, self.chunk) if self.is_exact else self.chunk
+        size = min(EXACT_PIECE_DRAWS, self.chunk) if self.is_exact else self.chunk
         for start in range(0, self.draws if self.judged else 0, size):
             yield DrawsPiece(start, min(start + size, self.draws))
 
@@ -118,7 +118,7 @@ def drawing_of(
 ) -> Drawing:
     """Prepare draws of all variables; a sample decides whether they need exact ranges."""
     setting = (analysis.mission.name, tuple(variables), tuple(judged), analysis.exact, analysis.geometry.both)
-    drawing = Drawing(*setting, draws, seed, False, CHUNK)
+    drawing = Drawing(*setting, draws, seed, False, CHUNK_DRAWS)
     is_exact = bool(variables and judged) and _needs_exact_ranges(drawing)
 
     def counts(variable: Variable) -> bool:
@@ -294,8 +294,8 @@ class Drawer:
         self._chunk, self._at = -1, 0
         self._streams: list[_Stream] = []
         normal = sum(variable.distribution == "normal" for variable in drawing.variables)
-        self._fill_normal = _compiled() if drawing.draws * normal >= _WORTH_COMPILING else _fill_normal
-        self._buffer = np.empty(BLOCK)
+        self._fill_normal = _compiled() if drawing.draws * normal >= _MIN_COMPILED_DRAWS else _fill_normal
+        self._buffer = np.empty(BLOCK_DRAWS)
 
     def tally(self, piece: DrawsPiece) -> Tally:
         """Draw a piece and count."""
@@ -304,8 +304,8 @@ class Drawer:
         count = len(drawing.judged)
         holds, imaged, squares, all_hold = [0] * count, [0] * count, [0.0] * count, 0
         sums: Sums | None = None
-        for start in range(piece.start, piece.stop, BLOCK):
-            size = min(BLOCK, piece.stop - start)
+        for start in range(piece.start, piece.stop, BLOCK_DRAWS):
+            size = min(BLOCK_DRAWS, piece.stop - start)
             if sums is None or sums.size != size:
                 sums = None  # the room of the others
                 sums = Sums(drawing, size, adds=not drawing.is_exact, keeps_motion=drawing.is_exact)

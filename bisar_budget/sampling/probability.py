@@ -30,8 +30,8 @@ from bisar_budget.sampling.draws import HeldSum, Share, Variable, drawing_of, ei
 
 CONFIDENCE = 0.95
 DOMINANT = 0.5  # of the variance: beyond, a sum has the shape of that one error, whatever the others are
-_QUANTILE = 1.959963984540054  # of the standard normal at 97.5 %
-_SURE_QUANTILE = 3.2905267314919255  # at 99.95 %: a warning is not to be chance
+_QUANTILE_SIGMA = 1.959963984540054  # of the standard normal at 97.5 %
+_SURE_QUANTILE_SIGMA = 3.2905267314919255  # at 99.95 %: a warning is not to be chance
 _MATERIAL = 0.1  # of the probability to fail: a difference that is sure but smaller changes nobody's mind
 
 _DIGITS = 9  # of sampled sigmas: further ones differ between processors, and mean nothing
@@ -78,7 +78,7 @@ def monte_carlo(
     requirements = tuple(
         _requirement(*counted, draws, predictions) for counted in zip(judged, holds, mean_squares, strict=True)
     )
-    low, high = _wilson(all_hold, draws, _QUANTILE) if judged else (None, None)
+    low, high = _wilson(all_hold, draws, _QUANTILE_SIGMA) if judged else (None, None)
     return MonteCarlo(
         draws=draws,
         seed=seed,
@@ -253,7 +253,7 @@ def _requirement(
     variances = predictions.variances(judged)
     variance = math.fsum(variances.values())
     dominant = max(variances, key=lambda name: variances[name])
-    low, high = _wilson(holds, draws, _QUANTILE)
+    low, high = _wilson(holds, draws, _QUANTILE_SIGMA)
     requirement = Requirement(
         id=judged.id,
         unit=judged.unit,
@@ -282,7 +282,7 @@ def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Pred
             "variance: the sum has its shape, and no multiple of sigma is the bound it would be of a normal "
             "distribution"
         )
-    low, high = _wilson(holds, draws, _SURE_QUANTILE)
+    low, high = _wilson(holds, draws, _SURE_QUANTILE_SIGMA)
     normal, drawn = requirement.probability_normal, requirement.probability
     fails = max(1 - normal, 1 - drawn)
     if not low <= normal <= high and abs(normal - drawn) > _MATERIAL * fails:

@@ -27,8 +27,8 @@ def files(tmp_path):
 
 @pytest.mark.parametrize("cores", [2, 3, 16])
 def test_every_format_says_the_same_for_any_number_of_processes(files, monkeypatch, cores: int) -> None:
-    monkeypatch.setattr(check, "MANY", 2)
-    monkeypatch.setattr(check, "AT_ONCE", 2)
+    monkeypatch.setattr(check, "FILES_FOR_TWO_PROCESSES", 2)
+    monkeypatch.setattr(check, "FILES_AT_ONCE", 2)
     monkeypatch.setattr(check, "cores", lambda: 1)
     one = check.check_files(files, DAY, None, check.without_analysis)
     monkeypatch.setattr(check, "cores", lambda: cores)
@@ -41,14 +41,14 @@ def test_every_format_says_the_same_for_any_number_of_processes(files, monkeypat
 
 
 def test_standard_input_is_read_once_by_one_process(monkeypatch) -> None:
-    monkeypatch.setattr(check, "MANY", 1)
+    monkeypatch.setattr(check, "FILES_FOR_TWO_PROCESSES", 1)
     monkeypatch.setattr(check, "_kept", lambda files, **_: list(files))
     assert check.check_files(["a", "-", "b"], DAY, None, check.without_analysis) == ["a", "-", "b"]
 
 
 def test_the_command_checks_a_fleet(run, files, monkeypatch) -> None:
     serial = run("check", "-q", *files)
-    monkeypatch.setattr(check, "MANY", 2)
+    monkeypatch.setattr(check, "FILES_FOR_TWO_PROCESSES", 2)
     monkeypatch.setattr(check, "cores", lambda: 2)
     parallel = run("check", "-q", *files)
     assert parallel.exit_code == serial.exit_code == 2

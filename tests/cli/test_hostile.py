@@ -455,7 +455,7 @@ class TestTargets:
         settings.write_text("[tool.bisar-budget]\n")
         assert run("check", mission.name, "-o", settings.name, cwd=mission.parent).returncode == 2
         assert settings.read_text() == "[tool.bisar-budget]\n"
-        monkeypatch.setattr(checking, "MANY", 2)
+        monkeypatch.setattr(checking, "FILES_FOR_TWO_PROCESSES", 2)
         monkeypatch.setattr(checking, "cores", lambda: 2)
         part = mission.with_name("part.yaml")
         part.write_text("kind: oscillator\n")  # is read, and is no part

@@ -32,8 +32,8 @@ LARGE = str(ROOT / "specs" / "missions" / "uav_pair_l_band.yaml")  # its draws g
 @pytest.fixture
 def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Chunks of some hundredths of a second."""
-    monkeypatch.setattr(drawing, "CHUNK", 1 << 15)
-    monkeypatch.setattr(drawing, "EXACT_PIECE", 1 << 12)
+    monkeypatch.setattr(drawing, "CHUNK_DRAWS", 1 << 15)
+    monkeypatch.setattr(drawing, "EXACT_PIECE_DRAWS", 1 << 12)
 
 
 def drawing_of(file: str, draws: int) -> Drawing:

@@ -51,7 +51,7 @@ IMPATIENT = f"""
 from bisar_budget.cli import main
 from bisar_budget.cluster import scheduler
 from bisar_budget.design import sweep
-sweep._FEW, scheduler._LOOK, scheduler._FETCH = {CASES}, 0.5, 2.0
+sweep._FEW, scheduler._LOOK_PERIOD_S, scheduler._FETCH_TIMEOUT_S = {CASES}, 0.5, 2.0
 main()
 """
 
@@ -188,7 +188,7 @@ def test_an_address_where_nobody_answers(run, tmp_path: Path) -> None:
 @pytest.mark.parametrize("answer", [b"HTTP/1.1 400 Bad Request\r\nContent-Type: text/html\r\n\r\n", b""])
 def test_something_else_answers(monkeypatch: pytest.MonkeyPatch, answer: bytes) -> None:
     """Dask takes the first bytes of a web server for the length of a message, and has no memory for it."""
-    monkeypatch.setattr(scheduler, "_CONNECTION", 0.5)
+    monkeypatch.setattr(scheduler, "_CONNECTION_TIMEOUT_S", 0.5)
 
     def reply(listening: socket.socket) -> None:
         while True:
@@ -300,7 +300,7 @@ def test_what_ended_every_worker_that_had_it_is_said() -> None:
 
 def test_a_cluster_may_shrink(monkeypatch: pytest.MonkeyPatch) -> None:
     """More is given out then than would be given to those who are left."""
-    monkeypatch.setattr(scheduler, "_LOOK", 0.0)
+    monkeypatch.setattr(scheduler, "_LOOK_PERIOD_S", 0.0)
     sizes = iter([100])
 
     class Done(Future):

@@ -255,7 +255,7 @@ def test_the_solution_is_imaged(run: Callable) -> None:
 
 
 def test_a_factor_and_a_part_are_imaged(run: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(spread_cases, "_MOST", 512)  # draws; what is asked is that there is an image
+    monkeypatch.setattr(spread_cases, "_MAX_ISLR_DRAWS", 512)  # draws; what is asked is that there is an image
     done = run(
         "solve",
         SECTION_V,

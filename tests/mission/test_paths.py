@@ -129,7 +129,7 @@ class TestLevelFlight:
         assert path.rms <= path.farthest
         assert max(off) == pytest.approx(path.farthest, rel=0.5, abs=2e-9)  # looked at in other places
         assert path.doubts == ()
-        monkeypatch.setattr(flight, "_ROUGH_M", 0.0)
+        monkeypatch.setattr(flight, "_MAX_INTERPOLATION_ERROR_M", 0.0)
         monkeypatch.setattr(paths, "_paths", {})
         (doubt,) = mission(**fast).platforms.receiver.path.doubts
         assert doubt == f"the polynomial that is flown is up to {path.farthest:.3g} m from the path"

@@ -392,7 +392,7 @@ class TestReproducible:
     @pytest.mark.parametrize("block", [1000, 12_345, 1 << 20])
     def test_blocks_do_not_matter(self, monkeypatch, block: int) -> None:
         want = drawn(40_000, **self.changes)
-        monkeypatch.setattr(drawing, "BLOCK", block)
+        monkeypatch.setattr(drawing, "BLOCK_DRAWS", block)
         got = drawn(40_000, **self.changes)
         for a, b in zip(want.requirements, got.requirements, strict=True):
             assert b.probability == a.probability
@@ -401,7 +401,7 @@ class TestReproducible:
 
     def test_draws_of_a_chunk_are_those_of_its_stream(self, monkeypatch) -> None:
         """The first is seeded by seed and name, the others are children of it; of two and a half, drawn by hand."""
-        monkeypatch.setattr(drawing, "CHUNK", 4000)
+        monkeypatch.setattr(drawing, "CHUNK_DRAWS", 4000)
         found = drawn(10_000, 7, **{ERROR: {"acceleration": [3e-4, 0, 0]}})
         name = b"transmitter.acceleration.x"
         seeds = (np.random.SeedSequence([7, *name], spawn_key=key) for key in ((), (257,), (258,)))
@@ -413,7 +413,7 @@ class TestReproducible:
 
     def test_the_sum_of_many_chunks_has_the_probability_of_one(self, monkeypatch) -> None:
         """Alike streams of two chunks would make the interval too narrow: 400 of them would hold alike."""
-        monkeypatch.setattr(drawing, "CHUNK", N // 400)
+        monkeypatch.setattr(drawing, "CHUNK_DRAWS", N // 400)
         found = drawn(timing_error={"quadratic": math.pi / 8 / small("timing.quadratic")[0]})
         holds_like(requirement(found, "receiver.quadratic_phase_error"), phi(1))
 
@@ -425,12 +425,12 @@ class TestReproducible:
     @pytest.mark.parametrize("piece", [100, 250])
     def test_pieces_of_a_chunk_do_not_matter(self, monkeypatch, piece: int) -> None:
         """Each made by itself: normal, uniform and two-sided streams go past the draws before it."""
-        monkeypatch.setattr(drawing, "CHUNK", 500)
+        monkeypatch.setattr(drawing, "CHUNK_DRAWS", 500)
         other = [{"name": "a", "quadratic_phase_error": 0.3}]
         analysis = Analysis(parse_mission(mission_text(**TestLargeErrors.changes, other_errors=other)))
         want = monte_carlo(analysis, 1200, 5)
         assert want.is_exact
-        monkeypatch.setattr(drawing, "EXACT_PIECE", piece)
+        monkeypatch.setattr(drawing, "EXACT_PIECE_DRAWS", piece)
 
         def apart(one: drawing.Drawing):
             pieces = list(one.pieces())
@@ -451,7 +451,7 @@ class TestReproducible:
         """To the last bit; tails, which one draw in 3700 is in, included."""
         pytest.importorskip("numba", reason="the extra `fast` is not installed")
         want = drawn(100_000, 7, **self.changes)
-        monkeypatch.setattr(drawing, "_WORTH_COMPILING", 1)
+        monkeypatch.setattr(drawing, "_MIN_COMPILED_DRAWS", 1)
         assert drawn(100_000, 7, **self.changes) == want
         plain, compiled = np.empty(1_000_000), np.empty(1_000_000)
         for fill, out in ((drawing._fill_normal, plain), (drawing._compiled(), compiled)):

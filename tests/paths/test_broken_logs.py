@@ -8,7 +8,7 @@ from time import process_time
 import pytest
 
 from bisar_budget.paths.flight import PathFileError
-from bisar_budget.paths.log_places import NOTHING_SAID
+from bisar_budget.paths.log_places import NO_KEYS
 from bisar_budget.paths.path_formats import log_format, read_log
 from tests.hostile_commands import log_read
 from tests.paths.log_files import message
@@ -60,5 +60,5 @@ def test_what_is_long_is_soon_refused(data: bytes, kind: str) -> None:
     begin = process_time()
     log_format(data)
     with pytest.raises(PathFileError):
-        read_log(data, "a", kind, NOTHING_SAID)
+        read_log(data, "a", kind, NO_KEYS)
     assert process_time() - begin < 3

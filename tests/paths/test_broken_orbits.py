@@ -305,14 +305,14 @@ def test_samples_of_another_century_give_no_traceback(kind: str) -> None:
 
 
 def test_what_is_too_large_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(messages, "LARGEST_BYTES", 1_000_000)
+    monkeypatch.setattr(messages, "MAX_MARKUP_BYTES", 1_000_000)
     text = "#" * 1_000_001
     for reader in (read_tle, read_omm):
         with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the objects needed$"):
             reader(text.encode(), "x", None, CENTER)
     with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the time needed$"):
         read_oem(text.encode(), "x", None, INSIDE)
-    monkeypatch.setattr(messages, "_MOST", 1000)
+    monkeypatch.setattr(messages, "_MAX_ELEMENTS_COUNT", 1000)
     for data in (b"<omm>" * 100, b"<omm>" + b"<a/>" * 2000 + b"</omm>"):
         with pytest.raises(PathFileError, match=r"^x:1: has more than 1000 elements, or 32 in each other$"):
             read_omm(data, "x", None, CENTER)

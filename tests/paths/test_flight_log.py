@@ -119,7 +119,7 @@ def test_stamps_are_instants(ticks: list[int], spare: int, begins: str) -> None:
 def test_chunks_of_lines_are_one_log(monkeypatch: pytest.MonkeyPatch) -> None:
     data = geodetic_csv(flight())
     whole = read_csv(data, "a.csv")
-    monkeypatch.setattr(flight_log, "_CHUNK", 7)
+    monkeypatch.setattr(flight_log, "_CHUNK_LINES", 7)
     parts = read_csv(data, "a.csv")
     assert (parts.times == whole.times).all()
     assert (parts.places == whole.places).all()
@@ -258,7 +258,7 @@ def test_other_encodings_are_refused(data: bytes, says: str) -> None:
 
 
 def test_a_file_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(flight_log, "LARGEST", 50)
+    monkeypatch.setattr(flight_log, "MAX_CSV_BYTES", 50)
     with pytest.raises(PathFileError, match=r"^flight.csv: has 0 MB, at most 0 MB are read$"):
         read(GOOD)
 

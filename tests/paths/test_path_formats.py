@@ -34,7 +34,7 @@ FILES = every_format(SHORT) | {
 def test_a_log_is_known_by_its_content(name: str, kind: str) -> None:
     data = FILES[name][1]
     assert log_format(data) == kind
-    others = [one for one, format in LOG_FORMATS.items() if one != kind and format.is_one(data)]
+    others = [one for one, format in LOG_FORMATS.items() if one != kind and format.is_format(data)]
     assert others == []
 
 

@@ -13,7 +13,7 @@ import pytest
 
 from bisar_budget.geometry import BistaticGeometry, Pieces, PlatformState
 from bisar_budget.paths.flight import Fitted, slow_times, smoothed, widest_stretch
-from bisar_budget.paths.splines import SHORTEST_S, SplineFit
+from bisar_budget.paths.splines import MIN_PIECE_S, SplineFit
 from tests.paths.test_smoothed import log as log_of
 
 RADIUS, RATE, HEIGHT = 1000.0, 0.025, 500.0  # m, rad/s, m
@@ -113,7 +113,7 @@ def test_legs_get_longer_pieces_than_turns() -> None:
     assert isinstance(found.state.curve, Pieces)
     lengths = np.diff(np.array(found.state.curve.starts))
     assert lengths.max() >= 8 * lengths.min()
-    assert lengths.min() >= SHORTEST_S
+    assert lengths.min() >= MIN_PIECE_S
 
 
 def test_pieces_meet_with_one_place_and_one_velocity() -> None:

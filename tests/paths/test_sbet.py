@@ -14,9 +14,9 @@ from bisar_budget.paths import sbet as reader
 from bisar_budget.paths.flight import PathFileError, slow_times
 from bisar_budget.paths.flight_log import read_csv
 from bisar_budget.paths.instant import Instant, parse_instant
-from bisar_budget.paths.log_places import NOTHING_SAID, LogKeys, utc_of
+from bisar_budget.paths.log_places import NO_KEYS, LogKeys, utc_of
 from bisar_budget.paths.path_formats import LOG_FORMATS
-from bisar_budget.paths.sbet import WEEK, of_gps, read_accuracy, read_sbet
+from bisar_budget.paths.sbet import WEEK_S, of_gps, read_accuracy, read_sbet
 from tests.paths.flown import SECOND, START, Flight, flight, geodetic_csv, sbet, smrmsg, stamp
 from tests.paths.flown import WEEK as GPS_WEEK
 
@@ -45,7 +45,7 @@ def test_a_level_flight_is_where_it_was(wander: float) -> None:
 
 
 def test_without_a_week_times_are_seconds_of_it() -> None:
-    log = read_sbet(sbet(FLOWN), "a.out", NOTHING_SAID)
+    log = read_sbet(sbet(FLOWN), "a.out", NO_KEYS)
     assert log.start is None
     assert log.times == pytest.approx(SECOND + FLOWN.times, abs=1e-10)
     assert log.words == "SBET, 501 places over 10 s"
@@ -75,7 +75,7 @@ def test_a_real_flight_has_the_wander_frame() -> None:
     """
     records = [[float(word) for word in text.split()] for text in REAL.strip().split("\n\n")]
     data = b"".join(struct.pack("<17d", *record) for record in records)
-    log = read_sbet(data, "2-points.sbet", NOTHING_SAID)
+    log = read_sbet(data, "2-points.sbet", NO_KEYS)
     step = (log.places[1] - log.places[0]) / (log.times[1] - log.times[0])
     latitude, longitude = records[0][1:3]
     east = np.array([-math.sin(longitude), math.cos(longitude), 0])
@@ -108,7 +108,7 @@ def test_a_real_flight_has_the_wander_frame() -> None:
         (1930, 18.0, "2017-01-01T00:00:00Z"),
         (1930, 17.5, "2017-01-01T00:00:00.5Z"),
         (2421, 105619.25, "2026-06-01T05:20:01.25Z"),
-        (2421, WEEK + 18, "2026-06-07T00:00:00Z"),
+        (2421, WEEK_S + 18, "2026-06-07T00:00:00Z"),
     ],
 )
 def test_gps_time_is_ahead_of_utc(week: int, second: float, utc: str) -> None:
@@ -124,12 +124,12 @@ def test_leap_seconds_that_nobody_knows_are_said() -> None:
 
 @pytest.mark.parametrize("is_counted_on", [False, True])
 def test_a_week_ends_in_flight(is_counted_on: bool) -> None:
-    times = WEEK - 5 + FLOWN.times
-    data = sbet(FLOWN, time=times if is_counted_on else times % WEEK)
+    times = WEEK_S - 5 + FLOWN.times
+    data = sbet(FLOWN, time=times if is_counted_on else times % WEEK_S)
     log = read_sbet(data, "a.out", LogKeys(GPS_WEEK))
     assert log.times == pytest.approx(FLOWN.times, abs=1e-9)
-    assert log.start == utc_of(of_gps(GPS_WEEK, WEEK - 5), "gps")
-    assert read_sbet(data, "a.out", NOTHING_SAID).times == pytest.approx(times, abs=1e-9)
+    assert log.start == utc_of(of_gps(GPS_WEEK, WEEK_S - 5), "gps")
+    assert read_sbet(data, "a.out", NO_KEYS).times == pytest.approx(times, abs=1e-9)
 
 
 def changed(record: int, field: str, value: float) -> dict[str, Any]:
@@ -210,25 +210,25 @@ NOT_SO = "which it cannot be; are these records of 17 doubles?"
 )
 def test_faults_have_records(data: bytes, says: str) -> None:
     with pytest.raises(PathFileError) as error:
-        read_sbet(data, "flight.out", NOTHING_SAID)
+        read_sbet(data, "flight.out", NO_KEYS)
     assert str(error.value) == f"flight.out: {says}"
 
 
 def test_a_small_wander_angle_is_honoured() -> None:
     """At 59 m/s, 2 degrees the wrong way are 4 m/s."""
     angle = math.radians(2)
-    read_sbet(sbet(FLOWN, angle), "flight.out", NOTHING_SAID)
+    read_sbet(sbet(FLOWN, angle), "flight.out", NO_KEYS)
     with pytest.raises(PathFileError, match="wander frame"):
         read_sbet(
             sbet(FLOWN, angle).replace(struct.pack("<d", angle), struct.pack("<d", -angle)),
             "flight.out",
-            NOTHING_SAID,
+            NO_KEYS,
         )
 
 
 def test_velocities_that_are_not_there_are_not_compared() -> None:
-    assert len(read_sbet(sbet(FLOWN, x=0, y=0, z=0), "a.out", NOTHING_SAID).times) == 501
-    assert len(read_sbet(sbet(flight(1)), "a.out", NOTHING_SAID).times) == 1
+    assert len(read_sbet(sbet(FLOWN, x=0, y=0, z=0), "a.out", NO_KEYS).times) == 501
+    assert len(read_sbet(sbet(flight(1)), "a.out", NO_KEYS).times) == 1
 
 
 def test_noise_of_places_is_no_disagreement() -> None:
@@ -239,7 +239,7 @@ def test_noise_of_places_is_no_disagreement() -> None:
         longitude=FLOWN.longitude + noise[1] / 4.3e6,
         height=FLOWN.height + noise[2],
     )
-    read_sbet(sbet(noisy), "a.out", NOTHING_SAID)
+    read_sbet(sbet(noisy), "a.out", NO_KEYS)
 
 
 def test_longitude_jumps_by_a_turn() -> None:
@@ -247,15 +247,15 @@ def test_longitude_jumps_by_a_turn() -> None:
     wrapped = west._replace(
         longitude=np.where(west.longitude > math.pi, west.longitude - 2 * math.pi, west.longitude)
     )
-    a, b = (read_sbet(sbet(one), "a.out", NOTHING_SAID).places for one in (west, wrapped))
+    a, b = (read_sbet(sbet(one), "a.out", NO_KEYS).places for one in (west, wrapped))
     assert np.abs(a - b).max() < 5e-9
 
 
 def test_a_file_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reader, "LARGEST", 100)
+    monkeypatch.setattr(reader, "MAX_SBET_BYTES", 100)
     says = r"^a.out: has 0 MB, at most 0 MB are read$"
     with pytest.raises(PathFileError, match=says):
-        read_sbet(sbet(SHORT), "a.out", NOTHING_SAID)
+        read_sbet(sbet(SHORT), "a.out", NO_KEYS)
     with pytest.raises(PathFileError, match=says):
         read_accuracy(smrmsg(SHORT.times), "a.out", None, None, None, 1.0)
 
