@@ -244,7 +244,7 @@ def test_a_dataset_of_dask_is_checked_when_it_computes(
 ) -> None:
     """To the last bit what is checked at once, in the sweep's own parts."""
     pytest.importorskip("dask")
-    monkeypatch.setattr(engine, "_TOGETHER", 16)
+    monkeypatch.setattr(engine, "_PART_CASES", 16)
     values = {TIME: bb.linspace("1 s", "5 s", 11), "radar.center_frequency": ["9 GHz", "10 GHz", "11 GHz"]}
     swept = bb.sweep(mission, values, columns=["receiver.velocity.y.allowable"])
     checked: list[int] = []
