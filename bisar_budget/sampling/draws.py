@@ -180,6 +180,7 @@ def shared_out(drawing: Drawing, mapped: "MapBlocks") -> Iterator[tuple[DrawsPie
     mission_words = f"of {printable(drawing.name)}"
 
     def about(piece: DrawsPiece) -> str:
+        """A piece in messages."""
         return f"draws {piece.start} to {piece.stop - 1} {mission_words}"
 
     return mapped(tally_of, drawing, drawing.pieces(), about)
