@@ -89,7 +89,7 @@ def _files(platform: Platform) -> tuple[str, ...]:
 
 
 def _chosen(platform: Platform) -> list[str]:
-    """What a path chooses of its file; empty where it does not choose."""
+    """Choices of a path within its file; empty texts for choices that it does not make."""
     choices = [getattr(getattr(platform, platform.way), choice, None) for choice in _CHOICES]
     return ["" if choice is None else str(choice) for choice in choices]
 
