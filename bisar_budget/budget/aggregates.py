@@ -63,17 +63,15 @@ class Aggregates:
     def _quadratic(self, mine: Together, theirs: Together, owner: str) -> "Aggregate":
         split, limit, gain = self.allocation.qpe, self.allocation.qpe_limit(owner), self.allocation.autofocus_gain
         members, their_members = mine.owed(split, owner), theirs.owed(split, owner)
-        size, size_by_theirs, equal_loss = (
-            mine.judged(members),
-            theirs.judged(their_members),
-            mine.judged(members, gain=1.0),
-        )
+        parts, size_by_theirs = mine.judged_parts(members), theirs.judged(their_members)
+        size = mine.combined(parts)
+        equal_loss = mine.judged(members, gain=1.0) if np.any(gain != 1) else size
         published, full = (members, their_members) if mine.model == "published" else (their_members, members)
         of_full = self.together("full").combined(quadratics(full))
         aggregate = self._row(
             subject(owner, QUADRATIC),
             self._is_declared(members),
-            mine.judged_parts(members),
+            parts,
             size,
             limit * gain,
             theirs,
@@ -83,7 +81,8 @@ class Aggregates:
             qpe_published_rad=self.together("published").combined(quadratics(published)),
             qpe_full_rad=np.where(np.isfinite(of_full), of_full, math.nan),
         )
-        return aggregate.of_equal_loss(equal_loss, self.together("full").judged(full, gain=1.0))
+        is_full = mine.model == "full"
+        return aggregate.of_equal_loss(equal_loss, equal_loss if is_full else theirs.judged(full, gain=1.0))
 
     def _largest_quadratic(self, mine: Together, theirs: Together) -> "Aggregate":
         """A warning where each error stands alone and all together exceed the total; else there is no row."""
@@ -91,9 +90,8 @@ class Aggregates:
         size, of_all = mine.judged(mine.phases), mine.judged(mine.phases, "rss")
         limit = self.allocation.qpe_total * self.allocation.autofocus_gain
         aggregate = self._row(row_subject, True, phases, size, limit, theirs, of_all=of_all)
-        is_there = aggregate.is_over_of_all & (
-            aggregate.judged.status == CODE["warn"]
-        )  # else its own row says what fails
+        is_warning = aggregate.judged.status == CODE["warn"]  # else the row of the error says why it fails
+        is_there = aggregate.is_over_of_all & is_warning
         nothing = self.judging.row(row_subject, None, None)
         return replace(aggregate, judged=aggregate.judged.where(~is_there, nothing), is_there=is_there)
 
