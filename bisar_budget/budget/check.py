@@ -214,7 +214,7 @@ def check_files(
     model : str or None
         Gating model in place of each file's own.
     keep : callable
-        Reduces the findings of a file to the result, in the process that made the findings.
+        Function that reduces the findings of a file to the result, in the process that made the findings.
     drawn : Draws, optional
         Arguments of a Monte Carlo; None: no draws.
     changes : sequence of SetValue

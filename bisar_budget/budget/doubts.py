@@ -34,7 +34,7 @@ LEAST_M = 1e-3  # smallest doubt of a path that counts against a declared error,
 NEGLIGIBLE_USE_FRACTION = 0.1  # of a requirement, by the doubt of a path or by a velocity that its source states
 NEGLIGIBLE_RAD = 0.08  # of quadratic phase, in any image
 _TYPICAL_SHARE = 1 / 3  # of a usual error; a fix may be better by this factor than fixes of its quality usually are
-MOST_RESIDUAL_RAD = 0.2  # largest rms phase of the residual along the line of sight that needs no statement in the file
+MOST_RESIDUAL_RAD = 0.2  # largest rms phase of the residual along the line of sight that needs no statement
 MOST_GRID_SHARE = 0.1  # largest step of a log, relative to the declared position error, that needs no statement
 RESIDUAL = "residual"  # kind of doubt: the residual of a smooth path
 _EQUAL_VARIANCE_FRACTION = 1e-6  # relative, of variances: an equal variance is enough, and turned axes round
@@ -329,7 +329,7 @@ def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Any:
 
 
 def _sight(mission: Mission, name: str, time: Any) -> Any:
-    """Range that a metre of a platform's motion adds along each axis at a slow time, less the direct path's change."""
+    """Range that a metre of a platform's motion along each axis adds at a slow time, less that of a direct path."""
     platforms = mission.platforms
     sight = unit(getattr(platforms, name).state.place(time))
     if not mission.has_direct_path:
@@ -403,7 +403,7 @@ def missing_settings(mission: Mission) -> list[str]:
 
 
 def collection_notes(case: Case) -> Iterator[Note]:
-    """Notes on a collection that the published model does not describe, or whose image differs from the full model."""
+    """Notes on collections beyond the published model, and on images that show less than the full model."""
     mission = case.mission
     for name, state in zip(PLATFORMS, case.geometry.both, strict=True):
         if not state.is_straight:
