@@ -262,7 +262,7 @@ _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
 _OF_HALVES = ("propagation", "synchronization")  # kinds that the file may state in part
 
 
-# ---------------------------------------------------------------------- what a mission declares
+# ---------------------------------------------------------------------- declarations of a mission
 def declared_kinds(mission: Mission) -> DeclaredKinds:
     """List the kinds of error, by owner, that a mission declares, that it should declare, and that lack a source.
 
@@ -315,7 +315,7 @@ def still_platforms(mission: Mission) -> list[str]:
     return [name for name in PLATFORMS if getattr(mission.platforms, name).state.is_still]
 
 
-# ---------------------------------------------------------------------- what it must declare
+# ---------------------------------------------------------------------- required declarations
 def missing_declarations(mission: Mission, still: Container[str] | None = None) -> list[Missing]:
     """List all errors that `requirements.declare` requires and the file does not declare, each once.
 

@@ -145,7 +145,7 @@ def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, kind: str = 
     return row_subject.owner == owner and row_subject.kind == kind and row_subject.frame == frame
 
 
-# ---------------------------------------------------------------------- what the source of a path states
+# ---------------------------------------------------------------------- errors that the source of a path states
 def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) -> Any:
     """Whether the source of a path states a larger error than the file declares, in each case.
 
@@ -239,7 +239,7 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
     return InputDoubt(name, sizes[0][worst_axis], sizes[1][worst_axis], note, kind, is_stated=True)
 
 
-# ---------------------------------------------------------------------- what a smooth path leaves of a log
+# ---------------------------------------------------------------------- the residual of a log
 def leaves_unsaid(mission: Mission, name: str) -> Any:
     """Whether a log has too large a residual, and the file does not state whether the processor uses its fixes."""
     log = _unsaid_log(mission, name)

@@ -58,7 +58,7 @@ class JudgedMission:
     """A mission as judged in many cases.
 
     `rows` are the rows after waivers, in the order of the contract. `before` are the same rows before waivers; their
-    `why` gives the reason if the row's numbers do not decide. `families` has the rows of the families, by gating model.
+    `why` gives the reason if the row's numbers do not decide. `families` has each family's rows by gating model.
     """
 
     analysis: Analysis
