@@ -122,7 +122,7 @@ class CurvedPath(Protocol):
         """Position and velocity at slow times from the midpoint. [m], [m/s]"""
 
     def of(self, cases: Any) -> "CurvedPath":
-        """The paths of some cases, by their places."""
+        """The paths of some cases, by their indices."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ class Pieces:
         return (float(x), float(y), float(z)), (float(u), float(v), float(w))
 
     def of(self, cases: Any) -> "Pieces":
-        """The paths of some cases, by their places; what all cases share stays as it is."""
+        """The paths of some cases, by their indices; numbers that all cases share are unchanged."""
         starts, middles = (
             tuple(_number_of_cases(number, cases) for number in numbers) for numbers in (self.starts, self.middles)
         )
@@ -276,7 +276,7 @@ class PlatformState:
         return _minus(self.place(tau + delay_s), self.place(tau))
 
     def of(self, cases: Any) -> "PlatformState":
-        """The paths of some cases, by their places; what all cases share stays as it is."""
+        """The paths of some cases, by their indices; numbers that all cases share are unchanged."""
         return PlatformState(
             position=_vector_of_cases(self.position, cases),
             velocity=_vector_of_cases(self.velocity, cases),

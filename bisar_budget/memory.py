@@ -13,7 +13,7 @@ from collections.abc import Iterator
 LEAST = 192 << 20  # NumPy with one thread of OpenBLAS takes 134 MB, a check a little more
 OF_TABLES = 400 << 20
 OF_CLUSTER = 3 << 29
-_SPACIOUS = 2 << 30  # bytes; LLVM hangs in 400 MB, and each core adds threads to what Numba takes
+_SPACIOUS = 2 << 30  # bytes; LLVM hangs in 400 MB, and Numba takes more memory with each core
 _NEAR = 32 << 20  # bytes; size of a single request of a library
 _WORDS = ("failed to map segment", "annot allocate memory", "bad_alloc", "out of memory")
 

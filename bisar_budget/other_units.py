@@ -272,7 +272,7 @@ def _respelt(unit: str, dimension: Dimension) -> str:
         folded = [one for one in folded if one in dimension.units]
         is_unsure = len(folded) > 1 or folded[0][0] != unit[0]  # Mhz is not millihertz, and Nm is ambiguous
         folded = [] if is_unsure else folded
-    is_level = _powers_of(dimension) is None  # one letter of dBc makes it a power
+    is_level = _powers_of(dimension) is None  # without a letter of dBc, the unit is a power ratio
     slips = [one for one in candidates if _is_one_slip(unit, one)]
     if not _is_one_size([candidates[one] for one in (*folded, *slips)]):
         return ""

@@ -64,7 +64,7 @@ def project_settings(folder: str, files: Files = DISK) -> Settings | None:
 
 @lru_cache(maxsize=4)
 def _parsed(file: str, data: bytes) -> Settings | None:
-    """The table of a `pyproject.toml`, None without the table; cached, as every mission that names a part needs it."""
+    """The table of a `pyproject.toml`, None without it; cached, since every mission that names a part reads it."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

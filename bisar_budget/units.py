@@ -301,7 +301,7 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
             value /= scale
             break
     text = "%.*g" % (digits, value)  # noqa: UP031 -- a table has thirty of these, and format() takes twice as long
-    if unit == "dB" and rounding == "down" and value < 0:  # a lower level is the stricter one
+    if unit == "dB" and rounding == "down" and value < 0:  # a lower level is stricter
         return _stricter(value, digits) + suffix
     if "e" in text or (rounding == "down" and abs(float(text)) > abs(value)):
         text = _rounded(value, digits, rounding)
@@ -437,7 +437,7 @@ def _invalid(problem: str, dimension: Dimension, hint: str = "") -> InvalidValue
 
 
 def _wrong_unit(digits: str, written: str, dimension: Dimension) -> InvalidValueError:
-    """Say that a unit is unknown or belongs to a different dimension, and which unit was probably meant."""
+    """Error for a unit that is unknown or belongs to a different dimension, with the unit that was probably meant."""
     unit = normal_unit(written)
     if unit.startswith(","):
         return _invalid("has a decimal comma", dimension, "Write a point")

@@ -248,7 +248,7 @@ class Aggregate(FamilyRow):
         return replace(self, judged=judged)
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         mission, row_subject = case.mission, self.judged.subject
         groups, combine, owner = case.analysis.groups, mission.allocation.combine, row_subject.owner
         numbers = map(case.number, (self.judged.declared, self.judged.allowable))
@@ -286,7 +286,7 @@ class Aggregate(FamilyRow):
         )
 
     def _passes_with(self, case: Case, model: str) -> Note:
-        """Say from which N_pull on the sum would pass, or that no autofocus corrects the sum."""
+        """Note on the N_pull from which on the sum would pass, or that no autofocus corrects the sum."""
         together, owner = case.analysis.together(model), self.judged.subject.owner
         members = together.owed(case.allocation.qpe, owner)
         quadratic = case.number(together.combined(quadratics(members)))
@@ -469,7 +469,7 @@ class SceneRow(FamilyRow):
     scene: JudgedScene
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         edge, total = self.scene.edge(case), case.allocation.qpe_total
         doubt, degeneracy, notes = NOTHING, NOTHING, tuple[Note, ...]()
         if edge is not None:

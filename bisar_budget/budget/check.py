@@ -149,7 +149,7 @@ def _flown_paths(mission: Mission) -> tuple[tuple[str, FlownPath], ...]:
 
 
 def _overridden(mission: Mission) -> Iterator[Note]:
-    """Say which figures of parts the file replaces."""
+    """Name the figures of parts that the file replaces."""
     for name in PLATFORMS:
         platform = getattr(mission.platforms, name)
         for section in filter(None, (platform.motion_error, platform.oscillator)):
@@ -218,7 +218,7 @@ def check_files(
     drawn : Draws, optional
         Arguments of a Monte Carlo; None: no draws.
     changes : sequence of SetValue
-        Values that replace those of each file.
+        Values that replace values of each file.
     outside : Outside
         Options, settings and environment variables that bear on the verdicts.
 
@@ -270,7 +270,7 @@ def _kept(
     changes: Sequence[SetValue],
     outside: Outside,
 ) -> list[Kept]:
-    # The findings of a thousand missions are 10⁵ tuples without a reference cycle: the collector finds nothing.
+    # The findings of a thousand missions are 10⁵ tuples without a reference cycle: the collector has no work.
     gc.disable()
     kept: dict[int, Kept] = {}
     missions: dict[int, Mission] = {}

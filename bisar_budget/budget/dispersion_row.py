@@ -40,7 +40,7 @@ class DispersionRow(FamilyRow):
     """Dispersion in many cases. [rad]"""
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case; it is the same for both models."""
+        """Row of a case in words; it is the same for both models."""
         propagation = case.mission.propagation
         assert propagation is not None  # else there is no row
         contents: dict[str, Any] = {name: propagation.content(name) for name in PLATFORMS}

@@ -329,7 +329,7 @@ def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Any:
 
 
 def _sight(mission: Mission, name: str, time: Any) -> Any:
-    """Range that a metre of a platform's motion along each axis adds at a slow time, less that of a direct path."""
+    """Range that a metre of a platform's motion along each axis adds at a slow time, less the direct path's range."""
     platforms = mission.platforms
     sight = unit(getattr(platforms, name).state.place(time))
     if not mission.has_direct_path:

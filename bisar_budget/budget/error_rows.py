@@ -117,7 +117,7 @@ class ErrorRow(FamilyRow):
     limit: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         mission, row, source = case.mission, self.judged, self.source
         model, other_model = case.analysis.models(gating)
         gain, status = case.allocation.autofocus_gain, row.status[case.place]
@@ -160,7 +160,7 @@ class ErrorRow(FamilyRow):
 
 # ---------------------------------------------------------------------- in words
 def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Declared, limit: float) -> Note:
-    """Say which requirement the declared error breaks."""
+    """Reason with the requirement that the declared error breaks."""
     requirements, binding = case.mission.requirements, row.requirement(case)
     if binding == END_OF_IMAGE:
         return phrases.beyond_the_image(case.number(row.allowable), source.unit)
@@ -178,7 +178,7 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
 
 
 def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
-    """Say that the model that does not gate fails the declared error, and why the models differ; else empty."""
+    """Reason if the model that does not gate fails the declared error, with the cause of its difference; else empty."""
     needs, theirs = case.mission.requirements, case.does(other, source)
     uses = [(float(theirs.judged(case.allocation.autofocus_gain)), limit, QUADRATIC)]
     if source.is_motion and needs.cubic_phase_error is not None:
@@ -237,7 +237,7 @@ class SpecificationRow(FamilyRow):
     number: Number
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case; it is the same for both models."""
+        """Row of a case in words; it is the same for both models."""
         return worded(
             case,
             self.judged,

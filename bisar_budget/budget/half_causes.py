@@ -82,6 +82,6 @@ def _required(mission: Mission, keys: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def half_cause_of(mission: Mission, key: str) -> Note:
-    """Say which key to add to the file if a requirement depends on half a cause; otherwise empty."""
+    """Note with the key to add to the file if a requirement depends on half a cause; otherwise empty."""
     notes = [half.note for half in half_causes(mission) if key in half.requirements]
     return notes[0].then(*notes[1:]) if notes else NOTHING

@@ -339,7 +339,7 @@ class RowStatuses:
         self.why = np.where(are_settled, np.int8(why), self.why)
 
     def require_declarations(self, geometry: BistaticGeometry) -> None:
-        """Set missing required errors to not evaluated; the first row says whether no required error is missing."""
+        """Set missing required errors to not evaluated; the first row shows whether any is missing."""
         if not self.mission.requirements.declare:
             return
         still = np.array([np.broadcast_to(path.is_still, self.status.shape[1:]) for path in geometry.both])

@@ -239,7 +239,7 @@ class FamilyRow(ABC):
 
     @abstractmethod
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
 
 
 def worded(

@@ -39,6 +39,6 @@ class UnsaidResidual(FamilyRow):
     """The residual of a log in many cases; the reason is the note of the input doubt."""
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case; it is the same for both models."""
+        """Row of a case in words; it is the same for both models."""
         path = ("platforms", self.judged.subject.owner, "trajectory", "processed")
         return worded(case, self.judged, unit="m", path=path, equation="residual of the smoothed log")

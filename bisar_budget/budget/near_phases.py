@@ -104,7 +104,7 @@ class NearPhases(NamedTuple):
 
 
 def phase_over(case: Case, judged: Judged) -> Note:
-    """Say by how much a tone breaks the requirement on a phase; empty if another requirement limits the tone."""
+    """Reason with the excess of a tone over the requirement on a phase; empty if another requirement limits it."""
     mission, allocation, owner = case.mission, case.allocation, judged.subject.owner
     binding = phase_requirement(case, judged)
     if binding is None:

@@ -318,7 +318,7 @@ class RandomRow(FamilyRow):
     without_autofocus: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         mission, allocation, error = case.mission, case.allocation, case.random[self.place]
         combine, binding, over, doubt = mission.allocation.combine, self.judged.requirement(case), NOTHING, NOTHING
         if self.judged.status[case.place] == CODE["fail"]:
@@ -369,7 +369,7 @@ class IslrRow(FamilyRow):
     limit_of_other: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         level = _levels(case.mission, gating)
         other_model, over, doubt = OTHER_MODEL[gating], NOTHING, NOTHING
         variance, limit, limit_by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
@@ -405,7 +405,7 @@ class StatedRow(FamilyRow):
     """Row of an error from elsewhere that states its ISLR, in many cases. [dB]"""
 
     def in_words(self, case: Case, _: str) -> Row:
-        """The row of one case."""
+        """Row of a case in words."""
         mission, row = case.mission, self.judged
         index, is_limited = row.subject.entry or 0, not math.isnan(row.allowable[case.place])
         missing, over = phrases.no_requirement_of(ISLR), NOTHING
@@ -516,7 +516,7 @@ def _oscillator_wording(mission: Mission, error: RandomError) -> tuple[str, str 
 
 
 def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
-    """Say which part of an oscillator's noise remains after synchronisation; empty without synchronisation."""
+    """Note on the part of an oscillator's noise that remains after synchronisation; empty without synchronisation."""
     if sync is None:
         return
     if sync.interval is not None:
@@ -537,14 +537,14 @@ def _air_wording(mission: Mission, error: RandomError) -> tuple[str, str | None,
 
 
 def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> Note:
-    """Say why an error has no limit: it has no effect, or no requirement limits its effects."""
+    """Reason why an error has no limit: it has no effect, or no requirement limits its effects."""
     effects = (("cubic phase", effect.cubic), ("ISLR", effect.spread), ("displacement", effect.displacement))
     does = [name for name, size in effects if size > 0]
     return phrases.no_requirement_limits(does) if does else no_effect(mission, error)
 
 
 def no_effect(mission: Mission, error: RandomError) -> Note:
-    """Say why an error has no effect."""
+    """Reason why an error has no effect."""
     if error.subject.kind in ("imu", *CORRELATED, "lever_arm", "vibration"):
         return phrases.across_the_line_of_sight()
     if error.subject.kind == "propagation":
@@ -576,7 +576,7 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
 
 
 def _continuation(case: Case, error: RandomError, model: str) -> Note:
-    """Say how much a declared oscillator depends on noise below its mask, for the effect with the largest share."""
+    """Note on a declared oscillator's share of noise below its mask, for the effect with the largest share."""
     effect, size, worst = error.effect(model), error.declared, NOTHING
     limits = limits_for(case.mission, case.allocation, error.owner, model, case.allocation.autofocus_gain)
     most = 0.0
@@ -591,7 +591,7 @@ def _continuation(case: Case, error: RandomError, model: str) -> Note:
 
 
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:
-    """Say by which requirement the model that does not gate fails a declared error."""
+    """Note on the requirement by which the model that does not gate fails a declared error."""
     other_model, size = OTHER_MODEL[gating], error.declared
     effect = held_effect(mission, error.effect(other_model), error.coverage(mission), autofocus_gain_of(mission))
     if binding == ISLR:

@@ -61,7 +61,7 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
 
 
 def _declarations(case: Case, judged_row: Judged) -> Row:
-    """The row that says whether the file declares every required kind of error, with or without a row of its own."""
+    """The row that judges whether the file declares every required kind of error, also kinds without a row."""
     mission = case.mission
     missing, shifted = missing_declarations(mission), shifted_figures(mission)
     return Row(

@@ -91,19 +91,19 @@ class StayingAir:
         }
 
     def reason(self, case: Case, row_id: str) -> Note:
-        """Say how changing delays would affect a row of one case, and which key to add to the file."""
+        """Note on the effect of changing delays on a row of a case, with the key to add to the file."""
         use = self.uses.get(row_id)
         if use is not None:
             return self._says(case, use)
         return self._says_of_untaken(case, row_id)
 
     def reason_of_requirement(self, case: Case, key: str) -> Note:
-        """Say how changing delays would affect a requirement; empty if no verdict relies on constant delays."""
+        """Note on the effect of changing delays on a requirement; empty if no verdict relies on constant delays."""
         doubted = [use for use in self.uses.values() if use.key == key and case.number(use.is_doubted)]
         return self._says(case, max(doubted, key=lambda use: case.number(use.use))) if doubted else phrases.NOTHING
 
     def note(self, case: Case) -> Iterator[Note]:
-        """Say that delays are taken as constant, if no verdict relies on it."""
+        """Note that delays are taken as constant, if no verdict relies on it."""
         uses = [case.number(use.use) for use in self.uses.values()]
         is_open = any(case.number(use.is_doubted) for use in self.uses.values())
         is_open = is_open or any(case.number(is_made) for is_made in self.untaken_rows().values())

@@ -59,7 +59,7 @@ class PslrRow(FamilyRow):
     highest: Echo | None
 
     def in_words(self, case: Case, _: str) -> Row:
-        """The row of one case."""
+        """Row of a case in words."""
         over = NOTHING
         if self.highest is not None:
             makers = [
@@ -126,7 +126,7 @@ class SpurRow(FamilyRow):
     is_over_other: Any
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         spur = spurs_of(mission)[self.spur_index]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
@@ -163,7 +163,7 @@ class SpurRow(FamilyRow):
 
 
 def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> tuple[Note, ...]:
-    """Say which part of a tone is folded below one cycle per aperture, and which row has the phases of that part."""
+    """Note on the part of a tone that is folded below one cycle per aperture, and on the row that has its phases."""
     slow = [
         (float(share), float(frequency))
         for frequency, share in zip(folded.frequencies, folded.shares, strict=True)
@@ -225,7 +225,7 @@ class AcceleratedRow(FamilyRow):
     is_over_other: Any
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         tone = accelerated_tones(mission)[self.tone_index]
         T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
@@ -284,7 +284,7 @@ def evidence(oscillator: Oscillator) -> str | None:
 
 
 def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
-    """Say that an oscillator feels the vibration of its platform; empty if the oscillator has its own vibration."""
+    """Note that an oscillator feels the vibration of its platform; empty if the oscillator has its own vibration."""
     felt_vibration = felt(mission, name)
     return () if felt_vibration is not None and felt_vibration.is_own else (phrases.vibration_of_the_platform(),)
 

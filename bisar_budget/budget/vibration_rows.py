@@ -286,7 +286,7 @@ class VibrationRow(FamilyRow):
         return replace(self, judged=self.judged.in_unit(per_metre), per_metre=per_metre)
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         row_subject = self.judged.subject
         error: MotionError = getattr(case.mission.platforms, row_subject.owner).motion_error
         if self.is_slow:

@@ -131,7 +131,7 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
     outside : Outside
         Influences on all missions of the run.
     today : date
-        Day on which waivers are judged, UTC. It bears on the verdict where the file has a waiver.
+        Day on which waivers are judged, UTC. It bears on the verdict if the file has a waiver.
     """
     from_outside = list(outside.options)
     if mission.waivers or outside.is_day_given:

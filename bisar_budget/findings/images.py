@@ -110,7 +110,7 @@ class VerifiedMission(NamedTuple):
 
     @property
     def doubt(self) -> Note:
-        """Say that no limit got a verdict; empty if any limit did."""
+        """Note that no limit got a verdict; empty if any limit did."""
         if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
             return NOTHING
         return phrases.nothing_verified(len(self.rows))

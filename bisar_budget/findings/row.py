@@ -141,7 +141,7 @@ def where_ids_are(file: str) -> str:
 
 
 def unknown_id(row_id: str, known: Iterable[str], file: str, of_what: str = "row") -> str:
-    """Say that a mission has no such id, which command lists the ids, and which id is the nearest."""
+    """Sentence on an id that a mission does not have, with the command that lists the ids and the nearest id."""
     problem = f"no {of_what} has this id; {where_ids_are(file)}"
     return sentences(problem, did_you_mean(row_id, tuple(known)))
 
