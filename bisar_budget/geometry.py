@@ -66,17 +66,17 @@ _above = _either(
 
 
 def dot(a: Vectors, b: Vectors) -> Any:
-    """Scalar product."""
+    """Scalar product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vectors, b: Vectors) -> Vectors:
-    """Vector product."""
+    """Vector product of two vectors."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def norm(a: Vectors) -> Any:
-    """Length."""
+    """Length of a vector."""
     return math.hypot(*a) if _ARRAY not in map(type, a) else np.sqrt(dot(a, a))
 
 
@@ -499,11 +499,11 @@ class BistaticGeometry:
         return angle_between_lines(self.range_gradient, self.doppler_gradient)
 
     def range_resolution(self, bandwidth_hz: Any, speed_of_light: float) -> Any:
-        """Peak to first null along φ_b on the ground, c/(B|s|). [m]"""
+        """Resolution along φ_b on the ground, peak to first null: c/(B|s|). [m]"""
         return speed_of_light / (bandwidth_hz * _hypot(*self.range_gradient))
 
     def cross_range_resolution(self, wavelength_m: Any, aperture_time_s: Any) -> Any:
-        """Peak to first null across φ_b on the ground, along a line of constant range: λ/(T|ṡ⊥|). [m]"""
+        """Resolution across φ_b on the ground, peak to first null on a line of constant range: λ/(T|ṡ⊥|). [m]"""
         across = _hypot(*self.doppler_gradient) * _sin(self.gradient_angle)
         return wavelength_m / (aperture_time_s * across)
 

@@ -9,7 +9,7 @@ import errno
 import os
 from collections.abc import Iterator
 
-# Address space, bytes. With less, the libraries ended the process in tests, or reported that they are not installed.
+# Address space, bytes. With less, libraries were seen to end the process, or to report that they are not installed.
 LEAST = 192 << 20  # NumPy with one thread of OpenBLAS takes 134 MB, a check a little more
 OF_TABLES = 400 << 20
 OF_CLUSTER = 3 << 29

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @cache
 def resource(*parts: str) -> "Path":
-    """Path of a bundled file: inside an installed package, at the top level of a checkout."""
+    """Path of a bundled file: inside an installed package, or at the top level of a checkout."""
     from pathlib import Path  # a check does not need it
 
     package = Path(__file__).resolve().parent

@@ -300,7 +300,7 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
         if smallest <= size < largest:
             value /= scale
             break
-    text = "%.*g" % (digits, value)  # noqa: UP031 -- a table has thirty of these, and format() takes twice as long
+    text = "%.*g" % (digits, value)  # noqa: UP031 -- a table has thirty numbers, and format() takes twice as long
     if unit == "dB" and rounding == "down" and value < 0:  # a lower level is stricter
         return _stricter(value, digits) + suffix
     if "e" in text or (rounding == "down" and abs(float(text)) > abs(value)):

@@ -1,4 +1,4 @@
-"""Declared errors together: phases of platforms and mission, cubic phase, location, autofocus pull-in, scene edge."""
+"""Rows of sums of errors: phases of platforms and mission, cubic phase, location, autofocus pull-in, scene edge."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -39,7 +39,7 @@ PULL_IN = "autofocus_pull_in"
 
 
 class Aggregates:
-    """Errors together in many cases."""
+    """Rows of sums of errors in many cases."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         self.judging, self.together, self.array = judging, analysis.together, judging.array
@@ -367,7 +367,7 @@ class _Words(NamedTuple):
     what: str
     unit: str
     path: KeyPath
-    equation: tuple[str, str]  # by the published and by the full model
+    equation: tuple[str, str]  # by the published model, by the full model
 
 
 _EQUATIONS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "each": "largest of the rows"}

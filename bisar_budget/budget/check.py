@@ -48,7 +48,7 @@ def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_O
     Parameters
     ----------
     mission : Mission
-        As loaded.
+        Mission as loaded.
     today : date
         Day on which waivers are judged, UTC.
     outside : Outside
@@ -171,7 +171,7 @@ def _unused_keys(mission: Mission) -> Iterator[Note]:
 CheckedMission = MissionFindings | UnusableMission
 Kept = TypeVar("Kept")
 
-FILES_FOR_TWO_PROCESSES = 200  # a second process takes as long to start as half of them take to check
+FILES_FOR_TWO_PROCESSES = 200  # a second process starts in the time that a check of half of them takes
 FILES_AT_ONCE = 500  # checked together at most
 
 

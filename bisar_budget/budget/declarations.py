@@ -329,7 +329,7 @@ def missing_declarations(mission: Mission, still: Container[str] | None = None) 
     mission : Mission
         Mission as loaded.
     still : container of str, optional
-        Names of the platforms that do not move; omitted: by their paths.
+        Names of the platforms that do not move; omitted: derived from the paths.
     """
     if not mission.requirements.declare:
         return []

@@ -178,7 +178,7 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
 
 
 def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
-    """Reason if the model that does not gate fails the declared error, with the cause of its difference; else empty."""
+    """Reason if the model that does not gate fails the declared error, with the cause; otherwise empty."""
     needs, theirs = case.mission.requirements, case.does(other, source)
     uses = [(float(theirs.judged(case.allocation.autofocus_gain)), limit, QUADRATIC)]
     if source.is_motion and needs.cubic_phase_error is not None:
@@ -232,7 +232,7 @@ def specification_rows(judging: Judging, analysis: Analysis) -> Iterator["Specif
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpecificationRow(FamilyRow):
-    """One specification in many cases."""
+    """Row of one specification in many cases."""
 
     number: Number
 

@@ -472,7 +472,7 @@ def _wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tup
         source = motion.imu.source if motion.imu and is_of_imu else None
         equation = "lever arm" if kind == "lever_arm" else "inertial sensor"
     notes = override_notes(error.owner, motion.overridden, figure)
-    if error.counted_in and error.declared is None:  # else it is the reason of the row
+    if error.counted_in and error.declared is None:  # otherwise the note is the reason of the row
         notes = (phrases.counted_in_another_row(error.counted_in), *notes)
     return equation, source or motion.evidence(figure), notes
 
@@ -530,7 +530,7 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
 def _air_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
     """Equation, evidence and notes of the row of a delay on a leg."""
     source = None if mission.propagation is None else mission.propagation.source_of(legs_of(error.owner)[0])
-    if error.counted_in and error.declared is None:  # else it is the reason of the row
+    if error.counted_in and error.declared is None:  # otherwise the note is the reason of the row
         return "delay of the air", source, (phrases.counted_in_another_row(error.counted_in),)
     notes = () if error.owner in PLATFORMS else (phrases.held_to_the_total("both legs, by one air"),)
     return "delay of the air", source, notes

@@ -50,7 +50,7 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
             continue
         model = MODELS[judged_row.model[case.place]]
         family = families.get((model, judged_row.subject.id))
-        if family is None:  # only other cases have it
+        if family is None:  # only other cases have the row
             continue
         row, status = family.in_words(case, model), statuses(judged_row.status[case.place])
         changes: dict[str, Any] = {"model": model, "status": status, "is_unjudged": status == "not_evaluated"}
@@ -145,7 +145,7 @@ def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
 def requirements_in_words(judged: JudgedMission, case: Case, waived: Waived) -> tuple[JudgedRequirement, ...]:
     """Every requirement of one case as judged; `waived` has the rows of the case in words, after waivers."""
     rows = {row.id: row for row in waived.rows}
-    of_all = [rows.get(judged_row.subject.id) for judged_row in judged.before]  # None: only other cases have it
+    of_all = [rows.get(judged_row.subject.id) for judged_row in judged.before]  # None: only other cases have the row
     return tuple(_entry(state, judged, case, of_all, waived) for state in judged.requirements)
 
 

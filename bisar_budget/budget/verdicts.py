@@ -18,7 +18,7 @@ _SHOWN_ROWS = 4  # rows of a mission, at most
 
 
 def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: date | None = None) -> MissionFindings:
-    """Add verdicts to findings: a declared row, or a row of a requirement, fails if an image refutes its limit.
+    """Add verdicts to findings: a declared row fails if an image refutes its limit, and so does its requirement.
 
     A row that passes by autofocus also fails if the image refutes the autofocus. If the file does not declare the
     error of a row, the row reports its refuted limit. A refuted limit without a row in the check is a warning. It is

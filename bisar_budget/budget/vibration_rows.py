@@ -44,7 +44,7 @@ _ROUNDING_DB = 1e-6  # by which a level may exceed the required level
 
 
 class Vibrations:
-    """Vibrations in many cases."""
+    """Rows of vibrations in many cases."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         mission, geometry, allocation = analysis.mission, analysis.geometry, analysis.allocation

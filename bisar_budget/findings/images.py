@@ -101,7 +101,7 @@ class VerifiedMission(NamedTuple):
     def status(self) -> str:
         """`fail` if a limit of the gating model is optimistic, with or without autofocus.
 
-        `not_evaluated` if no limit got a verdict: nothing was verified, which is no pass. Else `pass`.
+        `not_evaluated` if no limit got a verdict: nothing was verified, which is not a pass. Else `pass`.
         """
         verdicts = {row.verdict for row in self.rows} | {row.verdict_autofocus for row in self.rows}
         if "optimistic" in verdicts:
@@ -141,7 +141,7 @@ class PointImage(NamedTuple):
 
 
 class ImageEvidence(NamedTuple):
-    """The images behind one verdict: at the limit, and with autofocus at its limit, before and after."""
+    """The images of one verdict: at the limit, and at the limit with autofocus, before and after autofocus."""
 
     file: str
     verdict: Verdict

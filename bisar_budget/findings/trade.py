@@ -29,7 +29,7 @@ class Axis(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Name and unit."""
+        """Name and unit of the key."""
         return f"{self.key} [{self.unit}]" if self.unit else self.key
 
     @property
@@ -65,9 +65,9 @@ class TradeStudy(NamedTuple):
 
     `asked` is the text after each option. `rows` are the utilizations, over the single key that varies, of the rows
     that are the worst at any value. The sweep has `cases`: `complying` of them meet every requirement, `waived` are
-    waived, by `waived_by`, `unevaluated` have no complete evaluation or no declared error, and `missing` are not
-    missions. `model` is the model that an option put in place of the mission's own model, `day` the date on which
-    waivers were judged.
+    waived, by `waived_by`, `unevaluated` have no complete evaluation or no declared error, and `missing` give no
+    usable mission. `model` is the model that an option put in place of the mission's own model, `day` the date on
+    which waivers were judged.
     """
 
     asked: tuple[str, ...]
