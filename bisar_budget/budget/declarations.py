@@ -45,7 +45,7 @@ def swings_nothing(platform: Platform) -> bool:
 
 
 def _lacks_an_attitude(mission: Mission, name: str) -> str:
-    """Keys that the file lacks for a lever arm: attitude errors swing the arm, also an arm without uncertainty."""
+    """Keys that the file lacks for a lever arm: attitude errors swing the full arm, not only its uncertainty."""
     if not swings_nothing(getattr(mission.platforms, name)):
         return ""
     return "imu.attitude, gyro_bias or angle_random_walk, which swings the arm"
@@ -206,7 +206,7 @@ def _lacking_of_setting(mission: Mission) -> list[str]:
 
 
 def _legs_without_delay(mission: Mission) -> list[str]:
-    """Missing keys of the air: `propagation`, or each leg without a delay that is high enough to state one."""
+    """Missing keys of the air: `propagation`, or each leg without a delay whose elevation is high enough for it."""
     if mission.propagation is None:
         return ["propagation"]
     T, lacking = mission.collection.aperture_time, []

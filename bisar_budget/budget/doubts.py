@@ -1,8 +1,8 @@
 """Doubts about the input of a check: paths that may stray from the truth, a model or a collection at its edge.
 
-A path by an orbit or a log has a known distance that the truth may be away from it: by the age of its elements, the
-interpolation of its ephemeris, the residual of its smoothed log. A smaller declared position error cannot be true of
-this path. Nor can a declared error that is smaller than the error that the source of the path states.
+The truth may differ from a path by an orbit or a log by a known distance: by the age of the elements, the
+interpolation of the ephemeris, the residual of the smoothed log. A smaller declared position error cannot be true of
+this path. A declared error cannot be true either if the source of the path states a larger error.
 
 A log has two further errors: the residual, which is the difference between its fixes and its smooth path, and the
 step to which the fixes are rounded. A processor that uses the smooth path has neither error. A processor that uses
@@ -37,14 +37,14 @@ _TYPICAL_SHARE = 1 / 3  # of a usual error; a fix may be better by this factor t
 MOST_RESIDUAL_RAD = 0.2  # largest rms phase of the residual along the line of sight that needs no statement
 MOST_GRID_SHARE = 0.1  # largest step of a log, relative to the declared position error, that needs no statement
 RESIDUAL = "residual"  # kind of doubt: the residual of a smooth path
-_EQUAL_VARIANCE_FRACTION = 1e-6  # relative, of variances: an equal variance is enough, and turned axes round
+_EQUAL_VARIANCE_FRACTION = 1e-6  # relative, of variances: an equal variance is enough; a turn of axes causes rounding
 
 
 @dataclass(frozen=True)
 class InputDoubt:
     """A platform whose path is in doubt by more than the file declares.
 
-    `doubt` is the distance that the truth may be away from the path, or the error that the path's source states,
+    `doubt` is the distance by which the truth may differ from the path, or the error that the path's source states,
     along the axis on which it exceeds the declared error most. `declared` is the declared error without the coverage
     factor, 0 if the file declares no error. Both are root-sum-squares if the doubt has no direction. [m] or [m/s], by
     the `kind`. `note` gives both values. With `is_of_log`, `doubt` is the residual of a log [rad], and `declared` the
