@@ -77,7 +77,7 @@ def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
 
 
 def _required(mission: Mission, keys: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the requirements that the file states."""
+    """Return the keys whose requirements the file states."""
     return tuple(key for key in keys if getattr(mission.requirements, key) is not None)
 
 
