@@ -1,10 +1,10 @@
-"""Physical constants and the fixed tolerances of the tool, each with its unit and origin; words of its options."""
+"""Physical constants and fixed tolerances, each with its unit and origin; words of the command's options."""
 
 SPEED_OF_LIGHT = 299_792_458.0  # m/s, exact (SI, CGPM 1983)
 STANDARD_GRAVITY = 9.80665  # m/s², exact (CGPM 1901); data sheets state accelerometer bias in g
 
-# A utilization this far above 1 still passes: an error set exactly at its limit is at the limit,
-# whatever the last bit of a division says.
+# A utilization this far above 1 still passes: an error set exactly at its limit passes, for any rounding of the last
+# bit of a division.
 UTILIZATION_TOLERANCE = 1e-9
 
 # Components below this fraction of a vector's length are rounding (cos 90° is 6e-17), not geometry.
@@ -18,16 +18,16 @@ MAINLOBE_ENERGY = {"uniform": 0.9028233335802807, "taylor": 0.9981912855769113}
 ONE_PEAK_DB = 3.0  # loss of the peak beyond which the point of least phase variance is 4 % or more beside the peak
 
 MIN_GRADIENT_ANGLE_DEG = 1.0  # between range and Doppler gradients on the ground
-MIN_GROUND_GRADIENT = 0.02  # of the range on the ground, m per m; the published model has no image plane with less
+MIN_GROUND_GRADIENT = 0.02  # of the range on the ground, m per m; with less the published model has no image plane
 
-MAX_DRAWS_HERE = 10**9  # of a Monte Carlo on one machine: minutes, and a probability known to 3e-5
-MAX_DRAWS = 10**12  # shared out between many
+MAX_DRAWS_HERE = 10**9  # of a Monte Carlo on one machine: takes minutes, and gives a probability to 3e-5
+MAX_DRAWS = 10**12  # of a Monte Carlo that many machines share
 
 EARTH_GRAVITATIONAL_PARAMETER = 3.986004418e14  # m³/s², GM of WGS-84, atmosphere included
-EARTH_RADIUS = 6.371e6  # m, mean radius; how far the Earth's centre is below the scene
-FASTEST_FLIGHT = 3e3  # m/s; no aircraft is as fast, and no satellite in a low orbit as slow
-MAX_DAYS = 366.0  # in which passes of a satellite are looked for
+EARTH_RADIUS = 6.371e6  # m, mean radius; depth of the Earth's centre below the scene
+FASTEST_FLIGHT = 3e3  # m/s; every aircraft is slower, and every satellite in a low orbit is faster
+MAX_DAYS = 366.0  # of a search for passes of a satellite
 
-# Here, since the command line says them without a mission, and a mission is read without the command line.
-GATING_MODELS = ("published", "full", "strictest")  # each asks for more than the one before it
-TARGETS = ("fail", "warn")  # of solve: what must not happen
+# Defined here, since the command line lists them without a mission, and a mission is read without the command line.
+GATING_MODELS = ("published", "full", "strictest")  # each is stricter than its predecessor
+TARGETS = ("fail", "warn")  # of solve: the status that must not occur

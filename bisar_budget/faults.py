@@ -1,4 +1,4 @@
-"""Faults of input, said so that they can be mended: where, what, the value given, what is accepted."""
+"""Faults of input, with all that is needed to correct them: place, problem, given value, accepted values."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
@@ -7,14 +7,14 @@ KeyPath = tuple[str | int, ...]
 
 
 def upwards(path: KeyPath) -> Iterator[KeyPath]:
-    """A path and those above it, the nearest first; not the file itself."""
+    """A path and the paths above it, the nearest first; without the path of the file itself."""
     return (path[:length] for length in range(len(path), 0, -1))
 
 
 class Region(NamedTuple):
-    """Where a value stands, counted from 1 in characters; `end_column` is the one behind its last.
+    """Region of a value in a file, counted from 1 in characters; `end_column` is the column after its last character.
 
-    The ends are None for a mapping or a list: it is pointed at, not spanned.
+    The ends are None for a mapping or a list: a message points at its start only.
     """
 
     line: int
@@ -24,10 +24,10 @@ class Region(NamedTuple):
 
 
 class Place(int):
-    """Line of a value in a file, from 1, which also knows where on the line the value stands.
+    """Line of a value in a file, from 1, together with the region of the value.
 
-    A number for everybody who wants the line; reports for editors and pull requests ask for the region. `text` is
-    what stands there, as the file has it; empty for a mapping or a list.
+    It is a number for all code that needs the line. Reports for editors and pull requests use the region. `text` is
+    the value as written in the file; empty for a mapping or a list.
     """
 
     region: Region
@@ -35,9 +35,9 @@ class Place(int):
 
     @classmethod
     def of(cls, event: Any) -> "Place":
-        """Place of what the YAML parser saw; one for every event, since many rows point at the same key.
+        """Place of an event of the YAML parser; each event has a single place, since many rows point at the same key.
 
-        It keeps four numbers and the text, and lets the parser's marks go: they are half the memory of a mission.
+        The place keeps four numbers and the text. It frees the parser's marks: they are half the memory of a mission.
         """
         fields: dict[str, Any] = vars(event)
         position: Place | None = fields.get("place")
@@ -53,20 +53,20 @@ class Place(int):
 
 
 def printable(text: str) -> str:
-    """Write text of a user's own so that it stays on its line and does nothing to a terminal."""
+    """Write text from a user on one line, without effects on a terminal."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def shown(text: str) -> str:
-    """Say a value from a file so that it stays short and does nothing to a terminal."""
+    """Write a value from a file as short text, without effects on a terminal."""
     text = printable(text[:61])
     return text if len(text) <= 60 else text[:57] + "..."
 
 
 def fault_words(problem: str, given: str = "", accepted: str = "", hint: str = "") -> str:
-    """Write `what is wrong (got value); what is accepted. Hint`, of which all but the first may be empty."""
+    """Write `what is wrong (got value); what is accepted. Hint`; all but the first part may be empty."""
     text = problem
     if given:
         text += f" (got {given})"
@@ -76,7 +76,7 @@ def fault_words(problem: str, given: str = "", accepted: str = "", hint: str = "
 
 
 def sentences(*texts: str) -> str:
-    """Join texts by full stops, but for those that end with a question mark; the last is left as it is."""
+    """Join texts by full stops, except after a text that ends with a question mark; the last text is unchanged."""
     joined = ""
     for text in filter(None, texts):
         joined = f"{closed(joined)} {text}" if joined else text
@@ -84,14 +84,14 @@ def sentences(*texts: str) -> str:
 
 
 def closed(text: str) -> str:
-    """The text with a full stop at its end, if it has neither that nor a question mark."""
+    """The text with a full stop at its end, unless it ends with a full stop or a question mark."""
     return text if text.endswith((".", "?")) else f"{text}."
 
 
 class SetValue(NamedTuple):
-    """A value that an option puts in place of what a mission file says: `--set radar.bandwidth=150MHz`.
+    """A value that an option puts in place of the mission file's value: `--set radar.bandwidth=150MHz`.
 
-    `text` is the value as a file would have it.
+    `text` is the value as written in a file.
     """
 
     key: str
@@ -99,37 +99,37 @@ class SetValue(NamedTuple):
 
     @property
     def option(self) -> str:
-        """The beginning of a message about the value."""
+        """Beginning of a message about the value."""
         return f"--set {printable(self.key)}"
 
 
-_BY_UNIT = ("m/s^2", "(m/s^2)^2/Hz", "m^2/Hz")  # of keys whose readers tell by the unit what is meant
+_BY_UNIT = ("m/s^2", "(m/s^2)^2/Hz", "m^2/Hz")  # of keys whose readers need the unit to tell the dimension
 
 
 class SetNumber(SetValue):
-    """A number in SI in the same place, as of a case of a sweep: readers take it as it is, the text is for people.
+    """A number in SI that replaces a value, as in a case of a sweep: readers take the number, people read the text.
 
-    `value` is what readers take: of a key that has several dimensions the text.
+    `value` is the number that readers take, or the text for a key with several dimensions.
     """
 
     value: float | str
 
     @classmethod
     def of(cls, key: str, number: float, unit: str) -> "SetNumber":
-        """The number for a key; `unit` is the one of SI."""
+        """The number for a key; `unit` is the SI unit."""
         set_number = cls(key, f"{number!r} {unit}".rstrip())
         set_number.value = set_number.text if unit in _BY_UNIT else number
         return set_number
 
 
 class Changed:
-    """Stands where the parser's event of a value would: the value is from an option, and has no line."""
+    """Replaces the parser's event of a value: the value comes from an option and has no line."""
 
     start_mark = None
 
 
 def changes_words(changes: Sequence[SetValue]) -> str:
-    """Write the options that changed a mission as they can be given again; empty if there is none."""
+    """Write the options that changed a mission in a form for the command line; empty without options."""
     if not changes:
         return ""
     from shlex import quote
@@ -138,10 +138,10 @@ def changes_words(changes: Sequence[SetValue]) -> str:
 
 
 class Problem(NamedTuple):
-    """Something wrong with a value, before anybody knows which file it stands in.
+    """A problem with a value, before its file is known.
 
-    `at` is the path of the culprit below the value that was checked. `names_value`: it says the value itself.
-    `is_of_key`: the key is wrong, whatever its value.
+    `at` is the path of the wrong value below the checked value. `names_value`: the text already contains the value.
+    `is_of_key`: the key is wrong, for any value.
     """
 
     problem: str
@@ -153,12 +153,12 @@ class Problem(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Words for all of it: the fault, what is accepted, and the hint."""
+        """Words for the full problem: the fault, the accepted values, and the hint."""
         return fault_words(self.problem, "", self.accepted, self.hint)
 
 
 class InvalidValueError(ValueError):
-    """A value that does not say what its key asks for."""
+    """A value that its key does not accept."""
 
     def __init__(self, problem: str, accepted: str = "", hint: str = "") -> None:
         super().__init__(problem)
@@ -166,10 +166,10 @@ class InvalidValueError(ValueError):
 
 
 class Fault(NamedTuple):
-    """One fault of a mission file. Line and column count from 1; None where the whole file is meant.
+    """One fault of a mission file. Line and column count from 1; None for a fault of the whole file.
 
-    `option` is the option that the value comes from, instead of a line; empty if it stands in the file. `file` is
-    that of the mission, known where the fault is one of a `MissionError`.
+    `option` is the option that gave the value, instead of a line; empty for a value in the file. `file` is the file
+    of the mission; it is known for faults of a `MissionError`.
     """
 
     line: int | None
@@ -184,7 +184,7 @@ class Fault(NamedTuple):
 
     @property
     def message(self) -> str:
-        """The problem, without its place, the value given and what is accepted."""
+        """The problem, without its place, the given value and the accepted values."""
         return self.problem
 
     def __str__(self) -> str:
@@ -200,7 +200,7 @@ def file_fault(problem: str, hint: str = "") -> Fault:
 
 
 class ClusterError(Exception):
-    """Workers, or a folder of parts, that cannot be used; the message says why, and what can be done."""
+    """Workers, or a folder of parts, that cannot be used; the message gives the reason and a remedy."""
 
 
 class WorkerLostError(Exception):
@@ -208,9 +208,9 @@ class WorkerLostError(Exception):
 
 
 class MissionError(Exception):
-    """A mission file that cannot be used, with every fault found in it, in file order.
+    """A mission file that cannot be used, with all of its faults, in file order.
 
-    `data` is the file as read, byte for byte; None where there is none, or more of it than was read.
+    `data` is the file as read, byte for byte; None without a file, or if the file is longer than the part read.
     """
 
     def __init__(self, file: str, faults: tuple[Fault, ...]) -> None:
@@ -220,7 +220,7 @@ class MissionError(Exception):
         self.data: bytes | None = None
 
     def __str__(self) -> str:
-        """Every fault on a line of its own."""
+        """All faults, each on a line of its own."""
         return "\n".join(self.lines())
 
     def lines(self) -> list[str]:

@@ -1,8 +1,8 @@
 """Bistatic geometry at the aperture midpoint: look vectors, angles, ground gradients, frames.
 
 Frame: scene centre at the origin, ground plane z = 0, x east, y north, z up. SI units, radians.
-Vectors are tuples, whose components are the numbers of one case or arrays of many, (cases,). What follows from
-numbers alone is a plain float, in a tenth of the time that NumPy takes for one.
+Vectors are tuples, whose components are the numbers of one case or arrays of many, (cases,). A result from plain
+numbers is a plain float: this takes a tenth of the time of a NumPy scalar.
 """
 
 import math
@@ -21,13 +21,13 @@ Vector = tuple[float, float, float]
 Vectors = tuple[Any, Any, Any]  # three components, each an array or a float
 GroundVector = tuple[float, float]
 
-_DIRECTED = 1e-300  # m/s; of what is smaller too few digits are left for a direction
-STRAIGHT: Vector = (0.0, 0.0, 0.0)  # acceleration of a platform whose path does not curve
+_DIRECTED = 1e-300  # m/s; a smaller velocity has too few digits for a direction
+STRAIGHT: Vector = (0.0, 0.0, 0.0)  # acceleration of a platform with a straight path
 Axes = tuple[Vectors, Vectors, Vectors]
 
-STILL = 1e-6  # m/s; slower than this no platform flies an aperture
-_LOOKS_PER_PIECE = 8  # at a path in pieces, for how far and how low it gets
-_FEWEST_LOOKS = 32  # to each side of the midpoint
+STILL = 1e-6  # m/s; a slower platform does not move
+_LOOKS_PER_PIECE = 8  # samples of a path in pieces, for its length and its lowest point
+_FEWEST_LOOKS = 32  # samples on each side of the midpoint
 FRAME_AXES = {
     "scene": ("x", "y", "z"),
     "track": ("along", "cross", "up"),
@@ -37,9 +37,9 @@ FRAME_AXES = {
 
 
 class UndefinedFrameError(ValueError):
-    """A frame that this platform does not have: a still one has no track, one overhead no cross direction.
+    """A frame that a platform does not have: a still platform has no track, a platform overhead no cross direction.
 
-    Without the scene's latitude and longitude nothing is known of the Earth's centre, and no platform has `ric`.
+    Without the scene's latitude and longitude the Earth's centre is not known, and no platform has `ric`.
     """
 
 
@@ -47,7 +47,7 @@ _ARRAY = np.ndarray
 
 
 def _either(of_numbers: Callable[..., Any], of_arrays: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of numbers or arrays, where one function takes each."""
+    """A function of numbers or arrays, from one function of numbers and one function of arrays."""
 
     def function(*values: Any) -> Any:
         return of_arrays(*values) if _ARRAY in map(type, values) else of_numbers(*values)
@@ -66,17 +66,17 @@ _above = _either(
 
 
 def dot(a: Vectors, b: Vectors) -> Any:
-    """Scalar product."""
+    """Scalar product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vectors, b: Vectors) -> Vectors:
-    """Vector product."""
+    """Vector product of two vectors."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def norm(a: Vectors) -> Any:
-    """Length."""
+    """Length of a vector."""
     return math.hypot(*a) if _ARRAY not in map(type, a) else np.sqrt(dot(a, a))
 
 
@@ -87,13 +87,13 @@ def unit(a: Vectors) -> Vectors:
 
 
 def without_rounding(a: Vectors) -> Vectors:
-    """Set components to zero that are rounding beside the vector's length: cos 90° is 6e-17."""
+    """Set components to zero that are only rounding errors relative to the vector's length: cos 90° is 6e-17."""
     floor = ROUNDING * norm(a)
     return (_above(floor, a[0]), _above(floor, a[1]), _above(floor, a[2]))
 
 
 def _of_cases(values: NDArray[np.float64], asked: Any) -> Any:
-    """Values of cases (cases,); a float where there is one case, and one was asked for."""
+    """Values of cases (cases,); a float if there is one case and `asked` is a number."""
     return values if np.ndim(asked) or values.size > 1 else values.item()
 
 
@@ -102,7 +102,7 @@ def _minus(a: Vectors, b: Vectors) -> Vectors:
 
 
 def _number_of_cases(number: Any, cases: Any) -> Any:
-    """The numbers of some cases; a number that all cases share stays as it is."""
+    """The numbers of some cases; a number that all cases share is unchanged."""
     return number[cases] if isinstance(number, np.ndarray) and number.size > 1 else number
 
 
@@ -116,18 +116,18 @@ class CurvedPath(Protocol):
 
     @property
     def count(self) -> int:
-        """Number of its pieces."""
+        """Number of pieces."""
 
     def at(self, tau: Any) -> tuple[Vectors, Vectors]:
         """Position and velocity at slow times from the midpoint. [m], [m/s]"""
 
     def of(self, cases: Any) -> "CurvedPath":
-        """The paths of some cases, by their places."""
+        """The paths of some cases, by their indices."""
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """A path in polynomials, each over its own piece of slow time; the first and the last go on beyond their ends.
+    """A path in polynomials, each over its own piece of slow time; the first and the last continue beyond the ends.
 
     Each piece counts time from its own middle. A polynomial about the midpoint of a long aperture would lose digits
     in powers of hundreds of seconds. Numbers may be arrays (cases,).
@@ -135,9 +135,9 @@ class Pieces:
     Attributes
     ----------
     starts : tuple
-        When each piece but the first begins, rising. [s]
+        Time at which each piece except the first begins, rising. [s]
     middles : tuple
-        From when the time of each piece counts. [s]
+        Origin of the time of each piece. [s]
     powers : tuple
         Coefficients of time to the power 0, 1, … of each piece. [m], [m/s], …
     """
@@ -181,7 +181,7 @@ class Pieces:
         return (float(x), float(y), float(z)), (float(u), float(v), float(w))
 
     def of(self, cases: Any) -> "Pieces":
-        """The paths of some cases, by their places; what all cases share stays as it is."""
+        """The paths of some cases, by their indices; numbers that all cases share are unchanged."""
         starts, middles = (
             tuple(_number_of_cases(number, cases) for number in numbers) for numbers in (self.starts, self.middles)
         )
@@ -194,7 +194,7 @@ class Pieces:
 
 @dataclass(frozen=True)
 class _Apart:
-    """A path less another one, one of which is in pieces."""
+    """A path less a second path; at least one of the paths is in pieces."""
 
     path: "PlatformState"
     other: "PlatformState"
@@ -213,11 +213,11 @@ class _Apart:
 
 @dataclass(frozen=True, kw_only=True)
 class PlatformState:
-    """The path of one platform over the aperture, a function of slow time; of one case or of many.
+    """The path of one platform over the aperture, a function of slow time; for one case or many.
 
     Position [m] and velocity [m/s] at the midpoint, acceleration [m/s²], and in `bends` the coefficients of τ³, τ⁴, …
-    [m/s³], [m/s⁴], …: a polynomial, which is the whole path unless there is a `curve`. With one, the polynomial is
-    the path near the midpoint. `radial` are the axes of its `ric` frame, where the Earth's centre is known.
+    [m/s³], [m/s⁴], … form a polynomial. Without a `curve` the polynomial is the full path; with a `curve` it is the
+    path near the midpoint. `radial` are the axes of the platform's `ric` frame, if the Earth's centre is known.
     """
 
     position: Vectors
@@ -229,12 +229,12 @@ class PlatformState:
 
     @property
     def is_still(self) -> Any:
-        """Whether it stays where it is; what flies several pieces does not."""
+        """Whether the platform does not move; a path in pieces always moves."""
         return self.curve is None and self.travelled(1.0) < STILL
 
     @property
     def is_straight(self) -> bool:
-        """Whether the velocity is constant; of one case."""
+        """Whether the velocity is constant; for one case."""
         return self.acceleration == STRAIGHT and self.is_quadratic
 
     @property
@@ -272,11 +272,11 @@ class PlatformState:
         return self.place(tau), (x, y, z)
 
     def later(self, tau: Any, delay_s: Any) -> Vectors:
-        """How far it gets from slow times on within a delay. [m]"""
+        """Displacement of the platform from slow times `tau` to `tau + delay_s`. [m]"""
         return _minus(self.place(tau + delay_s), self.place(tau))
 
     def of(self, cases: Any) -> "PlatformState":
-        """The paths of some cases, by their places; what all cases share stays as it is."""
+        """The paths of some cases, by their indices; numbers that all cases share are unchanged."""
         return PlatformState(
             position=_vector_of_cases(self.position, cases),
             velocity=_vector_of_cases(self.velocity, cases),
@@ -308,7 +308,7 @@ class PlatformState:
         )
 
     def travelled(self, duration_s: Any) -> Any:
-        """Bound of the way it makes from the midpoint in a time. [m]"""
+        """Upper bound on the length of the path from the midpoint within a time. [m]"""
         if self.curve is not None:
             steps = norm(tuple(np.diff(component, axis=0) for component in self._looks(duration_s)))
             before, after = np.split(steps, 2)
@@ -317,19 +317,19 @@ class PlatformState:
         return way + sum(norm(bend) * duration_s**power for power, bend in enumerate(self.bends, 3))
 
     def sinks(self, duration_s: Any) -> Any:
-        """Bound of how much lower than at the midpoint it is within a time. [m]"""
+        """Upper bound on the descent of the platform below its midpoint height within a time. [m]"""
         if self.curve is not None:
             return _of_cases(self.position[2] - self._looks(duration_s)[2].min(axis=0), duration_s)
         way = abs(self.velocity[2]) * duration_s + abs(self.acceleration[2]) * duration_s**2 / 2
         return way + sum(abs(bend[2]) * duration_s**power for power, bend in enumerate(self.bends, 3))
 
     def _looks(self, duration_s: Any) -> Vectors:
-        """Places within a time of the midpoint, as many to each side, (places, cases). [m]"""
+        """Positions within a time of the midpoint, equally many on each side, (samples, cases). [m]"""
         count = _FEWEST_LOOKS if self.curve is None else max(_FEWEST_LOOKS, _LOOKS_PER_PIECE * self.curve.count)
         return self.place(np.linspace(-1.0, 1.0, 2 * count + 1)[:, None] * duration_s)
 
     def less(self, other: "PlatformState") -> "PlatformState":
-        """The path less another one, at each time; it has no frame of an orbit."""
+        """The path less a second path, at each time; the difference has no frame of an orbit."""
         return PlatformState(
             position=_minus(self.position, other.position),
             velocity=_minus(self.velocity, other.velocity),
@@ -340,17 +340,17 @@ class PlatformState:
 
     @property
     def azimuth(self) -> Any:
-        """From east, counter-clockwise, φ of (6). [rad]"""
+        """Azimuth from east, counter-clockwise, φ of (6). [rad]"""
         return _arctan2(self.position[1], self.position[0])
 
     @property
     def elevation(self) -> Any:
-        """Above the ground plane as seen from the scene centre, θ of (6). [rad]"""
+        """Elevation above the ground plane as seen from the scene centre, θ of (6). [rad]"""
         return _arctan2(self.position[2], _hypot(self.position[0], self.position[1]))
 
     @property
     def squint(self) -> float | None:
-        """Angle of the line of sight from broadside, positive looking forward; None when still. One case. [rad]"""
+        """Angle of the line of sight from broadside, positive forward; None for a still platform. One case. [rad]"""
         speed = norm(self.velocity)
         if speed == 0:
             return None
@@ -358,7 +358,7 @@ class PlatformState:
         return math.asin(max(-1.0, min(1.0, sine))) if abs(sine) > ROUNDING else 0.0
 
     def has_frame(self, name: str, margin: float = 1.0) -> Any:
-        """Whether it has a frame, with a margin to spare for rounding."""
+        """Whether the platform has a frame, with a margin for rounding."""
         if name in ("scene", "ric"):
             return name == "scene" or self.radial is not None
         first = self._first_axis(name)
@@ -373,10 +373,10 @@ class PlatformState:
 
         `track`: along the velocity; cross is horizontal, to the left; up completes it (vertical in level
         flight). `look`: line of sight from the scene centre to the platform; cross is horizontal; up
-        completes it. `ric`: away from the Earth's centre; in-track and cross-track are those of the orbit, whose
-        plane holds the velocity against the stars; cross-track is its normal.
+        completes it. `ric`: away from the Earth's centre; in-track and cross-track belong to the orbit, whose
+        plane contains the velocity against the stars; cross-track is its normal.
 
-        Of many cases, those that do not have it hold no number.
+        With many cases, the axes are NaN in the cases without the frame.
 
         Raises
         ------
@@ -431,7 +431,7 @@ def state_from_angles(
 
 @dataclass(frozen=True, kw_only=True)
 class BistaticGeometry:
-    """Both platforms together, and what range and Doppler say about the ground; of one case or of many."""
+    """Both platforms together, with the gradients of range and Doppler on the ground; for one case or many."""
 
     transmitter: PlatformState
     receiver: PlatformState
@@ -443,26 +443,26 @@ class BistaticGeometry:
 
     @cached_property
     def apart(self) -> PlatformState:
-        """The transmitter as the receiver has it: its position is the baseline."""
+        """The transmitter relative to the receiver: the position is the baseline."""
         return self.transmitter.less(self.receiver)
 
     @property
     def echo_delay(self) -> Any:
-        """Time by which the echo of the scene centre comes after the direct path, at mid-aperture. [s]"""
+        """Delay of the scene centre's echo after the direct path, at mid-aperture. [s]"""
         t, r = self.both
         return (t.slant_range + r.slant_range - self.apart.slant_range) / SPEED_OF_LIGHT
 
     def at(self, tau: Any) -> "BistaticGeometry":
-        """The geometry at other slow times, of straight paths through them. [s]"""
+        """The geometry at slow times [s], with straight paths through the positions at these times."""
         transmitter, receiver = (
             PlatformState(position=p, velocity=v) for p, v in (path.at(tau) for path in self.both)
         )
         return BistaticGeometry(transmitter=transmitter, receiver=receiver)
 
     def sights(self, *, has_direct_path: bool) -> tuple[Vectors, Vectors]:
-        """The range at mid-aperture that a metre of the transmitter's motion, and of the receiver's, takes away. [-]
+        """Decrease of range at mid-aperture per metre of motion of the transmitter, and of the receiver. [-]
 
-        The lines of sight u_t, u_r; where the direct path is the clock u_t − b, u_r + b, b to the transmitter.
+        The lines of sight u_t, u_r; with a direct path as clock u_t − b, u_r + b, with b towards the transmitter.
         """
         t, r = self.transmitter.look, self.receiver.look
         if not has_direct_path:
@@ -499,15 +499,15 @@ class BistaticGeometry:
         return angle_between_lines(self.range_gradient, self.doppler_gradient)
 
     def range_resolution(self, bandwidth_hz: Any, speed_of_light: float) -> Any:
-        """Peak to first null along φ_b on the ground, c/(B|s|). [m]"""
+        """Resolution along φ_b on the ground, peak to first null: c/(B|s|). [m]"""
         return speed_of_light / (bandwidth_hz * _hypot(*self.range_gradient))
 
     def cross_range_resolution(self, wavelength_m: Any, aperture_time_s: Any) -> Any:
-        """Peak to first null across φ_b on the ground, along a line of constant range: λ/(T|ṡ⊥|). [m]"""
+        """Resolution across φ_b on the ground, peak to first null on a line of constant range: λ/(T|ṡ⊥|). [m]"""
         across = _hypot(*self.doppler_gradient) * _sin(self.gradient_angle)
         return wavelength_m / (aperture_time_s * across)
 
 
 def angle_between_lines(a: tuple[Any, Any], b: tuple[Any, Any]) -> Any:
-    """Angle between two directions of the plane without regard to sign, 0 to π/2; 0 if one is zero. [rad]"""
+    """Angle between two lines in the plane, regardless of sign, 0 to π/2; 0 if a direction is zero. [rad]"""
     return _arctan2(abs(a[0] * b[1] - a[1] * b[0]), abs(a[0] * b[0] + a[1] * b[1]))

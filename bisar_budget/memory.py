@@ -1,25 +1,25 @@
-"""Memory that the system allows a process (`ulimit -v`, `ulimit -d`), looked at before libraries take their share.
+"""Memory that the system allows a process (`ulimit -v`, `ulimit -d`), checked before libraries take their share.
 
-A library in C ends the process where it gets none: OpenBLAS, when NumPy is imported or first multiplies matrices,
-with 1 or with the signal of an interrupt, and LLVM never returns. No code here sees that, so what is known to be
-needed is held to the limit before.
+A library in C ends the process if it gets no memory: OpenBLAS ends it with exit code 1 or with the signal of an
+interrupt, when NumPy is imported or first multiplies matrices; LLVM never returns. No code here can catch this, so
+the known need for memory is compared with the limit before.
 """
 
 import errno
 import os
 from collections.abc import Iterator
 
-# Address space, bytes. Below it the libraries were seen to end the process, or to say that they are not installed.
-LEAST = 192 << 20  # NumPy with one thread of OpenBLAS takes 134 MB, a check some more
+# Address space, bytes. With less, libraries were seen to end the process, or to report that they are not installed.
+LEAST = 192 << 20  # NumPy with one thread of OpenBLAS takes 134 MB, a check a little more
 OF_TABLES = 400 << 20
 OF_CLUSTER = 3 << 29
-_SPACIOUS = 2 << 30  # bytes; LLVM hangs in 400 MB, and each core adds threads to what Numba takes
-_NEAR = 32 << 20  # bytes; what a library asks for at once
+_SPACIOUS = 2 << 30  # bytes; LLVM hangs in 400 MB, and Numba takes more memory with each core
+_NEAR = 32 << 20  # bytes; size of a single request of a library
 _WORDS = ("failed to map segment", "annot allocate memory", "bad_alloc", "out of memory")
 
 
 def limit() -> int | None:
-    """Address space that the system allows this process [B]; None where there is no limit."""
+    """Address space that the system allows this process [B]; None without a limit."""
     try:
         import resource
     except ImportError:  # Windows
@@ -29,16 +29,16 @@ def limit() -> int | None:
 
 
 def limit_words() -> str:
-    """Words for the limit, for a message; empty without one."""
+    """Words for the limit, for a message; empty without a limit."""
     allowed = limit()
     return "" if allowed is None else f"the system allows {allowed >> 20} MB (ulimit -v, ulimit -d)"
 
 
 def spare_threads() -> None:
-    """Let libraries that are not loaded yet do with one thread, unless the environment gives OpenBLAS more.
+    """Limit libraries that are not loaded yet to one thread, unless the environment gives OpenBLAS more threads.
 
-    A second one costs a check an eighth of its time and gains nothing anywhere: products of matrices are small here.
-    Under a limit each takes tens of MB.
+    A second thread costs a check an eighth of its time and never saves time: products of matrices are small here.
+    Each thread takes tens of MB, which counts under a limit.
     """
     if limit() is not None:
         os.environ.update(OPENBLAS_NUM_THREADS="1", ARROW_DEFAULT_MEMORY_POOL="system")
@@ -47,20 +47,20 @@ def spare_threads() -> None:
 
 
 def hold_room(needed: int, purpose: str) -> None:
-    """Raise a `MemoryError` where the system allows less than is known to be needed for something. [B]"""
+    """Raise a `MemoryError` if the system allows less than the memory `needed` for a purpose. [B]"""
     allowed = limit()
     if allowed is not None and allowed < needed:
         raise MemoryError(f"{purpose} needs at least {needed >> 20} MB of memory; {limit_words()}")
 
 
 def is_spacious() -> bool:
-    """Whether there is room for LLVM."""
+    """Whether the limit leaves enough memory for LLVM."""
     allowed = limit()
     return allowed is None or allowed >= _SPACIOUS
 
 
 def ran_out(error: BaseException) -> bool:
-    """Whether an error, or one that led to it, is of memory; under a limit that was all but reached any is."""
+    """Whether an error, or a cause of it, is a lack of memory; near the memory limit any error counts as one."""
     return any(map(_says_memory, _causes(error))) or _is_near_limit()
 
 
@@ -80,13 +80,13 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 
 
 def _is_near_limit() -> bool:
-    """Whether the process once had all but a little of what it may have."""
+    """Whether the process once used nearly all of the memory that the limit allows."""
     allowed = limit()
     if allowed is None:
         return False
     try:
         with open("/proc/self/status", encoding="ascii") as file:
             peak = next(int(line.split()[1]) << 10 for line in file if line.startswith("VmPeak"))
-    except (OSError, StopIteration):  # no Linux
+    except (OSError, StopIteration):  # not Linux
         return False
     return peak > allowed - _NEAR

@@ -1,4 +1,4 @@
-"""Answers as a notebook shows them: tables and drawings in HTML, in the colours of its theme."""
+"""Answers for a notebook: tables and drawings in HTML, in the colours of the notebook's theme."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -14,7 +14,7 @@ _STYLE = """<style>
 .bisar-budget .muted { opacity: 0.7 }
 .bisar-budget svg, .bisar-budget img { max-width: 100%; height: auto }
 </style>"""
-# White on each has a contrast of at least 4.5, on light and on dark pages alike.
+# White text on each colour has a contrast of at least 4.5, on light and on dark pages.
 _COLOURS = {
     "pass": "#1a7f37",
     "pass_with_autofocus": "#1a7f37",
@@ -29,12 +29,12 @@ _COLOURS = {
 
 
 def page(*elements: str) -> str:
-    """HTML of an answer."""
+    """HTML of an answer, from its parts."""
     return f'{_STYLE}<div class="bisar-budget">{"".join(elements)}</div>'
 
 
 def heading(status: str, title: str, remark: str = "") -> str:
-    """The verdict, what it is of, and a remark beside it."""
+    """The verdict, the title of the answer, and a remark beside it."""
     texts = f' <span class="muted">{escape(remark)}</span>' if remark else ""
     return f"<p>{badge(status)} <strong>{escape(title)}</strong>{texts}</p>"
 
@@ -46,7 +46,7 @@ def badge(status: str) -> str:
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table; the values of a column `status` are badges, numbers stand to the right."""
+    """A table; the values of a column `status` are badges, numbers are aligned to the right."""
     head = "".join(f"<th>{escape(name)}</th>" for name in columns)
     body = "".join(f"<tr>{''.join(map(_cell, columns, row))}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
@@ -61,5 +61,5 @@ def _cell(column: str, value: object) -> str:
 
 
 def note(text: str) -> str:
-    """A line below."""
+    """A line of text below the answer."""
     return f'<p class="muted">{escape(text)}</p>'

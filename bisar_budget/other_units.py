@@ -1,7 +1,7 @@
-"""Units that are understood without being read: inches, mils, words, prefixes that no table has.
+"""Units that are understood but not accepted: inches, mils, words, prefixes that no table has.
 
-A message may then say what a quantity is in a unit that is read, or which spelling was meant, and never offers one
-that changes the size. Imported where a unit has been refused.
+A message can convert the quantity to an accepted unit, or suggest the spelling that was meant. It never suggests a
+unit that changes the size. The module is imported only after a unit was refused.
 """
 
 import math
@@ -13,18 +13,18 @@ from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.units import DIMENSIONS, Dimension, format_quantity, normal_unit
 
 _SAME_FACTOR = 1e-9  # relative difference of two spellings of one unit
-_SHORTEST_TYPO = 3  # characters; a shorter unit is one slip away from everything
+_SHORTEST_TYPO = 3  # characters; a shorter unit is one slip away from too many units
 _SHORTEST_PLURAL = 4  # characters: mils, days
 
 
 class UnitValue(NamedTuple):
-    """Factor of a unit to SI, and the powers of metre, second and radian in it."""
+    """Factor of a unit to SI, and the powers of metre, second and radian in the unit."""
 
     factor: float
     powers: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def times(self, other: "UnitValue", exponent: float = 1.0) -> "UnitValue":
-        """Product with a power of another unit."""
+        """Product with a power of a second unit."""
         a, b = self.powers, other.powers
         powers = (a[0] + exponent * b[0], a[1] + exponent * b[1], a[2] + exponent * b[2])
         return UnitValue(self.factor * other.factor**exponent, powers)
@@ -35,8 +35,8 @@ _SPEED, _ACCELERATION, _FREQUENCY, _TURN_RATE = (1.0, -1.0, 0.0), (1.0, -2.0, 0.
 _DEGREE = math.pi / 180
 _SI_PREFIXES = {"T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "h": 1e2, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6}
 _SI_PREFIXES |= {"n": 1e-9, "p": 1e-12, "f": 1e-15}
-# Each with the prefixes that somebody writes before it. International inch, foot, yard and mile of 1959; the rest are
-# of the SI brochure, 9th edition, tables 8 and 3, and of ISO 80000-3.
+# Each unit with its prefixes in use. International inch, foot, yard and mile of 1959; the remaining units are from
+# the SI brochure, 9th edition, tables 8 and 3, and from ISO 80000-3.
 _ATOMS: Mapping[str, tuple[float, tuple[float, float, float], str]] = {
     "1": (1.0, _PLAIN, ""),
     "%": (1e-2, _PLAIN, ""),
@@ -83,7 +83,7 @@ _ATOMS: Mapping[str, tuple[float, tuple[float, float, float], str]] = {
     "Gal": (1e-2, _ACCELERATION, "mu"),
     "TECU": (1e16, (-2.0, 0.0, 0.0), ""),
 }
-# Words in small letters and in the singular; a prefix may stand before them.
+# Words in small letters and in the singular; a word may have a prefix.
 _WORDS = {
     "arcminute": "arcmin",
     "arcsecond": "arcsec",
@@ -114,7 +114,7 @@ _WORDS = {
 _WORD_PREFIXES = {"tera": 1e12, "giga": 1e9, "mega": 1e6, "kilo": 1e3, "centi": 1e-2, "milli": 1e-3, "micro": 1e-6}
 _WORD_PREFIXES |= {"nano": 1e-9, "pico": 1e-12}
 _TOKEN = re.compile(r"\s*(sqrt\(|[()/*\u00b7]|\^-?\d(?:\.\d)?|[A-Za-z\u00b0%-]+|1)", re.ASCII)
-# Levels against something else than a carrier, by their units in small letters.
+# Levels against a reference other than a carrier, by their units in small letters.
 _OTHER_LEVELS = {
     "dbm": "a power",
     "dbw": "a power",
@@ -125,7 +125,7 @@ _OTHER_LEVELS = {
 }
 
 
-# 47°15'04.3", 47d15m, 47:15:04, N behind.
+# 47°15'04.3", 47d15m, 47:15:04, with or without a letter such as N at the end.
 _SEXAGESIMAL = re.compile(
     r"([+-]?)(\d{1,3})\s*(?:\u00b0|\u00ba|d|deg|:)\s*(\d{1,2}(?:\.\d*)?)\s*(?:['\u2032\u2019m:]|min)?"
     r"\s*(?:(\d{1,2}(?:\.\d*)?)\s*(?:[\"\u2033\u201ds]|''|sec)?)?\s*([NSEW]?)",
@@ -134,7 +134,7 @@ _SEXAGESIMAL = re.compile(
 
 
 def about_unit(digits: str, written: str, dimension: Dimension) -> tuple[str, str]:
-    """Problem and hint for a number with a unit that no dimension reads."""
+    """Problem and hint for a number with a unit that no dimension accepts."""
     unit = normal_unit(written)
     sexagesimal = _SEXAGESIMAL.fullmatch(digits + written) if dimension.si == "rad" else None
     if sexagesimal is not None:
@@ -161,20 +161,20 @@ def about_unit(digits: str, written: str, dimension: Dimension) -> tuple[str, st
             return problem, f"Did you mean {meant!r}?"
         return problem, _converted(digits, written, value.factor, dimension)
     other = next((one for one in DIMENSIONS if _powers_of(one) == value.powers), None)
-    if other is None or "Hz" in unit:  # a density that is none of the field
+    if other is None or "Hz" in unit:  # a density that is not of the field's dimension
         return problem, ""
     conversion = _converted(digits, written, value.factor, other)
     return problem, f"{conversion}, {other.name}" if conversion else ""
 
 
 def is_of(written: str, dimension: Dimension) -> bool:
-    """Whether a unit, read or only understood, is one of a dimension."""
+    """Whether a unit, accepted or only understood, belongs to a dimension."""
     value = value_of_unit(normal_unit(written))
     return value is not None and value.powers == _powers_of(dimension)
 
 
 def value_of_unit(unit: str) -> UnitValue | None:
-    """Value of a unit made of known ones by products, quotients, powers and square roots; None where it is none."""
+    """Value of a unit made of known units by products, quotients, powers and square roots; None for other text."""
     tokens: list[str] = []
     end = 0
     while end < len(unit):
@@ -191,7 +191,7 @@ def value_of_unit(unit: str) -> UnitValue | None:
 
 
 def _product(tokens: list[str]) -> UnitValue | None:
-    """Value of factors up to the end or a closing bracket; takes them from the list."""
+    """Value of the factors up to the end or a closing bracket; removes their tokens from the list."""
     value = UnitValue(1.0)
     sign = 1.0
     if tokens[0] == "/":
@@ -224,7 +224,7 @@ def _power(tokens: list[str]) -> UnitValue | None:
 
 
 def _atom(name: str) -> UnitValue | None:
-    """Value of a unit's name, with or without a prefix, or of a word for it."""
+    """Value of a unit's name, with or without a prefix, or of a word for the unit."""
     for prefix, factor in {"": 1.0, **_SI_PREFIXES}.items():
         of_name = _ATOMS.get(name.removeprefix(prefix)) if name.startswith(prefix) else None
         if of_name is not None and (not prefix or prefix in of_name[2]):
@@ -240,13 +240,13 @@ def _atom(name: str) -> UnitValue | None:
 
 
 def _powers_of(dimension: Dimension) -> tuple[float, float, float] | None:
-    """Powers of a dimension's SI unit; None of decibels and bytes."""
+    """Powers of metre, second and radian in a dimension's SI unit; None for decibels and bytes."""
     value = value_of_unit(dimension.si or "1")
     return None if value is None else value.powers
 
 
 def _of_same_size(value: UnitValue, dimension: Dimension) -> str:
-    """Unit of a dimension that is as large; empty if none is."""
+    """Unit of a dimension with the same size as `value`; empty without such a unit."""
     return next((unit for unit, factor in dimension.units.items() if unit and _is_same(factor, value.factor)), "")
 
 
@@ -255,24 +255,24 @@ def _is_same(a: float, b: float) -> bool:
 
 
 def _converted(digits: str, written: str, factor: float, dimension: Dimension) -> str:
-    """Words on what a number with a unit is in a unit that is read."""
+    """Words that convert a number with a unit to an accepted unit."""
     value = float(digits) * factor
     return f"{digits} {written} is {format_quantity(value, dimension.si, 9)}" if math.isfinite(value) else ""
 
 
 def _respelt(unit: str, dimension: Dimension) -> str:
-    """Unit of a dimension that is written like this one but for letters of the other case, or one slip.
+    """Unit of a dimension whose spelling differs from `unit` only by upper and lower case, or by one slip.
 
-    Empty where another unit that somebody may have meant is as near, and differs in size.
+    Empty if a second unit that may have been meant is as near and has a different size.
     """
     candidates = dict(_conceivable(dimension))
     spellings = {unit.lower(), normal_unit(unit.lower().replace("hz", "Hz")).lower()}
     folded = [one for one in candidates if one.lower() in spellings and len(one) > 1]
     if not _is_one_size([candidates[one] for one in folded]):
         folded = [one for one in folded if one in dimension.units]
-        is_unsure = len(folded) > 1 or folded[0][0] != unit[0]  # Mhz is no millihertz, and nobody knows what Nm is
+        is_unsure = len(folded) > 1 or folded[0][0] != unit[0]  # Mhz is not millihertz, and Nm is ambiguous
         folded = [] if is_unsure else folded
-    is_level = _powers_of(dimension) is None  # one letter of dBc makes it a power
+    is_level = _powers_of(dimension) is None  # without a letter of dBc, the unit is a power ratio
     slips = [one for one in candidates if _is_one_slip(unit, one)]
     if not _is_one_size([candidates[one] for one in (*folded, *slips)]):
         return ""
@@ -285,7 +285,7 @@ def _is_one_size(factors: list[float]) -> bool:
 
 
 def _conceivable(dimension: Dimension) -> Iterator[tuple[str, float]]:
-    """Units of a dimension, and those with other prefixes that somebody could mean, with their factors."""
+    """Units of a dimension, also with further prefixes that may be meant, with their factors."""
     powers = _powers_of(dimension)
     for unit, factor in dimension.units.items():
         if not unit:
@@ -301,7 +301,7 @@ def _conceivable(dimension: Dimension) -> Iterator[tuple[str, float]]:
 
 
 def _is_one_slip(a: str, b: str) -> bool:
-    """Whether a letter too many, too few, wrong, or two exchanged make one text of the other."""
+    """Whether two texts differ by one extra, missing or wrong letter, or by two exchanged letters."""
     if a == b or abs(len(a) - len(b)) > 1:
         return a == b
     start = next((n for n, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))

@@ -1,4 +1,4 @@
-"""Resources to work with: files that travel with the package and those of a user, and processors."""
+"""Resources of a command: files in the package, files of a user, and processors."""
 
 import os
 import stat
@@ -13,22 +13,22 @@ if TYPE_CHECKING:
 
 @cache
 def resource(*parts: str) -> "Path":
-    """Path of a bundled file: inside an installed package, at the top level of a checkout."""
-    from pathlib import Path  # a check does without
+    """Path of a bundled file: inside an installed package, or at the top level of a checkout."""
+    from pathlib import Path  # a check does not need it
 
     package = Path(__file__).resolve().parent
     installed = package.joinpath(*parts)
     return installed if installed.exists() else package.parent.joinpath(*parts)
 
 
-# Device and inode of the files that were read since a command began: no result may replace one.
+# Device and inode of the files that were read since a command began: no result may replace such a file.
 FILES_READ: set[tuple[int, int]] = set()
 
 
 class FilesHeld:
-    """The files of a command as it first read them: all of its formats and reports are of that.
+    """The files of a command as first read: all formats and reports of the command use this content.
 
-    Contents are kept up to 64 MB together, then hashes: a larger file that changes meanwhile is refused.
+    It keeps contents up to 64 MB in total, and hashes beyond: a larger file that changes meanwhile is refused.
     """
 
     def __init__(self) -> None:
@@ -37,7 +37,7 @@ class FilesHeld:
         self.room = _MOST_HELD
 
     def content(self, file: str, most: int, read: Callable[[], bytes]) -> bytes:
-        """Content of a file as it was read first, at most so many bytes and one; else `read` gives it."""
+        """Content of a file as first read, at most `most` + 1 bytes; `read` gives the content of an unread file."""
         key = (file if file == "-" else os.path.normpath(file), most)
         known = self.known.get(key)
         if isinstance(known, bytes):
@@ -62,24 +62,24 @@ class FilesHeld:
 
 
 _MOST_HELD = 64 << 20  # bytes
-_held: FilesHeld | None = None  # none outside of a command: who calls functions reads what is there
+_held: FilesHeld | None = None  # None outside of a command: a caller of functions reads the current files
 
 
 def hold_files() -> None:
-    """Begin a command: no file was read yet, and each that is read stays as it was."""
+    """Begin a command: forget the files that were read, and keep the content of each file from its first reading."""
     global _held
     FILES_READ.clear()
     _held = FilesHeld()
 
 
 def release_files() -> None:
-    """End a command: files are read as they are."""
+    """End a command: further reads give the current files."""
     global _held
     _held = None
 
 
 def held(file: str, most: int, read: Callable[[], bytes]) -> bytes:
-    """Content of a file as this command read it first; outside of a command, as `read` gives it."""
+    """Content of a file as this command first read it; outside of a command, the content that `read` gives."""
     return read() if _held is None else _held.content(file, most, read)
 
 
@@ -96,9 +96,9 @@ _STREAMS = (
 
 
 def special_file(path: str) -> str:
-    """Kind of a file that waits, or never ends: a named pipe, a device, a socket; empty for any other.
+    """Kind of a file that waits or never ends: a named pipe, a device, a socket; empty for other files.
 
-    Streams that this process has open, such as those of a shell's `<(…)`, are none of them.
+    Open streams of this process, such as the streams of a shell's `<(…)`, do not count as special files.
     """
     if os.path.abspath(path).startswith(_STREAMS):
         return ""
@@ -114,7 +114,7 @@ def special_file(path: str) -> str:
 
 
 class UnreadableError(Exception):
-    """A file that cannot be read. The message begins with its name; `is_missing` where there is none of it."""
+    """A file that cannot be read. The message begins with its name; `is_missing` if the file does not exist."""
 
     def __init__(self, message: str, *, is_missing: bool = False) -> None:
         super().__init__(message)
@@ -137,39 +137,39 @@ def _read(file: str, most: int, called: str) -> bytes:
 
 
 def standard_input() -> BinaryIO:
-    """Bytes of standard input; raises `ValueError` where there is none."""
+    """Bytes of standard input; raises `ValueError` without a standard input."""
     if sys.stdin is None:
         raise ValueError("standard input is closed")
     return sys.stdin.buffer
 
 
 class Files(Protocol):
-    """Where the files of a project are read: on the disk, or in a git revision (`mission.revision`)."""
+    """Source of the files of a project: the disk, or a git revision (`mission.revision`)."""
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
-        """Content of a regular file; of a larger one than `most` bytes so many and one more.
+        """Content of a regular file; the first `most` + 1 bytes of a file that is larger than `most`.
 
         Parameters
         ----------
         file : str
-            Where it is.
+            Path of the file.
         most : int
-            Bytes. What is larger is for the caller to refuse.
+            Limit in bytes. The caller must refuse a larger file.
         called : str, optional
-            What messages call it, instead of `file`.
+            Name of the file in messages, instead of `file`.
 
         Raises
         ------
         UnreadableError
-            It cannot be read, or is no regular file: a pipe would be waited for, and a device never ends.
+            The file cannot be read, or is not a regular file: a read of a pipe would wait, and a device never ends.
         """
 
     def names(self, folder: str) -> list[str]:
-        """Names of the files in a folder, sorted; raises `OSError` where it cannot be listed."""
+        """Names of the files in a folder, sorted; raises `OSError` if the folder cannot be listed."""
 
 
 class Disk:
-    """The files as they stand, or as this command read them first."""
+    """The current files on the disk, or the files as this command first read them."""
 
     @staticmethod
     def content(file: str, most: int, called: str | None = None) -> bytes:
@@ -186,14 +186,14 @@ DISK = Disk()
 
 
 def locked(folder: str) -> int | None:
-    """Lock a folder for this process, until it closes what is returned or ends; None where no lock can be had.
+    """Lock a folder for this process, until it closes the returned descriptor or ends; None if locks do not exist.
 
     Raises
     ------
     BlockingIOError
-        Another process has it.
+        Another process has the lock.
     OSError
-        There is no such folder, or it is not for this user.
+        The folder does not exist, or the user may not open it.
     """
     try:
         import fcntl
@@ -216,7 +216,7 @@ def cores() -> int:
 
 
 def docstring(documented: Any) -> str:
-    """Docstring of a class or function at the top of its module; from the source where Python dropped it (-OO)."""
+    """Docstring of a class or function at the top of its module; from the source if Python dropped it (-OO)."""
     if sys.flags.optimize < 2:
         return documented.__doc__ or ""
     import ast

@@ -1,4 +1,4 @@
-"""A project's defaults for `check`: the table `[tool.bisar-budget]` of the nearest `pyproject.toml` that has one."""
+"""A project's defaults for `check`: the table `[tool.bisar-budget]` of the nearest `pyproject.toml` that has it."""
 
 import os
 import re
@@ -30,26 +30,26 @@ _MOST_DOTS = 1000  # on a line: tomllib's time grows with the square of the part
 
 
 class SettingsError(Exception):
-    """A table that cannot be used; the message names file and key."""
+    """A table that cannot be used; the message names the file and the key."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """The keys and values of the table; `file` is where it stands, for messages."""
+    """The keys and values of the table; `file` is the file of the table, for messages."""
 
     file: str
     values: Mapping[str, Any]
 
 
 def project_settings(folder: str, files: Files = DISK) -> Settings | None:
-    """Read the table for a folder from `files`; None if no `pyproject.toml` in it or above has one.
+    """Read the table for a folder from `files`; None if no `pyproject.toml` in the folder or above has the table.
 
-    Names of reports and folders of sensors are relative to the file that says them.
+    Names of reports and folders of sensors are relative to the file that states them.
 
     Raises
     ------
     SettingsError
-        No regular file, neither UTF-8 nor TOML, an unknown key, or a value of the wrong type.
+        Not a regular file, neither UTF-8 nor TOML, an unknown key, or a value of the wrong type.
     """
     folder = os.path.abspath(folder)
     while True:
@@ -64,7 +64,7 @@ def project_settings(folder: str, files: Files = DISK) -> Settings | None:
 
 @lru_cache(maxsize=4)
 def _parsed(file: str, data: bytes) -> Settings | None:
-    """The table of a `pyproject.toml`, None without one; every mission of a fleet that names a part asks for it."""
+    """The table of a `pyproject.toml`, None without it; cached, since every mission that names a part reads it."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -77,7 +77,7 @@ def _parsed(file: str, data: bytes) -> Settings | None:
 
     try:
         document = tomllib.loads(text)
-    except ValueError as error:  # a whole number of thousands of digits too
+    except ValueError as error:  # also for an integer with thousands of digits
         raise SettingsError(f"{file}: is not valid TOML: {error}") from None
     except RecursionError:
         raise SettingsError(f"{file}: is nested too deep to be read") from None
@@ -97,7 +97,7 @@ def _parsed(file: str, data: bytes) -> Settings | None:
 
 
 def _bytes_of(file: str, files: Files) -> bytes | None:
-    """Content of a file, None where there is none."""
+    """Content of a file, None if the file does not exist."""
     try:
         data = files.content(file, _LARGEST, f"{file}:")
     except UnreadableError as error:
@@ -120,7 +120,7 @@ def _hold_to_type(file: str, key: str, value: object) -> None:
         raise SettingsError(f"{file}: {TABLE}.{shown(key)}: {problem}")
     is_right = type(value) is kind and (kind is not list or all(type(name) is str for name in value))  # type: ignore[attr-defined]
     if type(value) is int:
-        is_right = is_right and abs(value) < 1 << 64  # beyond it, it could not even be said
+        is_right = is_right and abs(value) < 1 << 64  # a message cannot print a larger integer
     if not is_right:
         raise SettingsError(f"{file}: {TABLE}.{key}: must be {_KINDS[kind]} (got {_said(value)})")
 
@@ -128,5 +128,5 @@ def _hold_to_type(file: str, key: str, value: object) -> None:
 def _said(value: object) -> str:
     try:
         return shown(repr(value))
-    except (ValueError, RecursionError):  # digits without end, lists in lists
+    except (ValueError, RecursionError):  # an endless number of digits, nested lists
         return "one too large to be shown"

@@ -1,6 +1,6 @@
-"""Quantities as text: `9.6 GHz` to SI on the way in, SI to `9.60 GHz` on the way out.
+"""Quantities as text: read `9.6 GHz` to SI, write SI as `9.60 GHz`.
 
-A small table of its own, because general unit libraries read `3 dBi` as three ampere.
+The module has its own small table, because general unit libraries read `3 dBi` as three ampere.
 """
 
 import math
@@ -11,19 +11,19 @@ from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.faults import InvalidValueError
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-# What nearly every quantity looks like; all else is looked at closely.
+# The form of nearly every quantity; `_parse_closely` reads the remaining forms.
 _plain_quantity = re.compile(
     r"([+-]?(?:0|[1-9]\d{0,20})(?:\.\d{0,20})?(?:[eE][+-]?\d{1,3})?) ?([^\s\d]\S{0,20})?", re.ASCII
 ).fullmatch
-_MAX_TEXT = 64  # characters; longer text is no quantity anybody wrote
+_MAX_TEXT = 64  # characters; longer text is not a quantity
 
 
 class Dimension:
     """A kind of quantity: its name with article, the unit of a bare number, every unit with its factor.
 
-    `scales` maps what can stand behind a number to a factor and a divisor, of which one is 1: dividing by a whole
-    number keeps decimals exact, 5 mm is 0.005 m to the bit. `usual` names the units of which one has to stand there;
-    empty where a bare number is in SI. `offsets` are units of decibels that are read by adding a number.
+    `scales` maps each accepted unit to a factor and a divisor, one of them 1: dividing by a whole number keeps
+    decimals exact, 5 mm is 0.005 m to the bit. `usual` names the usual units if every number needs a unit; it is
+    empty if a bare number is in SI. `offsets` are units of decibels that are read by adding a number.
     """
 
     def __init__(
@@ -40,12 +40,12 @@ class Dimension:
 
     @property
     def unit_names(self) -> tuple[str, ...]:
-        """Units that are read, as messages and documents list them."""
+        """Accepted units, as messages and documents list them."""
         return (*filter(None, self.units), *self.offsets)
 
     @property
     def accepted(self) -> str:
-        """Say which units may stand behind the number."""
+        """Words that list the accepted units of the number."""
         units = ", ".join(self.unit_names)
         if self.usual:
             return f"accepted: {self.name} in {units}; only zero needs no unit"
@@ -95,7 +95,7 @@ ACCELERATION = Dimension(
 )
 JERK = Dimension("a jerk", "m/s^3", {f"{unit}/s^3": factor for unit, factor in _LENGTHS.items()})
 SNAP = Dimension("a snap", "m/s^4", {f"{unit}/s^4": factor for unit, factor in _LENGTHS.items()})
-# Readers think in degrees, formulas in radians: 45 without its unit is one in one file and the other in the next.
+# Readers think in degrees, formulas in radians: 45 without its unit is degrees in one file and radians in the next.
 ANGLE = Dimension(
     "an angle",
     "rad",
@@ -107,7 +107,7 @@ _DAY = 86400.0
 _AGES = {"/day": 1 / _DAY, "1/day": 1 / _DAY, "/month": 1 / (30 * _DAY), "/year": 1 / (365.25 * _DAY)}
 _AGES |= {"ppm/day": 1e-6 / _DAY, "ppb/day": 1e-9 / _DAY}
 RATE = Dimension("a rate", "1/s", {"1/s": 1.0, "/s": 1.0, "s^-1": 1.0, "Hz": 1.0, "s/s^2": 1.0} | _AGES)
-# A bare 1e-10 would be the aging of a day in a second.
+# A bare 1e-10 per second would be the aging of a whole day in one second.
 AGING = Dimension("an aging rate", "1/s", _AGES | {"/s": 1.0, "1/s": 1.0}, usual=("/day",))
 RATE_SQUARED = Dimension("a rate per second", "1/s^2", {"1/s^2": 1.0, "/s^2": 1.0, "s^-2": 1.0, "s/s^3": 1.0})
 POWER_RATIO = Dimension("a power ratio in decibel", "dB", {"dB": 1.0})
@@ -121,7 +121,7 @@ ANGULAR_RATE = Dimension(
     | {"deg/s": _DEGREE, "mdeg/s": 1e-3 * _DEGREE, "deg/min": _DEGREE / 60, "deg/h": _DEGREE / 3600},
     usual=("deg/h", "deg/s"),
 )
-_ROOT_HOUR = 1 / 60  # of an hour's root, in roots of a second
+_ROOT_HOUR = 1 / 60  # 1/√h in 1/√s
 VELOCITY_RANDOM_WALK = Dimension(
     "a velocity random walk",
     "m/s/sqrt(s)",
@@ -156,7 +156,7 @@ ELECTRON_CONTENT = Dimension(
     {"TECU": 1e16, "1/m^2": 1.0, "/m^2": 1.0, "m^-2": 1.0},
     usual=("TECU",),
 )
-# L(f) is half of the one-sided density of phase: IEEE Std 1139.
+# L(f) is half of the one-sided density of phase, by IEEE Std 1139.
 PHASE_NOISE = Dimension(
     "a phase noise L(f)",
     "dBc/Hz",
@@ -197,10 +197,10 @@ MEMORY = Dimension("an amount of memory", "B", _scaled("B", "kMGT") | {"KB": 1e3
 
 DIMENSIONS = tuple(found for found in globals().values() if isinstance(found, Dimension))
 
-# Spellings of data sheets, one after the other, as the tables of units have them: °/√hr is deg/sqrt(h).
+# Spellings of data sheets, replaced in this order by the spellings of the unit tables: °/√hr is deg/sqrt(h).
 _SPELLINGS = (
     ("[µμ]", "u"),  # the micro sign and the Greek letter
-    ("[º˚]", "°"),  # the ordinal sign and the ring, which stand in for the degree sign
+    ("[º˚]", "°"),  # the ordinal sign and the ring, written in place of the degree sign
     (r"\*\*", "^"),
     (r"\s*([/^])\s*", r"\1"),
     ("²", "^2"),
@@ -220,34 +220,34 @@ _SPELLINGS = (
     (r"/(s|h|Hz)\^(?:0?\.5|\(?1/2\)?|½)$", r"/sqrt(\1)"),
     (r"\(hr\)", "(h)"),
 )
-# Decibels against a carrier have no other unit near them: what is meant where one stands in the place of another.
+# Decibel units: in place of a different decibel unit, each can only mean the unit of the dimension.
 _DECIBELS = ("dB", "dBc")
 
-# By the unit that rows are in; a clock's linear term is a ratio of times, a scale factor one of accelerations.
+# Keys are the units of rows; a clock's linear term is a ratio of times, a scale factor a ratio of accelerations.
 _OF_SI = {dimension.si: dimension for dimension in reversed(DIMENSIONS) if dimension.si} | {"s/s": RATIO, "1": RATIO}
 
 
 def parse_quantity(value: object, dimension: Dimension) -> float:
-    """Read `31 km`, `9.6GHz`, `2 µrad`, `1e-12`; a bare number is SI, in decibels where the dimension is.
+    """Read `31 km`, `9.6GHz`, `2 µrad`, `1e-12`; a bare number is in SI, or in decibels for a dimension in decibels.
 
     A bare angle is refused, except zero.
 
     Parameters
     ----------
     value : str, int or float
-        What the mission file says.
+        Value in the mission file.
     dimension : Dimension
-        What it has to be.
+        Required dimension of the value.
 
     Returns
     -------
     float
-        Finite. In SI; decibels stay decibels.
+        Finite number in SI; decibels remain decibels.
 
     Raises
     ------
     InvalidValueError
-        Not a number, not finite, an unknown unit, a unit of another dimension, or none where one is needed.
+        Not a number, not finite, an unknown unit, a unit of a different dimension, or no unit if a unit is required.
     """
     plain = _plain_quantity(value) if type(value) is str else None
     if plain is not None:
@@ -261,7 +261,7 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
 
 
 def _parse_closely(value: object, dimension: Dimension) -> float:
-    """Read every accepted way to write a quantity, and say what is wrong with the others."""
+    """Read every accepted form of a quantity; an error says why a different form is wrong."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise _invalid(f"must be {dimension.name}", dimension)
     if not isinstance(value, str):
@@ -290,9 +290,9 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
 
 
 def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "nearest") -> str:
-    """Write an SI value with a prefix that keeps it readable: 0.005 m/s^2 is `5 mm/s²`.
+    """Write an SI value with a readable prefix: 0.005 m/s^2 is `5 mm/s²`.
 
-    `rounding` is `nearest` or `down`; a limit is rounded down so that copying it from the page still passes.
+    `rounding` is `nearest` or `down`; a limit is rounded down, so that the printed limit still passes.
     """
     size, suffix = abs(value), ""
     for scale, smallest, largest, its_suffix in _steps(unit):
@@ -300,8 +300,8 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
         if smallest <= size < largest:
             value /= scale
             break
-    text = "%.*g" % (digits, value)  # noqa: UP031 -- a table has thirty of these, and format() takes twice as long
-    if unit == "dB" and rounding == "down" and value < 0:  # a lower level is the stricter one
+    text = "%.*g" % (digits, value)  # noqa: UP031 -- a table has thirty numbers, and format() takes twice as long
+    if unit == "dB" and rounding == "down" and value < 0:  # a lower level is stricter
         return _stricter(value, digits) + suffix
     if "e" in text or (rounding == "down" and abs(float(text)) > abs(value)):
         text = _rounded(value, digits, rounding)
@@ -309,16 +309,16 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
 
 
 def unit_behind(text: str) -> str:
-    """Unit that stands behind the number of a text, as written; the whole text where it has no number."""
+    """Unit after the number of a text, as written; the whole text if it has no number."""
     text = text.strip()
     match = _NUMBER.match(text)
     return text[match.end() :].strip() if match else text
 
 
 def given_unit(text: str, unit: str) -> str:
-    """Unit that a text states its number in, as the tables of units have it.
+    """Unit of the number in a text, spelt as in the tables of units.
 
-    Empty where it is no quantity of the dimension of `unit`, the SI one, or states none.
+    Empty if the text has no unit or is not a quantity of the dimension of `unit`, which is an SI unit.
     """
     match = _NUMBER.match(text.strip()) if len(text) <= _MAX_TEXT else None
     dimension = _OF_SI.get(unit)
@@ -330,9 +330,10 @@ def given_unit(text: str, unit: str) -> str:
 
 
 def format_in(value: float, unit: str, given: str, digits: int = 3, rounding: str = "nearest") -> str:
-    """Write an SI value in a unit of the same dimension: 349 µrad is `0.02 deg` where the file speaks of degrees.
+    """Write an SI value in a unit of the same dimension: 349 µrad is `0.02 deg` if the file uses degrees.
 
-    Without a unit, as `format_quantity` does. What takes more than six digits, or zeros, has a power of ten.
+    Without a unit the text is the same as by `format_quantity`. A number with more than six digits or zeros has a
+    power of ten.
     """
     if not given or unit == "dB" or not math.isfinite(value):
         return format_quantity(value, unit, digits, rounding)
@@ -346,7 +347,7 @@ def format_in(value: float, unit: str, given: str, digits: int = 3, rounding: st
 
 @cache
 def _pretty(given: str) -> str:
-    """Write a unit of the tables behind a number: `um` is µm, `m/s^2` m/s², `deg/sqrt(h)` deg/√h, `1/s` /s."""
+    """Write a unit of the tables for print: `um` is µm, `m/s^2` m/s², `deg/sqrt(h)` deg/√h, `1/s` /s."""
     text = given.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("°", "deg")
     text = re.sub(r"sqrt\((\w+)\)", r"√\1", text)
     text = re.sub(r"^u(?=m|g|s|rad|Gal)", "µ", text)
@@ -354,12 +355,12 @@ def _pretty(given: str) -> str:
 
 
 def format_limit(limit: float, unit: str) -> str:
-    """Write a limit, rounded down; radians without a prefix, for the eye that knows π/4."""
+    """Write a limit, rounded down; radians without a prefix, so that readers recognise π/4."""
     return f"{_rounded(limit, 3, 'down')} rad" if unit == "rad" else format_quantity(limit, unit, 3, "down")
 
 
 _SMALL = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-# Nobody says kilometre per second squared, or megametre.
+# Kilometres per second squared and megametres are not in use.
 _STEPS = {
     "Hz": ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, "")),
     "m": ((1e3, "k"), *_SMALL),
@@ -368,7 +369,7 @@ _STEPS = {
     "m/s": _SMALL,
     "m/s^2": _SMALL,
 }
-# Written in the units of data sheets: factor to SI, and what stands behind the number.
+# Units of data sheets: factor to SI, and the text after the number.
 _SHEETS = {
     "rad/s": (_DEGREE / 3600, " deg/h"),
     "m/s/sqrt(s)": (_ROOT_HOUR, " m/s/√h"),
@@ -382,7 +383,7 @@ _SHEETS = {
 
 @cache
 def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
-    """Scale, range of sizes written in it and what stands behind the number, for each prefix; last, the bare unit."""
+    """Scale, range of sizes and text after the number, for each prefix; the unit without a prefix comes last."""
     if unit in _SHEETS:
         scale, suffix = _SHEETS[unit]
         return ((scale, 0.0, math.inf, suffix),)
@@ -392,7 +393,7 @@ def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
 
 
 def _stricter(level: float, digits: int) -> str:
-    """Write a negative level so that it is not above what it is."""
+    """Write a negative level, rounded so that the text is not above the level."""
     step = 10.0 ** (math.floor(math.log10(-level)) - digits + 1)
     return f"{math.floor(level / step * (1 - 1e-12)) * step:.{digits}g}"
 
@@ -424,7 +425,7 @@ def _finite(number: float, dimension: Dimension) -> float:
 
 @lru_cache(256)
 def normal_unit(unit: str) -> str:
-    """Write a unit as the tables of units do: `µrad` is `urad`, `m/s²` is `m/s^2`, `°/√hr` is `deg/sqrt(h)`."""
+    """Spell a unit as in the tables of units: `µrad` is `urad`, `m/s²` is `m/s^2`, `°/√hr` is `deg/sqrt(h)`."""
     unit = unit.strip()
     for pattern, meant in _SPELLINGS:
         unit = re.sub(pattern, meant, unit)
@@ -436,7 +437,7 @@ def _invalid(problem: str, dimension: Dimension, hint: str = "") -> InvalidValue
 
 
 def _wrong_unit(digits: str, written: str, dimension: Dimension) -> InvalidValueError:
-    """Say that a unit is none of a dimension, or of another one, and which was meant."""
+    """Error for a unit that is unknown or belongs to a different dimension, with the unit that was probably meant."""
     unit = normal_unit(written)
     if unit.startswith(","):
         return _invalid("has a decimal comma", dimension, "Write a point")

@@ -1,4 +1,4 @@
-"""Long work: how far it is, who shares it, and worker processes that end when the command does, whatever ends it."""
+"""Long work: its progress, its distribution, and worker processes that always end with the command."""
 
 import os
 import signal
@@ -15,32 +15,32 @@ from typing import Any
 
 from bisar_budget.faults import WorkerLostError
 
-Progress = Callable[[int, int], None]  # is told how much is done, and how much there is in all
+Progress = Callable[[int, int], None]  # receives the finished amount and the total amount
 
-# Has others call a function with what is common and each block; gives each block with what came of it, in any order.
-# The last argument says of a block what it is, for messages.
+# Lets workers call a function with the common data and each block; gives each block with its result, in any order.
+# The last argument is a function that describes a block in messages.
 MapBlocks = Callable[[Callable[[Any, Any], Any], Any, Iterable[Any], Callable[[Any], str]], Iterator[tuple[Any, Any]]]
 
-_PATIENCE = 10.0  # s for the pool's own thread, which ends as soon as its workers have
+_PATIENCE = 10.0  # s to wait for the pool's own thread, which ends as soon as its workers end
 
 
 def unseen(done: int, total: int) -> None:
-    """Progress that nobody looks at."""
+    """Progress that is not shown."""
 
 
 @contextmanager
 def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExecutor]:
-    """Give a pool of processes that leaves none behind.
+    """Give a pool of processes that leaves no process behind.
 
     `start` is `spawn` for fresh interpreters: a fork would copy the threads of a numerical library half way. A
-    `WorkerLostError` says that something ended a worker: the system does when memory runs out.
+    `WorkerLostError` reports that a worker was ended from outside, as by the system when memory runs out.
     """
     worker_count = set(threading.enumerate())
     pool = ProcessPoolExecutor(count, mp_context=get_context(start), initializer=_begin)
     try:
         yield pool
-    except BaseException as error:  # an interrupt or a signal too: the work that is left serves nobody
-        threading.excepthook = lambda _: None  # the pool's own thread may stumble over workers that are gone
+    except BaseException as error:  # also for an interrupt or a signal: the remaining work is useless
+        threading.excepthook = lambda _: None  # the pool's own thread may fail on workers that have ended
         pool.shutdown(wait=False, cancel_futures=True)
         for worker in active_children():
             worker.terminate()
@@ -54,7 +54,7 @@ def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExe
 
 
 def in_processes(count: int) -> MapBlocks:
-    """Processes of its own for blocks, which come in their order; none is far ahead of what has been asked for."""
+    """Map blocks in `count` processes; results come in the order of the blocks, computed only a little in advance."""
 
     def mapped(
         function: Callable[[Any, Any], Any], common: Any, blocks: Iterable[Any], about: Callable[[Any], str]
@@ -73,7 +73,7 @@ def in_processes(count: int) -> MapBlocks:
 
 
 def _begin() -> None:
-    """Leave interrupts to the parent, end with it, and keep to oneself what a library warns of."""
+    """Begin a worker: leave interrupts to the parent, end with the parent, and hide warnings of libraries."""
     warnings.simplefilter("ignore")
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in ("SIGTERM", "SIGHUP"):  # a fork has the handlers of the command

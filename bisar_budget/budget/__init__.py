@@ -1,6 +1,6 @@
-"""From an analysis to findings: each error and their sums held to what is allowed, waivers, many files."""
+"""From an analysis to findings: limits on each error and on sums of errors, waivers, checks of many files."""
 
-# What other rooms may use.
+# Modules that other rooms may use.
 __all__ = [
     "aggregates",
     "check",

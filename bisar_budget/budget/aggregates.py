@@ -1,4 +1,4 @@
-"""Declared errors together: phases of platforms and mission, cubic phase, location, autofocus pull-in, scene edge."""
+"""Rows of sums of errors: phases of platforms and mission, cubic phase, location, autofocus pull-in, scene edge."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -39,7 +39,7 @@ PULL_IN = "autofocus_pull_in"
 
 
 class Aggregates:
-    """Errors together in many cases."""
+    """Rows of sums of errors in many cases."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         self.judging, self.together, self.array = judging, analysis.together, judging.array
@@ -47,13 +47,13 @@ class Aggregates:
         self.needs, self.combine = self.errors.mission.requirements, self.errors.mission.allocation.combine
 
     def rows(self, model: str) -> Iterator["Aggregate"]:
-        """Every row by one model, which the other may doubt, in the order of the contract."""
+        """All rows by one model, in the order of the contract; the other model may turn a pass into a warning."""
         mine, theirs = self.together(model), self.together(OTHER_MODEL[model])
         if self.combine == "each":
             yield self._largest_quadratic(mine, theirs)
         else:
             owners = ("transmitter", "receiver", "clock", "mission")
-            has_clock = self.allocation.qpe.clock is not None  # else it counts with the receiver
+            has_clock = self.allocation.qpe.clock is not None  # else the clock counts with the receiver
             yield from (self._quadratic(mine, theirs, owner) for owner in owners if owner != "clock" or has_clock)
         yield self._cubic(mine, theirs)
         yield self._location(mine, theirs)
@@ -85,7 +85,7 @@ class Aggregates:
         return aggregate.of_equal_loss(equal_loss, equal_loss if is_full else theirs.judged(full, gain=1.0))
 
     def _largest_quadratic(self, mine: Together, theirs: Together) -> "Aggregate":
-        """A warning where each error stands alone and all together exceed the total; else there is no row."""
+        """A warning if errors are judged alone and their root-sum-square exceeds the total; otherwise no row."""
         row_subject, phases = subject("mission", QUADRATIC), mine.judged_parts(mine.phases)
         size, of_all = mine.judged(mine.phases), mine.judged(mine.phases, "rss")
         limit = self.allocation.qpe_total * self.allocation.autofocus_gain
@@ -146,7 +146,7 @@ class Aggregates:
         return [error for error in self.together("full").random if split.includes(error.owner, owner)]
 
     def _is_declared(self, members: Iterable[DeclaredPhase]) -> Truths:
-        """Cases in which any of these is declared."""
+        """Cases in which any of the phases is declared."""
         is_declared = np.zeros(self.judging.cases, dtype=bool)
         for member in members:
             is_declared |= member.is_there
@@ -169,11 +169,11 @@ class Aggregates:
         continued: tuple[str, Sequence[RandomError]] = ("quadratic", ()),
         **fields: Any,
     ) -> "Aggregate":
-        """Judge what errors add up to; a sum without a finite value fails: one of them has no image at all.
+        """Judge the sum of errors; a sum without a finite value fails: an error in it has no image.
 
-        `without_value` is its status there, where it is another one. `continued` names the part of random errors that
-        the row adds up, and those errors: a pass that rests on noise below the first points of masks is a warning,
-        and one that rests on noise in doubt is not evaluated.
+        `without_value` is the status of such a sum, if it is not a fail. `continued` names the effect of random
+        errors that the row adds up, and these errors. A pass that depends on noise below the first points of masks
+        becomes a warning; a pass that depends on noise in doubt is not evaluated.
         """
         rests_on: Any = False
         is_in_doubt: Any = False
@@ -212,11 +212,11 @@ class Aggregates:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Aggregate(FamilyRow):
-    """One row of errors together, by a model, in many cases.
+    """One row of the sum of errors, by a model, in many cases.
 
-    `rule` combines the `phases`; those of displacements are none. `by_other` is the sum by the model that does not
-    gate, `of_all` the root-sum-square where the row is the largest part; where either breaks the limit, a pass is a
-    warning.
+    `rule` combines the `phases`; a row of displacements has no phases. `by_other` is the sum by the model that does
+    not gate. `of_all` is the root-sum-square of all errors if the row has the largest error instead of a sum. A pass
+    becomes a warning if `by_other` or `of_all` breaks the limit.
     """
 
     rule: str
@@ -226,14 +226,15 @@ class Aggregate(FamilyRow):
     is_over_by_other: Any = False
     is_over_of_all: Any = False
     without_autofocus: Any = 0.0
-    rests_on: Any = False  # noise below the first points of masks, which `continued` names as `Aggregates._row`
+    rests_on: Any = False  # depends on noise below the first points of masks; `continued` as in `Aggregates._row`
     continued: tuple[str, Sequence[RandomError]] = ("quadratic", ())
-    is_in_doubt: Any = False  # the noise that it rests on
+    is_in_doubt: Any = False  # the noise that the row depends on is in doubt
 
     def of_equal_loss(self, equal_loss: Floats, of_full: Floats) -> "Aggregate":
-        """The row with the phase of equal loss as declared; of what autofocus does not correct it may be less.
+        """The row with the phase of equal loss as the declared value.
 
-        What is allowed of it is declared over utilization, where anything is declared.
+        The phase of equal loss may be smaller because of the phase that autofocus does not correct. The allowable is
+        scaled by the same factor, so that the utilization remains; without a declared phase it is unchanged.
         """
         judged = self.judged
         with np.errstate(all="ignore"):
@@ -247,7 +248,7 @@ class Aggregate(FamilyRow):
         return replace(self, judged=judged)
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         mission, row_subject = case.mission, self.judged.subject
         groups, combine, owner = case.analysis.groups, mission.allocation.combine, row_subject.owner
         numbers = map(case.number, (self.judged.declared, self.judged.allowable))
@@ -285,7 +286,7 @@ class Aggregate(FamilyRow):
         )
 
     def _passes_with(self, case: Case, model: str) -> Note:
-        """Say from which N_pull the sum would pass, or that no autofocus corrects it."""
+        """Note on the N_pull from which on the sum would pass, or that no autofocus corrects the sum."""
         together, owner = case.analysis.together(model), self.judged.subject.owner
         members = together.owed(case.allocation.qpe, owner)
         quadratic = case.number(together.combined(quadratics(members)))
@@ -308,10 +309,10 @@ def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
 
 
 def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> list[UntakenEffect]:
-    """Find the effects that no requirement takes, and the rows that make them up where they are not negligible.
+    """Find the effects that no requirement covers, and the rows that make up each effect that is not negligible.
 
-    By several models that gate the larger of each counts. `instead` are errors that count instead of those with their
-    ids.
+    With several gating models the largest value of each effect counts. `instead` are errors that replace the errors
+    with the same ids.
     """
     needs = analysis.mission.requirements
     level = negligible_rad(analysis.mission)
@@ -331,7 +332,7 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
                 sizes[row_id] = np.fmax(sizes.get(row_id, 0.0), np.abs(size))
         if not sizes:
             continue
-        # One without an image fails by itself.
+        # An error without an image fails by its own row.
         total = np.where(np.isfinite(sum_of_all), sum_of_all, 0.0)
         sizes = {row_id: np.where(np.isfinite(size), size, 0.0) for row_id, size in sizes.items()}
         largest = np.max(list(sizes.values()), axis=0)
@@ -344,7 +345,7 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
 
 
 def _exchanged(phases_by_kind: Mapping[str, Phases], errors: Sequence[RandomError], model: str) -> dict[str, Phases]:
-    """Parts of effects with those of random errors in place of the parts that have their ids. [rad]"""
+    """Parts of effects, with the parts of `errors` in place of the parts with the same ids. [rad]"""
     ids = {error.id for error in errors}
     exchanged = {kind: [phase for phase in phases if phase[0] not in ids] for kind, phases in phases_by_kind.items()}
     for error in errors:
@@ -355,18 +356,18 @@ def _exchanged(phases_by_kind: Mapping[str, Phases], errors: Sequence[RandomErro
 
 # ---------------------------------------------------------------------- displacements that no row holds
 def unplaced(together: Together) -> dict[str, Truths]:
-    """Find the clocks that displace the image by an amount that the file leaves open, and in which cases."""
+    """Find the clocks that displace the image by an amount that the file does not state, with the cases."""
     return {error.subject.id: together.errors.array(error.displaces_unknown) > 0 for error in together.random}
 
 
 # ---------------------------------------------------------------------- in words
 class _Words(NamedTuple):
-    """How a row says what adds up, in which unit, and where the file states what it is held to."""
+    """Words of a row: the effect that adds up, its unit, the place of its limit in the file, and the equations."""
 
     what: str
     unit: str
     path: KeyPath
-    equation: tuple[str, str]  # by the published and by the full model
+    equation: tuple[str, str]  # by the published model, by the full model
 
 
 _EQUATIONS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "each": "largest of the rows"}
@@ -386,7 +387,7 @@ def _wording_of(row_subject: Subject, rule: str) -> _Words:
 
 
 def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, Note]:
-    """Which part is the largest, its size, and what it rests on beside the file."""
+    """Id of the largest part, its size, and a note on data that it uses beyond the file."""
     together, kind = case.analysis.together(model), aggregate.judged.subject.kind
     if kind == LOCATION:
         sizes = [(row_id, math.hypot(*move)) for row_id, move in together.displacement_parts(case.place)]
@@ -400,7 +401,7 @@ def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, 
 
 
 def _folded_spur(case: Case, row_id: str, size: float, kind: str) -> Note:
-    """Name the spur that makes most of an oscillator's phase, as exchanges fold it; nothing where noise does."""
+    """Name the folded spur that makes most of an oscillator's phase after exchanges; empty if noise makes most."""
     T, factor = case.mission.collection.aperture_time, case.mission.allocation.coverage_factor
     for spur in spurs_of(case.mission):
         slow = spur.slow_parts(T) if f"{spur.name}.oscillator" == row_id else None
@@ -410,7 +411,7 @@ def _folded_spur(case: Case, row_id: str, size: float, kind: str) -> Note:
 
 
 def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit: float | None) -> Note:
-    """Reason that makes a pass a warning: all errors together, or the model that does not gate."""
+    """Reason for a warning instead of a pass: all errors together, the model that does not gate, or a mask."""
     if limit is None:
         return NOTHING
     if case.number(aggregate.is_over_of_all):
@@ -429,22 +430,22 @@ def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit:
 # ---------------------------------------------------------------------- the scene's edge
 @dataclass(frozen=True, eq=False)
 class JudgedScene:
-    """The edges of scenes in many cases: differences that they add, none without a declared error."""
+    """The edges of scenes in many cases: the differences of phase at the edge; None without a declared error."""
 
     analysis: Analysis
     edges: SceneEdges | None
 
     @cached_property
     def corrections(self) -> Corrections | None:
-        """How far one autofocus correction serves: only words ask, and a search takes longer than all else."""
+        """Range over which one autofocus correction is valid; used in words only, because the search is slow."""
         return None if self.edges is None else Corrections(self.edges, self.analysis.allocation.qpe_total)
 
     def edge(self, case: Case) -> SceneEdge | None:
-        """The edge of one case, with how far one autofocus correction serves."""
+        """The edge of one case, with the range over which one autofocus correction is valid."""
         return None if self.corrections is None else SceneEdge.of(self.corrections, case.mission, case.place)
 
     def row(self, judging: Judging, model: str) -> "SceneRow":
-        """Judge the edges by a model; to the published one an error is the same all over the scene."""
+        """Judge the edges by a model; by the published model an error is the same all over the scene."""
         row_subject, edges = subject("mission", "spatial_variance"), self.edges
         total = judging.array(self.analysis.allocation.qpe_total)
         allowable = None if model == "published" else total
@@ -468,7 +469,7 @@ class SceneRow(FamilyRow):
     scene: JudgedScene
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         edge, total = self.scene.edge(case), case.allocation.qpe_total
         doubt, degeneracy, notes = NOTHING, NOTHING, tuple[Note, ...]()
         if edge is not None:

@@ -48,7 +48,7 @@ def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_O
     Parameters
     ----------
     mission : Mission
-        As loaded.
+        Mission as loaded.
     today : date
         Day on which waivers are judged, UTC.
     outside : Outside
@@ -149,7 +149,7 @@ def _flown_paths(mission: Mission) -> tuple[tuple[str, FlownPath], ...]:
 
 
 def _overridden(mission: Mission) -> Iterator[Note]:
-    """Say which figures of parts the file replaces."""
+    """Name the figures of parts that the file replaces."""
     for name in PLATFORMS:
         platform = getattr(mission.platforms, name)
         for section in filter(None, (platform.motion_error, platform.oscillator)):
@@ -171,7 +171,7 @@ def _unused_keys(mission: Mission) -> Iterator[Note]:
 CheckedMission = MissionFindings | UnusableMission
 Kept = TypeVar("Kept")
 
-FILES_FOR_TWO_PROCESSES = 200  # a second process takes as long to start as half of them take to check
+FILES_FOR_TWO_PROCESSES = 200  # a second process starts in the time that a check of half of them takes
 FILES_AT_ONCE = 500  # checked together at most
 
 
@@ -214,11 +214,11 @@ def check_files(
     model : str or None
         Gating model in place of each file's own.
     keep : callable
-        Reduces the findings of a file to the result, in the process that made the findings.
+        Function that reduces the findings of a file to the result, in the process that made the findings.
     drawn : Draws, optional
         Arguments of a Monte Carlo; None: no draws.
     changes : sequence of SetValue
-        Values that replace those of each file.
+        Values that replace values of each file.
     outside : Outside
         Options, settings and environment variables that bear on the verdicts.
 
@@ -270,7 +270,7 @@ def _kept(
     changes: Sequence[SetValue],
     outside: Outside,
 ) -> list[Kept]:
-    # The findings of a thousand missions are 10⁵ tuples without a reference cycle: the collector finds nothing.
+    # The findings of a thousand missions are 10⁵ tuples without a reference cycle: the collector has no work.
     gc.disable()
     kept: dict[int, Kept] = {}
     missions: dict[int, Mission] = {}

@@ -1,4 +1,4 @@
-"""The confidence with which requirements are met: the sigma or the bounds that declared errors are stated by."""
+"""The confidence with which requirements are met: the sigma or the bounds of the declared errors."""
 
 import math
 from collections.abc import Iterator
@@ -12,8 +12,8 @@ from bisar_budget.phrases import Note
 def confidence_of(case: Case) -> Note:
     """Confidence of the verdict on one case, as the end of a sentence: `at 1 sigma`, `for the stated bounds`.
 
-    Errors of which the file states a size and no distribution (amplitudes of vibration, errors from elsewhere, the
-    terrain) take no part, and an error of 0 only where there is no other.
+    Errors with a size and no distribution in the file (amplitudes of vibration, errors from elsewhere, the terrain)
+    do not count. An error of 0 counts only if all errors are 0.
     """
     stated = list(_stated(case))
     distributions = {name for name, is_nonzero in stated if is_nonzero} or {name for name, _ in stated}
@@ -22,7 +22,7 @@ def confidence_of(case: Case) -> Note:
 
 
 def _stated(case: Case) -> Iterator[tuple[str, bool]]:
-    """Distribution of every declared error that has one, and whether its size is known and not 0."""
+    """Distribution of each declared error with a distribution, and whether its size is known and not 0."""
     for source in case.analysis.errors.stated:
         if source.is_covered:
             yield distribution_of(case.mission, source), _is_nonzero(case.number(source.declared))

@@ -1,7 +1,7 @@
-"""Rows that rest on what no data sheet states: phase noise below the first point of an oscillator's mask.
+"""Rows that depend on phase noise below the first point of an oscillator's mask: no data sheet states this noise.
 
-A mask continues below its first point as f⁻³. Where more than half of what a row adds up lies there, and the row uses
-more than a tenth of its limit, a pass is a warning, which says down to which frequency the mask should reach.
+A mask continues below its first point as f⁻³. A pass becomes a warning if more than half of a row's power lies there
+and the row uses more than a tenth of its limit. The warning gives the frequency down to which the mask should reach.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,19 +15,19 @@ from bisar_budget.effects.oscillators import COVERED_CYCLES
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.phrases import NOTHING, Note
 
-MOST_OF_POWER = 0.5  # share of a row's power, above which it rests on the continuation
-MIN_USE_FRACTION = 0.1  # of a limit, up to which it does not matter what a row rests on
+MOST_OF_POWER = 0.5  # share of a row's power, above which the row depends on the continuation
+MIN_USE_FRACTION = 0.1  # utilization of a limit, up to which the source of the noise does not matter
 
 Part = str  # quadratic, cubic, spread or displacement
 
 
 def part_of(effect: RandomEffect, effect_kind: Part) -> Any:
-    """One of the sizes of an effect: a phase, an rms or a displacement, by a unit."""
+    """The size of an effect per unit that `effect_kind` names: a phase, an rms phase or a displacement."""
     return getattr(effect, effect_kind)
 
 
 def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> Any:
-    """Power of a part of what declared errors have below the first points of masks; 0 where none has any."""
+    """Power of an effect of declared errors by noise below the first points of masks; 0 without such noise."""
     power: Any = 0.0
     for error in errors:
         if error.continued is not None and error.declared is not None:
@@ -36,14 +36,14 @@ def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> Any:
 
 
 def rests_on_masks(errors: Iterable[RandomError], effect_kind: Part, size: Any, limit: Any) -> Any:
-    """Whether a size, with its limit, rests on what lies below the first points of masks, in which cases."""
+    """Whether a size, with its limit, depends on noise below the first points of masks, in each case."""
     power = continued_power(errors, effect_kind)
     with np.errstate(all="ignore"):
         return (power > MOST_OF_POWER * np.square(size)) & (size > MIN_USE_FRACTION * np.asarray(limit))
 
 
 def continuation_note(case: Case, errors: Sequence[RandomError], effect_kind: Part, size: float) -> Note:
-    """Say how much of a row lies below the first points of masks, and how far down a mask should reach."""
+    """Give the share of a row's power below the first points of masks, and how far down a mask should reach."""
     makers = [error for error in errors if error.continued is not None and error.declared is not None]
     if not makers or not size:
         return NOTHING

@@ -1,8 +1,8 @@
-"""Kinds of error that a mission can declare: which it does, which it lacks, and what `requirements.declare` asks for.
+"""Kinds of error that a mission can declare: declared kinds, missing kinds, and the kinds in `requirements.declare`.
 
-A kind is declared by a figure of it, a zero included. An empty section declares nothing, and neither does half of a
-cause: a lever arm that nothing swings, an oscillator that is sensitive to an acceleration which the file does not
-state.
+A figure of a kind declares the kind, also a figure of zero. An empty section declares no kind. Half of a cause does
+not declare its kind: a lever arm without an attitude error that swings it, an oscillator with a sensitivity to an
+acceleration which the file does not state.
 """
 
 from collections.abc import Callable, Container, Iterator, Mapping
@@ -20,13 +20,13 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, least_elevation_deg
 
-DECLARATIONS = subject("mission", DECLARE)  # the row of all that is asked for
+DECLARATIONS = subject("mission", DECLARE)  # the row of all required declarations
 
 
 class Missing(NamedTuple):
     """An error that the file should declare and does not: owner and kind of its rows, and its key in the file.
 
-    `lacks` says which key is absent where the file states half of the error: the other half does nothing alone.
+    If the file states half of the error, `lacks` names the absent key: half of the error has no effect alone.
     """
 
     owner: str
@@ -37,7 +37,7 @@ class Missing(NamedTuple):
 
 # ---------------------------------------------------------------------- half of a cause
 def swings_nothing(platform: Platform) -> bool:
-    """Whether a platform has a lever arm, and no attitude error that swings it, as far as the file says."""
+    """Whether the file states a lever arm of a platform, but no attitude error that swings the arm."""
     lever, imu = platform.motion_error.lever_arm, platform.motion_error.imu
     if lever is None or lever.arm is None or not any(lever.arm):
         return False
@@ -45,14 +45,14 @@ def swings_nothing(platform: Platform) -> bool:
 
 
 def _lacks_an_attitude(mission: Mission, name: str) -> str:
-    """Whatever the uncertainty of an arm, attitude errors swing all of it."""
+    """Keys that the file lacks for a lever arm: attitude errors swing the full arm, not only its uncertainty."""
     if not swings_nothing(getattr(mission.platforms, name)):
         return ""
     return "imu.attitude, gyro_bias or angle_random_walk, which swings the arm"
 
 
 def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
-    """Vibration acts on an oscillator by its sensitivity to acceleration: neither does anything alone."""
+    """Keys that the file lacks for an oscillator: vibration and sensitivity have an effect only together."""
     platform: Platform = getattr(mission.platforms, name)
     if platform.oscillator is not None and platform.oscillator.acceleration_sensitivity is None:
         vibration = platform.motion_error.vibration
@@ -70,16 +70,16 @@ def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
 
 # ---------------------------------------------------------------------- the table of kinds
 def _whole(mission: Mission, name: str) -> str:
-    """Nothing is lacking of a kind that has no halves."""
+    """Empty: a kind of error without halves lacks no key."""
     return ""
 
 
 @dataclass(frozen=True)
 class _OfPlatform:
-    """A kind of error that each platform has: its key below the platform, and which platforms state it.
+    """A kind of error that each platform has: its key below the platform, and tests of a platform's statements.
 
-    `lacks` names the key without which what a platform states of it does nothing; empty where it is whole. A kind
-    that is not `is_owed` is listed only where the file says something of it.
+    `lacks` names the missing key without which a platform's statement has no effect; empty if the statement is
+    complete. A kind that is not `is_owed` is listed only if the file states something about it.
     """
 
     key: str
@@ -170,7 +170,7 @@ _KINDS_OF_PLATFORMS: Mapping[str, _OfPlatform] = {
 
 @dataclass(frozen=True)
 class _OfMission:
-    """A kind of error of the clocks, of the air, of both platforms or of nobody, and when a mission states it."""
+    """A kind of error of the clocks, of the air, of both platforms or of no owner, with tests of a mission for it."""
 
     owner: str
     is_stated: Callable[[Mission], bool]
@@ -180,7 +180,7 @@ class _OfMission:
 
 
 def _states_clock(mission: Mission) -> bool:
-    """Whether the file says what the clock is wrong by: any of its terms, or what setting it left."""
+    """Whether the file states an error of the clock: any of its terms, or an error that remains after setting."""
     sync = mission.synchronization
     setting = () if sync is None else (sync.time_error, sync.frequency_error)
     return any(term is not None for term in (*mission.timing_error, *setting))
@@ -197,7 +197,7 @@ def _runs_two_clocks(mission: Mission) -> bool:
 
 
 def _lacking_of_setting(mission: Mission) -> list[str]:
-    """Keys of the synchronisation that the file should have: of clocks in holdover, both errors that setting left."""
+    """Missing keys of the synchronisation; clocks in holdover need both errors that remain after setting."""
     sync = mission.synchronization
     if sync is None:
         return ["synchronization"]
@@ -206,7 +206,7 @@ def _lacking_of_setting(mission: Mission) -> list[str]:
 
 
 def _legs_without_delay(mission: Mission) -> list[str]:
-    """Keys of the air that the file should have: of both legs, or of each leg of which a file may state a delay."""
+    """Missing keys of the air: `propagation`, or each leg without a delay whose elevation is high enough for it."""
     if mission.propagation is None:
         return ["propagation"]
     T, lacking = mission.collection.aperture_time, []
@@ -262,11 +262,12 @@ _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
 _OF_HALVES = ("propagation", "synchronization")  # kinds that the file may state in part
 
 
-# ---------------------------------------------------------------------- what a mission declares
+# ---------------------------------------------------------------------- declarations of a mission
 def declared_kinds(mission: Mission) -> DeclaredKinds:
-    """List the kinds of error that a mission owes or declares, by owner: which it declares, and which lack a source.
+    """List the kinds of error, by owner, that a mission declares, that it should declare, and that lack a source.
 
-    A covariance is position and velocity. With a direct path as clock there are no timing errors and no oscillators.
+    A covariance counts as position and velocity. With a direct path as clock there are no timing errors and no
+    oscillators.
     """
     declared, missing, without_source = list[str](), list[str](), list[str]()
     still = still_platforms(mission)
@@ -293,7 +294,7 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
 
 
 def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
-    """Phase noise and spectra of vibration that the file shifts by a level off what their source states."""
+    """Phase noise and vibration spectra that the file shifts by a level from the values of their source."""
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         oscillator, vibration = platform.oscillator, platform.motion_error.vibration
@@ -302,7 +303,7 @@ def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
         if oscillator is not None:
             felt = None if oscillator.vibration is None else oscillator.vibration.spectrum_level
             levels.append(("oscillator", "oscillator.level", oscillator.level, oscillator.source))
-            # What it feels is the file's own spectrum: the source is that of the oscillator.
+            # The vibration that the oscillator feels is the file's own spectrum: the source is about the oscillator.
             levels.append(("oscillator", "oscillator.vibration.spectrum_level", felt, None))
         for kind, key, level, its_source in levels:
             if level:
@@ -314,21 +315,21 @@ def still_platforms(mission: Mission) -> list[str]:
     return [name for name in PLATFORMS if getattr(mission.platforms, name).state.is_still]
 
 
-# ---------------------------------------------------------------------- what it must declare
+# ---------------------------------------------------------------------- required declarations
 def missing_declarations(mission: Mission, still: Container[str] | None = None) -> list[Missing]:
-    """List what `requirements.declare` asks for and the file does not declare: all of it, each once.
+    """List all errors that `requirements.declare` requires and the file does not declare, each once.
 
-    A covariance declares position and velocity. The clock is declared by any term of its error, a vibration by lines
-    or noise, an inertial sensor by any of its figures, the air by the delays of each leg. A platform that does not
-    move owes its position only, and an oscillator where it is asked for by the platform's name. An error that is
-    common to both platforms says nothing of their own.
+    A covariance declares position and velocity. Any term of its error declares the clock, lines or noise declare a
+    vibration, any figure declares an inertial sensor, the delays of each leg declare the air. A platform that does
+    not move needs its position only, and an oscillator if the requirement names the platform. An error that is common
+    to both platforms does not declare their own errors.
 
     Parameters
     ----------
     mission : Mission
-        As loaded.
+        Mission as loaded.
     still : container of str, optional
-        Names of the platforms that do not move; omitted: by their paths.
+        Names of the platforms that do not move; omitted: derived from the paths.
     """
     if not mission.requirements.declare:
         return []
@@ -358,5 +359,5 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
 
 
 def is_asked_for(row_subject: Subject, missing: Missing) -> bool:
-    """Whether a row is about what is asked for and missing."""
+    """Whether a row is about a required error that is missing."""
     return row_subject.owner == missing.owner and (row_subject.kind == missing.kind or missing.kind == "timing")

@@ -1,7 +1,8 @@
 """The row of dispersion in the air: free electrons bend the phase over the band, which blurs an image in range.
 
-The quadratic requirement holds it on its own: it is a phase over frequency, and adds to none over slow time. It may
-have all of the requirement, since nobody has a share for the air, and autofocus does not correct it.
+The quadratic requirement limits dispersion alone: dispersion is a phase over frequency, which does not add to phases
+over slow time. It may use the full requirement, because no owner has a share for the air. Autofocus does not correct
+it.
 """
 
 from collections.abc import Iterator
@@ -23,7 +24,7 @@ DISPERSION = subject("mission", "dispersion")
 
 
 def dispersion_rows(judging: Judging, analysis: Analysis) -> Iterator["DispersionRow"]:
-    """Judge the quadratic phase at the edges of the band; no row where no electron content is declared."""
+    """Judge the quadratic phase at the edges of the band; no row without a declared electron content."""
     propagation = analysis.mission.propagation
     if propagation is None or all(propagation.content(name) is None for name in PLATFORMS):
         return
@@ -36,10 +37,10 @@ def dispersion_rows(judging: Judging, analysis: Analysis) -> Iterator["Dispersio
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DispersionRow(FamilyRow):
-    """Dispersion in many cases. [rad]"""
+    """Row of dispersion in many cases. [rad]"""
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case; models do not differ in it."""
+        """Row of a case in words; it is the same for both models."""
         propagation = case.mission.propagation
         assert propagation is not None  # else there is no row
         contents: dict[str, Any] = {name: propagation.content(name) for name in PLATFORMS}

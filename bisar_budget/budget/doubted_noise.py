@@ -1,8 +1,9 @@
-"""Rows that rest on an oscillator whose noise is not what the file states: they are not evaluated.
+"""Rows that depend on an oscillator with doubted noise: they are not evaluated.
 
-A mask without its frequency, beside a part, is taken at the part's: at another one the same decibels are other noise.
-A power law that fits an Allan deviation badly is not that oscillator's. Where such noise uses more than a tenth of a
-limit, the row that has this limit is not evaluated, unless it fails anyway.
+A mask without its frequency, in a file that also names a part, is taken at the frequency of the part: at a different
+frequency the same decibels are different noise. A power law that fits an Allan deviation badly does not describe the
+oscillator. If such noise uses more than a tenth of a limit, the row with this limit is not evaluated, unless it fails
+anyway.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -20,7 +21,7 @@ from bisar_budget.phrases import NOTHING, Note
 
 
 def rests_on_doubted_noise(errors: Iterable[RandomError], effect_kind: Part, model: str, limit: Any) -> Any:
-    """Whether oscillators in doubt use more than a tenth of a limit by a part of their effects, in which cases."""
+    """Whether oscillators in doubt use more than a tenth of a limit by one of their effects, in each case."""
     power: Any = 0.0
     for error in errors:
         if error.declared is not None and np.any(error.is_in_doubt):
@@ -37,7 +38,7 @@ def has_doubted_frequency(mission: Mission, platform: str) -> bool:
 
 
 def doubted_noise_note(mission: Mission, platforms: Sequence[str] = PLATFORMS) -> Note:
-    """Say which keys leave the noise of oscillators in doubt, and what to write instead."""
+    """Name the keys that leave the noise of oscillators in doubt, and the statements to write instead."""
     notes = [note for name in platforms for _, note in noise_doubts(mission, name)]
     return notes[0].then(*notes[1:]) if notes else NOTHING
 

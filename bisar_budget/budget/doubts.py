@@ -1,12 +1,13 @@
-"""Doubts about what is checked: paths that stray from the truth, a model or a collection at its edge.
+"""Doubts about the input of a check: paths that may stray from the truth, a model or a collection at its edge.
 
-A path by an orbit or a log says how far the truth may be from it: by the age of its elements, the interpolation of
-its ephemeris, the residual of its smoothed log. A position error that is smaller cannot be that of this path. Nor can
-a declared error that is smaller than the one that the source of the path states of itself.
+The truth may differ from a path by an orbit or a log by a known distance: by the age of the elements, the
+interpolation of the ephemeris, the residual of the smoothed log. A smaller declared position error cannot be true of
+this path. A declared error cannot be true either if the source of the path states a larger error.
 
-A log says more than its smooth path: what the path leaves of the fixes, and the step to which they are written. A
-processor that flies the smooth path does without both, and one that flies the fixes has both in its image. Where the
-file does not say which one it is (`trajectory.processed`), neither can be judged.
+A log has two further errors: the residual, which is the difference between its fixes and its smooth path, and the
+step to which the fixes are rounded. A processor that uses the smooth path has neither error. A processor that uses
+the fixes has both errors in its image. If the file does not state the choice (`trajectory.processed`), neither error
+can be judged.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,25 +30,25 @@ from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 
-LEAST_M = 1e-3  # of a doubt; what is less is no story beside any declared error, zero included
+LEAST_M = 1e-3  # smallest doubt of a path that counts against a declared error, zero included
 NEGLIGIBLE_USE_FRACTION = 0.1  # of a requirement, by the doubt of a path or by a velocity that its source states
 NEGLIGIBLE_RAD = 0.08  # of quadratic phase, in any image
-_TYPICAL_SHARE = 1 / 3  # of a usual error; a fix may be as much better than those of its quality usually are
-MOST_RESIDUAL_RAD = 0.2  # rms phase along the line of sight that a smooth path may leave of a log, unsaid
-MOST_GRID_SHARE = 0.1  # of the declared position error, that a step of a log may have, unsaid
-RESIDUAL = "residual"  # kind of doubt of what a smooth path leaves
-_EQUAL_VARIANCE_FRACTION = 1e-6  # relative, of variances: equal is enough, and turned axes round
+_TYPICAL_SHARE = 1 / 3  # of a usual error; a fix may be better by this factor than fixes of its quality usually are
+MOST_RESIDUAL_RAD = 0.2  # largest rms phase of the residual along the line of sight that needs no statement
+MOST_GRID_SHARE = 0.1  # largest step of a log, relative to the declared position error, that needs no statement
+RESIDUAL = "residual"  # kind of doubt: the residual of a smooth path
+_EQUAL_VARIANCE_FRACTION = 1e-6  # relative, of variances: an equal variance is enough; a turn of axes causes rounding
 
 
 @dataclass(frozen=True)
 class InputDoubt:
     """A platform whose path is in doubt by more than the file declares.
 
-    `doubt` is how far the truth may be from the path, or the error that its source states, along the axis where it
-    exceeds the declared one most. `declared` is that one, without the coverage factor, 0 where the file declares
-    none. Both are root-sum-squares where the doubt has no direction. [m] or [m/s], by the `kind`. `note` says both.
-    Where `is_of_log`, it is what a smooth path leaves of a log [rad], beside the most that may go unsaid, or a step
-    of the log's fixes.
+    `doubt` is the distance by which the truth may differ from the path, or the error that the path's source states,
+    along the axis on which it exceeds the declared error most. `declared` is the declared error without the coverage
+    factor, 0 if the file declares no error. Both are root-sum-squares if the doubt has no direction. [m] or [m/s], by
+    the `kind`. `note` gives both values. With `is_of_log`, `doubt` is the residual of a log [rad], and `declared` the
+    largest residual that needs no statement; or `doubt` is a step of the log's fixes.
     """
 
     owner: str
@@ -87,7 +88,7 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
 
 
 def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Truths]:
-    """Cases in which a platform's path is in doubt by more than the file declares, by owner and kind of error."""
+    """Cases in which a platform's path is in doubt by more than the file declares, by platform and kind of error."""
     doubted = {}
     for name in PLATFORMS:
         path: FlownPath | None = getattr(mission.platforms, name).path
@@ -104,8 +105,8 @@ def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Tru
 def strays(mission: Mission, name: str) -> Any:
     """Whether the truth may be farther from a platform's path than the file declares, in each case.
 
-    Age, interpolation and residual count against an error that is not declared where they are unusual, or where so
-    much would be more than a negligible part of a requirement.
+    If no error is declared, age, interpolation and residual count if they are unusual, or if such an error would use
+    more than a negligible part of a requirement.
     """
     platform: Platform = getattr(mission.platforms, name)
     path, declared = platform.path, declared_position_error(platform.motion_error)
@@ -121,9 +122,9 @@ def strays(mission: Mission, name: str) -> Any:
 
 
 def declared_position_error(error: MotionError) -> Any:
-    """Root-sum-square of the position errors of a platform, or None: constant ones, and random ones of GNSS. [m]
+    """Root-sum-square of a platform's position errors, constant and random (GNSS); None without such an error. [m]
 
-    Numbers of the mission may be arrays (cases,), and so may be the result.
+    The result is an array (cases,) if numbers of the mission are.
     """
     stated = error.stated("position")
     sizes = [*(stated or ()), *(sigma for process in error.random for sigma in process.sigma)]
@@ -131,9 +132,9 @@ def declared_position_error(error: MotionError) -> Any:
 
 
 def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, kind: str = "position") -> bool:
-    """Whether a row is of a kind of error of a platform, along the axes that the file states it in.
+    """Whether a row is about a kind of error of a platform, along the axes in which the file states the error.
 
-    What a smooth path leaves of a log spreads: its own row, and those of the powers that spread.
+    The residual of a log spreads: it concerns its own row, and the rows of the sums of spread power.
     """
     if kind == RESIDUAL:
         return row_subject == residual_subject(owner) or (
@@ -144,14 +145,14 @@ def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, kind: str = 
     return row_subject.owner == owner and row_subject.kind == kind and row_subject.frame == frame
 
 
-# ---------------------------------------------------------------------- what the source of a path states
+# ---------------------------------------------------------------------- errors that the source of a path states
 def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) -> Any:
     """Whether the source of a path states a larger error than the file declares, in each case.
 
-    An error is larger if it has more variance in any direction. A source that states no direction is held to the
-    root-sum-square. A velocity counts where so much would be more than a negligible part of a requirement: an
-    ephemeris may know its places well and its velocities badly, and it is the places that are flown. So does a usual
-    position error where the file declares none.
+    An error is larger if it has more variance in any direction. For a source without directions the root-sum-squares
+    are compared. A velocity error counts only if it would use more than a negligible part of a requirement: an
+    ephemeris may have good positions and bad velocities, and the path follows the positions. The same holds for a
+    usual position error if the file declares no position error.
     """
     platform: Platform = getattr(mission.platforms, name)
     stated_covariance = _stated_covariance(stated, kind)
@@ -175,7 +176,7 @@ def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) 
 
 
 def _stated_covariance(stated: StatedAccuracy, kind: str) -> Floats | None:
-    """Covariance (..., 3, 3) of a kind of error along the scene's axes; None where the source states none."""
+    """Covariance (..., 3, 3) of a kind of error along the scene's axes; None if the source does not state it."""
     if stated.covariance is None:
         return None
     first = 3 * KINDS.index(kind)
@@ -206,7 +207,7 @@ def _stack(rows: Sequence[Sequence[Any]]) -> Floats:
 
 
 def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccuracy) -> InputDoubt:
-    """The errors that a source states and that the file declares, along the axis where they differ most."""
+    """The doubt by the errors that a source states and that the file declares, on the axis of largest difference."""
     error = platform.motion_error
     key = f"platforms.{name}.motion_error.{kind if error.covariance is None else 'covariance'}"
     stated_covariance, declared = _stated_covariance(stated, kind), _declared_covariance(platform, kind)
@@ -225,7 +226,7 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
         share * size <= declared_size * (1 + _EQUAL_VARIANCE_FRACTION) + LEAST_M
         for size, declared_size in zip(*sizes, strict=True)
     ):
-        # Along each axis enough is declared, but not between them.
+        # The declared error is large enough along each axis, but not between the axes.
         values, directions = np.linalg.eigh(declared - share**2 * stated_covariance)
         worst = directions[:, int(values.argmin())]
         sizes, names = (
@@ -238,15 +239,15 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
     return InputDoubt(name, sizes[0][worst_axis], sizes[1][worst_axis], note, kind, is_stated=True)
 
 
-# ---------------------------------------------------------------------- what a smooth path leaves of a log
+# ---------------------------------------------------------------------- the residual of a log
 def leaves_unsaid(mission: Mission, name: str) -> Any:
-    """Whether a smooth path leaves more of a log than may go unsaid, and the file does not say which one is flown."""
+    """Whether a log has too large a residual, and the file does not state whether the processor uses its fixes."""
     log = _unsaid_log(mission, name)
     return False if log is None else np.asarray(residual_phase(mission, name)) > MOST_RESIDUAL_RAD
 
 
 def residual_phase(mission: Mission, name: str) -> Any:
-    """Phase of what a smooth path leaves of a log's fixes along the line of sight, rms over the aperture. [rad]"""
+    """Phase of the residual of a log's fixes along the line of sight, rms over the aperture. [rad]"""
     path: FlownPath | None = getattr(mission.platforms, name).path
     if path is None or path.log_noise is None:
         return 0.0
@@ -259,10 +260,11 @@ def residual_phase(mission: Mission, name: str) -> Any:
 
 
 def is_coarse(mission: Mission, name: str) -> Any:
-    """Whether a step of a log's fixes exceeds a tenth of the declared position error, and nobody says which is flown.
+    """Whether a step of a log's fixes is too coarse, and the file does not state whether the processor uses them.
 
-    Along any direction. Where the file declares no position error, it counts where rounding to it would use more than
-    a negligible part of a requirement: its variance is that of a uniform error, a twelfth of the square of the step.
+    A step is too coarse if it exceeds a tenth of the declared position error along any direction. If the file
+    declares no position error, the step must also use more than a negligible part of a requirement: rounding is a
+    uniform error, whose variance is a twelfth of the square of the step.
     """
     log = _unsaid_log(mission, name)
     if log is None:
@@ -279,14 +281,14 @@ def is_coarse(mission: Mission, name: str) -> Any:
 
 
 def _unsaid_log(mission: Mission, name: str) -> LogNoise | None:
-    """Noise of a platform's log where the file does not say which path of it is flown; None elsewhere."""
+    """Noise of a platform's log if the file does not state which path the processor uses; otherwise None."""
     path: FlownPath | None = getattr(mission.platforms, name).path
     log = None if path is None else path.log_noise
     return log if log is not None and log.processed is None else None
 
 
 def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
-    """The step of a log's fixes that exceeds the declared position error most, along the axes of that error."""
+    """The doubt by the step of a log's fixes, on the axis of the position error on which the step exceeds it most."""
     assert platform.path is not None
     assert platform.path.log_noise is not None
     error = platform.motion_error
@@ -302,7 +304,7 @@ def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
     return InputDoubt(name, step, sigma, note, is_of_log=True)
 
 
-# ---------------------------------------------------------------------- what so much would do
+# ---------------------------------------------------------------------- the effect of a doubt
 def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Any:
     """Whether an error of a platform, by its covariance, uses more than a negligible part of a requirement."""
     needs, half = mission.requirements, np.asarray(mission.collection.aperture_time) / 2
@@ -327,7 +329,7 @@ def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Any:
 
 
 def _sight(mission: Mission, name: str, time: Any) -> Any:
-    """Range that a metre of a platform's motion adds at a slow time, along each axis; less that of a direct path."""
+    """Range that a metre of a platform's motion along each axis adds at a slow time, less the direct path's range."""
     platforms = mission.platforms
     sight = unit(getattr(platforms, name).state.place(time))
     if not mission.has_direct_path:
@@ -348,21 +350,21 @@ def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floa
 
 # ---------------------------------------------------------------------- the published model
 MAX_MODEL_DIFFERENCE_FRACTION = (
-    0.05  # of the full model's allowable; farther from it, the published one does not hold
+    0.05  # of the full model's allowable; beyond this difference the published model does not hold
 )
 
 
 def model_doubt(case: Case, rows: Sequence[Row]) -> Note:
-    """Say of which declared error the published model, where it decides, does not hold; nothing if it does.
+    """Name a declared error for which the published model decides but does not hold; empty if there is no such error.
 
-    Named is the row of which the two allowables say most differently how much of them is used.
+    The note names the row whose two utilizations, by the two allowables, differ most.
 
     Parameters
     ----------
     case : Case
-        That is judged.
+        The judged case.
     rows : sequence of Row
-        As judged: those that the published model judges are looked at, of errors as stated and not zero.
+        Judged rows. Only rows count that the published model judges, with an error as stated in the file and not 0.
     """
     stated = {source.id for source in case.analysis.errors.stated if case.number(source.declared)}
     apart = [row for row in rows if row.model == "published" and row.id in stated and _is_apart(row)]
@@ -382,7 +384,7 @@ def _is_apart(row: Row) -> bool:
 
 
 def _difference(row: Row) -> float:
-    """How differently the two allowables say how much of them is used."""
+    """Difference of the utilizations of a row by its two allowables."""
     declared, limits = row.declared or 0.0, (row.allowable_published, row.allowable_full)
     published, full = (0.0 if limit is None else declared / limit for limit in limits)
     return abs(published - full)
@@ -393,7 +395,7 @@ _TURNING_RAD = 0.1  # half the turn of a line of sight; the quartic term is 1 % 
 
 
 def missing_settings(mission: Mission) -> list[str]:
-    """List the errors that setting left of clocks in holdover, and that the file does not state."""
+    """List the errors that remain after setting clocks in holdover and that the file does not state."""
     sync = mission.synchronization
     if sync is None or not sync.is_holdover:
         return []
@@ -401,7 +403,7 @@ def missing_settings(mission: Mission) -> list[str]:
 
 
 def collection_notes(case: Case) -> Iterator[Note]:
-    """Say where the published model leaves the collection, and where an image shows less than the full one."""
+    """Notes on collections beyond the published model, and on images that show less than the full model."""
     mission = case.mission
     for name, state in zip(PLATFORMS, case.geometry.both, strict=True):
         if not state.is_straight:
@@ -414,4 +416,4 @@ def collection_notes(case: Case) -> Iterator[Note]:
     if mission.has_direct_path:
         yield phrases.direct_path_is_the_clock()
     if mission.requirements.location_error is None and (missing := missing_settings(mission)):
-        yield phrases.setting_is_perfect(missing)  # a location rests on it, and a warning says so
+        yield phrases.setting_is_perfect(missing)  # a required location depends on it, and has a warning

@@ -1,4 +1,4 @@
-"""Rows of errors: what is declared against the largest size that requirements allow, and that is specified."""
+"""Rows of errors: the declared size against the largest size that requirements, or a specification, allow."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -32,16 +32,16 @@ _BINDING = np.array([REQUIREMENTS.index(name) for name in (*HELD, END_OF_IMAGE)]
 
 
 class ErrorRows:
-    """Rows of the errors that are listed.
+    """Rows of the listed errors.
 
     Parameters
     ----------
     judging : Judging
-        Of the cases.
+        Judges the rows of the cases.
     analysis : Analysis
-        Of the cases.
+        Analysis of the cases.
     limits : mapping of str to (cases,)
-        Quadratic phase that each owner is held to, gain of autofocus included. [rad]
+        Limit on the quadratic phase of each owner, gain of autofocus included. [rad]
     """
 
     def __init__(self, judging: Judging, analysis: Analysis, limits: Mapping[str, Floats]) -> None:
@@ -50,7 +50,7 @@ class ErrorRows:
         self.is_of_sums = analysis.is_of_sums
 
     def rows(self, gating: str) -> Iterator["ErrorRow"]:
-        """Rows by one model, which the other may doubt."""
+        """Rows by one model; the other model may turn a pass into a warning."""
         for block_index in range(len(self.errors.blocks)):
             yield from self._of_block(block_index, gating)
 
@@ -60,7 +60,7 @@ class ErrorRows:
         needs, sources = errors.mission.requirements, block.sources
         limit = np.array([self.limits[source.owner] for source in sources])
         limits = (limit, needs.cubic_phase_error, needs.location_error)
-        # Searches start from what declared errors are known to do.
+        # Searches start from the known effects of the declared errors.
         mine, theirs = errors.of_block(gating, block_index), errors.of_block(other_model, block_index)
         searched = (None, None, None) if self.is_of_sums else limits
         allowed = block.allowed(gating, searched, is_complete=asks_for_all)
@@ -99,7 +99,7 @@ class ErrorRows:
 
 
 def _is_over(does: Declared, gain: Any, limits: tuple[Floats, float | None, float | None], is_motion: Any) -> Any:
-    """Whether any effect of errors is over what it is held to."""
+    """Whether any effect of the errors exceeds its limit."""
     limit, cubic, location = limits
     is_over = does.judged(gain) / limit > LIMIT_RATIO
     if cubic is not None:
@@ -111,13 +111,13 @@ def _is_over(does: Declared, gain: Any, limits: tuple[Floats, float | None, floa
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ErrorRow(FamilyRow):
-    """One error as judged in many cases; `limit` is the quadratic phase that it may have. [rad]"""
+    """One error as judged in many cases; `limit` is the limit on its quadratic phase. [rad]"""
 
     source: ErrorSource
     limit: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         mission, row, source = case.mission, self.judged, self.source
         model, other_model = case.analysis.models(gating)
         gain, status = case.allocation.autofocus_gain, row.status[case.place]
@@ -160,7 +160,7 @@ class ErrorRow(FamilyRow):
 
 # ---------------------------------------------------------------------- in words
 def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Declared, limit: float) -> Note:
-    """Say which requirement the declared error breaks."""
+    """Reason with the requirement that the declared error breaks."""
     requirements, binding = case.mission.requirements, row.requirement(case)
     if binding == END_OF_IMAGE:
         return phrases.beyond_the_image(case.number(row.allowable), source.unit)
@@ -178,7 +178,7 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
 
 
 def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
-    """Say that the model that does not gate fails the declared error, and why it thinks otherwise; else nothing."""
+    """Reason if the model that does not gate fails the declared error, with the cause; otherwise empty."""
     needs, theirs = case.mission.requirements, case.does(other, source)
     uses = [(float(theirs.judged(case.allocation.autofocus_gain)), limit, QUADRATIC)]
     if source.is_motion and needs.cubic_phase_error is not None:
@@ -196,7 +196,7 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
 
 
 def _cause(source: ErrorSource) -> Note:
-    """Say what the full model counts and the published one does not."""
+    """Name the effect that only the full model counts."""
     if source.subject.kind == "terrain":
         return phrases.wrong_height_defocuses()
     if source.unit == "m":
@@ -213,9 +213,10 @@ def _stated_elsewhere(case: Case, source: ErrorSource) -> Note:
 
 # ---------------------------------------------------------------------- specifications
 def specification_rows(judging: Judging, analysis: Analysis) -> Iterator["SpecificationRow"]:
-    """Judge each specification: no more may be declared, of three axes in the largest; coverage does not count.
+    """Judge each specification: the largest declared value of the axes must not exceed it.
 
-    An error that is specified and not declared is not evaluated. All of a specification may be used, without warning.
+    The coverage factor does not count. An error that is specified and not declared is not evaluated. An error may use
+    its full specification without a warning.
     """
     for number in analysis.mission.specifications.values():
         most, largest_declared = judging.array(number.value), judging.array(largest_at(analysis.mission, number))
@@ -231,12 +232,12 @@ def specification_rows(judging: Judging, analysis: Analysis) -> Iterator["Specif
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpecificationRow(FamilyRow):
-    """One specification in many cases."""
+    """Row of one specification in many cases."""
 
     number: Number
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case; models do not differ in it."""
+        """Row of a case in words; it is the same for both models."""
         return worded(
             case,
             self.judged,

@@ -1,7 +1,8 @@
-"""Warnings of a mission file: every sentence, its name is its code as in `phrases`, and when it is said.
+"""Warnings about a mission file: their sentences, and the finders that decide when to give each.
 
-Most change no verdict; what is in doubt is a warning at least. A finder gives a sentence and the key that it is said
-of; the line of the key is looked up here, once.
+The name of a sentence's function is its code, as in `phrases`. Most warnings change no verdict. A warning that doubts
+the checked mission sets the status to `warn` at least. A finder gives a sentence and the key that it is about; the
+line of the key is looked up here, once.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,7 +32,7 @@ _SENSITIVITY = "acceleration_sensitivity"
 
 
 class _Warned(NamedTuple):
-    """A sentence and the key of the file that it is said of; None: of the whole."""
+    """A sentence and the key of the file that it is about; None: the sentence is about the whole file."""
 
     key: KeyPath | None
     message: Note
@@ -42,16 +43,16 @@ class _Warned(NamedTuple):
 def file_warnings(
     case: Case, rows: Sequence[Row], waivers: Sequence[tuple[KeyPath, Note]]
 ) -> tuple[FileWarning, ...]:
-    """Everything about the file of a mission that should not go unsaid.
+    """All warnings about the file of a mission.
 
     Parameters
     ----------
     case : Case
-        That is judged.
+        The judged case.
     rows : sequence of Row
-        As judged.
+        Judged rows of the case.
     waivers : sequence of (key, sentence)
-        What is to be said of waivers.
+        Warnings about waivers.
     """
     mission = case.mission
     warnings = (
@@ -124,7 +125,7 @@ def nothing_declared() -> str:
 
 # ---------------------------------------------------------------------- how platforms fly
 def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
-    """Paths in doubt where rows do not say it; a place that strays is no part of a log's residual."""
+    """Warn of paths in doubt that no row reports; a position doubt is separate from the residual of a log."""
     owners = {doubt.owner for doubt in input_doubts(mission) if not doubt.is_stated}
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
@@ -137,7 +138,7 @@ def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
 
 
 def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
-    """Logs whose noise changes the allowables, through the path that is fitted to them."""
+    """Warn of logs whose noise changes the allowables, through the path that is fitted to the log."""
     for name in PLATFORMS:
         noise = allowable_noise(mission, name)
         if noise is not None and noise.change > MAX_UNSAID_CHANGE_FRACTION:
@@ -164,10 +165,10 @@ def path_is_doubtful(platform: str, doubt: str) -> str:
 
 
 def straight_orbits(mission: Mission) -> Iterator[_Warned]:
-    """Doubt each platform that is as fast as a satellite and has no `acceleration`; say what its orbit would have.
+    """Warn of each platform as fast as a satellite without `acceleration`; give the acceleration of its orbit.
 
-    Over an aperture T the missing acceleration a moves the true path by aT²/8 against the straight one: 25 m in 5 s.
-    A file that writes an acceleration has decided, zero included.
+    Over an aperture T the missing acceleration a moves the true path by aT²/8 against the straight path: 25 m in 5 s.
+    A file that states an acceleration has made the choice, also with zero.
     """
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
@@ -175,7 +176,7 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
         if speed <= FASTEST_FLIGHT or platform.acceleration is not None or platform.is_of_the_earth:
             continue
         key = ("platforms", name, "speed" if platform.velocity is None else "velocity")
-        from bisar_budget.paths.earth import free_fall  # 8 ms, and most missions do not come here
+        from bisar_budget.paths.earth import free_fall  # takes 8 ms; most missions do not need it
 
         acceleration = free_fall(platform.state.position, platform.state.velocity, axes)
         yield _Warned(key, satellite_flies_straight(name, speed, acceleration, axes is not None), is_doubt=True)
@@ -200,7 +201,7 @@ def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence
 
 # ---------------------------------------------------------------------- how errors are stated
 def _of_instruments(case: Case) -> Iterator[_Warned]:
-    """Find how sensors and clocks are stated, and errors that are stated twice."""
+    """Warn of the ways in which sensors and clocks are stated, and of errors that are stated twice."""
     mission, sync = case.mission, case.mission.synchronization
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
@@ -214,7 +215,7 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
 
 
 def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
-    """Arms that nothing swings, as far as the file says."""
+    """Warn of lever arms without an attitude error in the file that swings them."""
     for name in PLATFORMS:
         if swings_nothing(getattr(mission.platforms, name)):
             key = ("platforms", name, "motion_error", "lever_arm", "arm")
@@ -231,7 +232,7 @@ def nothing_swings_the_arm(platform: str) -> str:
 
 
 def calm_oscillators(mission: Mission) -> list[str]:
-    """Platforms of whose oscillators the file states a sensitivity to acceleration, and that nothing shakes."""
+    """Platforms whose oscillators have a stated sensitivity to acceleration, but neither vibration nor turn."""
     return [
         name
         for name in PLATFORMS
@@ -240,7 +241,7 @@ def calm_oscillators(mission: Mission) -> list[str]:
 
 
 def _of_calm_oscillators(mission: Mission) -> Iterator[_Warned]:
-    """Sensitivities to acceleration that the file states, of oscillators that nothing shakes or turns."""
+    """Warn of stated sensitivities to acceleration of oscillators that neither vibrate nor turn."""
     for name in calm_oscillators(mission):
         key = ("platforms", name, "oscillator", _SENSITIVITY)
         yield _Warned(key, nothing_shakes_the_oscillator(name), is_doubt=True)
@@ -256,7 +257,7 @@ def nothing_shakes_the_oscillator(platform: str) -> str:
 
 
 def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
-    """Oscillators whose noise is in doubt, where no row says it: no requirement rests on it."""
+    """Warn of oscillators with doubted noise that no row reports: no requirement depends on the noise."""
     for name in PLATFORMS:
         for key, sentence in noise_doubts(mission, name):
             if not any(row.reason is not None and row.reason.includes(sentence) for row in rows):
@@ -264,7 +265,7 @@ def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned
 
 
 def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
-    """Correlations that no row and no aggregate looks at."""
+    """Warn of correlations that no row and no aggregate uses."""
     for name in PLATFORMS if mission.allocation.combine == "each" else ():
         covariance = getattr(mission.platforms, name).motion_error.covariance
         if covariance is not None and covariance.has_correlations():
@@ -297,7 +298,7 @@ def exchanges_are_rare(aperture_time: float) -> str:
 
 # ---------------------------------------------------------------------- autofocus
 def _of_autofocus(mission: Mission, resolution: Resolution) -> Iterator[_Warned]:
-    """An `autofocus.n_pull` that is more than counts, by range walk, or than the scene's size leaves."""
+    """Warn of an `autofocus.n_pull` above the limit that range walk or the size of the scene sets."""
     n_pull, algorithm, radius = mission.autofocus.n_pull, mission.autofocus.algorithm, mission.scene.radius
     if n_pull is None:
         return

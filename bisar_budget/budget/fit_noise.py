@@ -1,8 +1,8 @@
 """Changes of the allowables by the noise of a log, through the path that is fitted to it.
 
-An allowable of a position or a velocity follows from how the line of sight to the platform turns. A fit to a noisy
-log has an error at each time of the aperture, and every allowable with it. The error is a sum of independent modes,
-along each axis. Each is put into the path with one sigma of either sign, and the changes add as squares.
+An allowable of a position or a velocity follows from the turn of the line of sight to the platform. A fit to a noisy
+log has an error at each time of the aperture, and so has every allowable. The error is a sum of independent modes,
+along each axis. Each mode is added to the path with one sigma of either sign, and the changes add as squares.
 """
 
 from dataclasses import dataclass, replace
@@ -17,9 +17,9 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.ranges.exact_ranges import Floats
 
-MAX_UNSAID_CHANGE_FRACTION = 0.05  # of an allowable, that goes unsaid
+MAX_UNSAID_CHANGE_FRACTION = 0.05  # largest change of an allowable without a warning
 _DECISIVE_EFFECT_FRACTION = (
-    0.1  # of the largest effect per unit of a kind: what does less has an allowable that decides nothing
+    0.1  # of the largest effect per unit of a kind: the allowable of a smaller effect decides nothing
 )
 _KINDS = ("position", "velocity")
 
@@ -38,7 +38,7 @@ class AllowableNoise:
 
 
 def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
-    """Largest change of an allowable of both platforms by the fit's own noise; None of a path that is no fit."""
+    """Largest change of an allowable of both platforms by the noise of a platform's fit; None without a fit."""
     platform: Platform = getattr(mission.platforms, name)
     path = platform.path
     if path is None or path.path_noise is None or path.acceleration_noise is None:
@@ -79,9 +79,10 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
 
 
 def _changes(units: Floats) -> Floats:
-    """One sigma of the relative change of the allowable of each error, (platforms, axes), by effects per unit.
+    """One sigma of the relative change of the allowable of each error, (platforms, axes), from effects per unit.
 
-    These are of the path itself, of each mode, and of each with the other sign, (platforms, axes, sides).
+    `units` (platforms, axes, sides) holds the effects for the path itself, for the path plus each mode, and for the
+    path minus each mode.
     """
     here = units[..., 0]
     with np.errstate(all="ignore"):

@@ -1,7 +1,8 @@
 """All rows and requirements of a mission, judged in many cases at once; a check is one case.
 
-Rows are made by their families, each by every model that gates. Of two the stricter verdict holds. Then follows what
-no row says by itself: what must be declared, paths in doubt, effects that no requirement takes, waivers.
+Each family makes its rows by every gating model. With two models the stricter verdict holds. Then follow the
+judgements that need more than one row: required declarations, paths in doubt, effects that no requirement covers,
+waivers.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -56,8 +57,8 @@ _OWNERS = (*PLATFORMS, "clock", "mission")
 class JudgedMission:
     """A mission as judged in many cases.
 
-    `rows` are in the order of the contract and after waivers, `before` the same before waivers, in which each row may
-    say why its numbers do not decide. `families` has the rows as they were made, by each model that gates.
+    `rows` are the rows after waivers, in the order of the contract. `before` are the same rows before waivers; their
+    `why` gives the reason if the row's numbers do not decide. `families` has each family's rows by gating model.
     """
 
     analysis: Analysis
@@ -70,12 +71,12 @@ class JudgedMission:
     air: StayingAir
     scene: JudgedScene | None
     floor: Codes  # the best status that each case can have
-    waivers: NDArray[np.intp]  # of each row, by its place in the file, (rows, n); -1: none
-    waived_requirements: Sequence[tuple[Truths, int]]  # where each is waived, and its own waiver by place; -1: none
+    waivers: NDArray[np.intp]  # index in the file of each row's waiver, (rows, n); -1: no waiver
+    waived_requirements: Sequence[tuple[Truths, int]]  # cases in which each is waived, index of its waiver or -1
 
     @property
     def is_empty(self) -> bool:
-        """Whether no case declares an error at all: nothing was judged."""
+        """Whether no case declares an error: nothing was judged."""
         nothing = (
             row.metric in (DECLARE, SPECIFICATION)
             or np.all((row.status == CODE["not_declared"]) | (row.why == Why.NOT_DECLARED_AS_REQUIRED))
@@ -84,7 +85,7 @@ class JudgedMission:
         return all(nothing)
 
     def covering(self, row_id: str | None = None) -> Iterator[tuple[str, Truths]]:
-        """Waivers by their ids, in the order of the file, and the cases in which each covers anything, or a row."""
+        """Ids of the waivers, in the order of the file, each with the cases in which it covers anything, or a row."""
         rows = [row_id is None or row.subject.id == row_id for row in self.rows]
         requirements = self.waived_requirements if row_id is None else ()
         for waiver_index, waiver in enumerate(self.analysis.mission.waivers):
@@ -93,7 +94,7 @@ class JudgedMission:
 
     @cached_property
     def status(self) -> Codes:
-        """Status of the mission in each case: the worst of what gates, and no better than the floor."""
+        """Status of the mission in each case: the worst status that gates, and no better than the floor."""
         codes = np.array([row.status for row in self.rows])
         worst = np.where(_GATES[codes], codes, CODE["pass"]).min(axis=0)
         return np.asarray(np.minimum(worst, self.floor), dtype=np.int8)
@@ -105,7 +106,7 @@ def judged_mission(analysis: Analysis, today: date) -> JudgedMission:
     Parameters
     ----------
     analysis : Analysis
-        Of cases that need the same number of nodes.
+        Analysis of cases that need the same number of nodes.
     today : date
         Day on which waivers are judged, UTC.
     """
@@ -151,7 +152,7 @@ class _Judgement:
         of_requirements = {key: holding_place(mission, self.today, [f"mission.{key}"]) for key in KEYS}
         states = requirement_states(
             mission,
-            # A requirement judges effects by itself, and is waived where its row is.
+            # A requirement judges its effects without the row's status, but a waiver of its row waives it too.
             np.where((after == CODE["waived"]) & np.isin(by_themselves, _BROKEN), CODE["waived"], by_themselves),
             np.array([row.utilization for row in rows]),
             of_all.judges(),
@@ -180,7 +181,7 @@ class _Judgement:
 
     # ---------------------------------------------------------------- rows of the families
     def _families(self, model: str) -> Iterator[FamilyRow]:
-        """Every row by a model, in the order of the contract."""
+        """All rows by a model, in the order of the contract."""
         needs = self.mission.requirements
         yield from self._errors.rows(model)
         if self._vibrates or self._shows_vibration:
@@ -201,7 +202,7 @@ class _Judgement:
         yield from specification_rows(self.judging, self.analysis)
 
     def _rows(self, model: str, families: Sequence[FamilyRow]) -> dict[str, Judged]:
-        """Rows by their ids: one may be of another family in some of the cases, and is in none of them nowhere."""
+        """Rows by their ids; a row may come from different families in different cases, and exists in some case."""
         rows: dict[str, Judged] = {}
         by_model = np.full(self.cases, MODELS.index(model), np.int8)
         for row in families:
@@ -223,7 +224,7 @@ class _Judgement:
 
     @cached_property
     def _limits(self) -> Mapping[str, Any]:
-        """Quadratic phase that each owner is held to, gain of autofocus included. [rad]"""
+        """Limit on the quadratic phase of each owner, gain of autofocus included. [rad]"""
         allocation = self.analysis.allocation
         return {owner: self.judging.array(allocation.qpe_allowed(owner)) for owner in _OWNERS}
 
@@ -254,17 +255,17 @@ class _Judgement:
         )
         return JudgedScene(analysis, edges)
 
-    # ---------------------------------------------------------------- what no row says by itself
+    # ---------------------------------------------------------------- judgements beyond single rows
     @cached_property
     def _in_doubt(self) -> dict[tuple[str, str], Truths]:
-        """Platforms with a path, by a kind of error, and in which cases that is in doubt by more than is declared."""
+        """Cases in which a platform's path is in doubt by more than is declared, by platform and kind of error."""
         return doubted_platforms(self.mission, self.cases)
 
     def _undeclared(self, judged_rows: Mapping[str, Judged]) -> Iterator[Judged]:
-        """Rows that are shown, and of position errors of paths in doubt, that no case declares."""
+        """Rows that no case declares: rows to show, and rows of errors of paths in doubt."""
         subjects = dict(self.shown or {})
         for (name, kind), is_doubtful in self._in_doubt.items():
-            is_shown = is_doubtful.any() and kind != RESIDUAL  # which has a family of its own
+            is_shown = is_doubtful.any() and kind != RESIDUAL  # the residual has a family of its own
             axes = (subject(name, kind, axis) for axis in "xyz") if is_shown else ()
             subjects |= {
                 axis_subject.id: axis_subject
@@ -279,9 +280,9 @@ class _Judgement:
         )
 
     def _has_noise(self) -> Truths:
-        """Cases that declare something that spreads, or a tone that ISLR holds.
+        """Cases that declare an error that spreads, or a tone that ISLR limits.
 
-        What an error of motion leaves beyond the cubic spreads where it is more than negligible.
+        The phase of a motion error beyond the cubic spreads if it is not negligible.
         """
         array, gates = self.judging.array, self.analysis.gates
         level = negligible_rad(self.mission)
@@ -294,7 +295,7 @@ class _Judgement:
         return np.asarray(np.any([np.zeros(self.cases, bool), *has_any], axis=0))
 
     def _doubted_rows(self, rows: Sequence[Judged]) -> Truths:
-        """Rows of oscillators whose noise is not what the file states, (rows, cases)."""
+        """Rows of oscillators with doubted noise, (rows, cases)."""
         doubted = {error.id: error.is_in_doubt for error in self.analysis.random if np.any(error.is_in_doubt)}
         in_doubt = np.zeros((len(rows), self.cases), dtype=bool)
         for row_index, row in enumerate(rows) if doubted else ():
@@ -302,7 +303,7 @@ class _Judgement:
         return in_doubt
 
     def _floor(self) -> Codes:
-        """Best status that each case can have: paths may be in doubt, and nothing declared."""
+        """Best possible status of each case: worse than `pass` if paths are in doubt or no error is declared."""
         floor, analysis = np.full(self.cases, CODE["pass"]), self.analysis
         for name, path in zip(PLATFORMS, analysis.geometry.both, strict=True):
             platform = getattr(self.mission.platforms, name)
@@ -321,9 +322,9 @@ class _Judgement:
 
 
 class RowStatuses:
-    """Statuses of rows in many cases, (rows, cases), as what no row says by itself changes them, and why.
+    """Statuses of rows in many cases, (rows, cases), and the reasons for changes by judgements beyond single rows.
 
-    Each step turns rows into rows that are not evaluated; one that fails stays so.
+    Each step turns rows into rows that are not evaluated; a row that fails still fails.
     """
 
     def __init__(self, rows: Sequence[Judged], mission: Mission) -> None:
@@ -332,17 +333,17 @@ class RowStatuses:
         self.status, self.why = np.array([row.status for row in rows]), np.array([row.why for row in rows])
 
     def _settle(self, rows: Sequence[bool], is_so: Any, why: Why) -> None:
-        """Some rows are not evaluated, where it is so, (rows, cases) or (cases,)."""
+        """Set `rows` to not evaluated in the cases where `is_so`, (rows, cases) or (cases,)."""
         are_settled = np.array(rows, dtype=bool)[:, None] & is_so
         self.status = np.where(are_settled, CODE["not_evaluated"], self.status)
         self.why = np.where(are_settled, np.int8(why), self.why)
 
     def require_declarations(self, geometry: BistaticGeometry) -> None:
-        """Errors that should be declared and are not are not evaluated; the first row says whether all are there."""
+        """Set missing required errors to not evaluated; the first row shows whether any is missing."""
         if not self.mission.requirements.declare:
             return
         still = np.array([np.broadcast_to(path.is_still, self.status.shape[1:]) for path in geometry.both])
-        # There is nearly always one combination: a platform that moves does so in every case.
+        # There is nearly always one combination: a moving platform moves in every case.
         for still_platforms in np.unique(still, axis=1).T:
             cases = (still == still_platforms[:, None]).all(axis=0)
             names = [name for name, is_still in zip(PLATFORMS, still_platforms, strict=True) if is_still]
@@ -352,24 +353,24 @@ class RowStatuses:
             self._settle(owed, cases & (self.status == CODE["not_declared"]), Why.NOT_DECLARED_AS_REQUIRED)
 
     def doubt_inputs(self, in_doubt: Mapping[tuple[str, str], Truths]) -> None:
-        """Errors of a path that is in doubt by more than the file declares are not evaluated."""
+        """Set errors of a path that is in doubt by more than the file declares to not evaluated."""
         for (name, kind), is_doubtful in in_doubt.items():
             if is_doubtful.any():
                 owed = [is_in_doubt(row_subject, name, self.mission, kind) for row_subject in self.subjects]
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
     def doubt_air(self, doubted: Mapping[str, Truths]) -> None:
-        """Rows, by their ids, that rest on air that stays are not evaluated."""
+        """Set rows that depend on constant air, by their ids, to not evaluated."""
         for row_id, is_doubted in doubted.items():
             if is_doubted.any():
                 rows = [row_subject.id == row_id for row_subject in self.subjects]
-                is_new = self.why != Why.EFFECT_NOT_TAKEN  # which names the requirement to add
+                is_new = self.why != Why.EFFECT_NOT_TAKEN  # that reason names the requirement to add
                 self._settle(rows, is_doubted & self._is_open & is_new, Why.AIR_STAYS)
 
     def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
-        """Rows that make up an effect that no requirement takes are not evaluated.
+        """Set rows that make up an effect that no requirement covers to not evaluated.
 
-        One that no requirement limits, with a negligible effect, judges nothing: `info`.
+        A row without a limit and with a negligible effect judges nothing: `info`.
         """
         for row_index, row in enumerate(self.rows):
             row_id, status = row.subject.id, self.status[row_index]
@@ -387,18 +388,18 @@ class RowStatuses:
             self.why[row_index] = np.where(makes_up, np.int8(Why.EFFECT_NOT_TAKEN), self.why[row_index])
 
     def judge_place(self, is_misplaced: Truths) -> None:
-        """Where the image is displaced by an amount that no row holds, the location is not evaluated."""
+        """Set the location to not evaluated if an error displaces the image by an amount that no row limits."""
         if self.mission.requirements.location_error is not None:
             rows = [row_subject.id == f"mission.{LOCATION}" for row_subject in self.subjects]
             self._settle(rows, is_misplaced & self._is_open, Why.NO_PLACE)
 
     def judge_halves(self, halves: Sequence[HalfCause]) -> None:
-        """Rows that rest on a cause of which the file states one half are not evaluated."""
+        """Set rows that depend on a half-stated cause to not evaluated."""
         for half in halves:
             self._settle([half.holds(row_subject) for row_subject in self.subjects], self._is_open, Why.HALF_A_CAUSE)
 
     def judge_spread(self, has_noise: Truths) -> None:
-        """ISLR is not evaluated where nothing but a cubic phase makes it."""
+        """Set ISLR to not evaluated if only a cubic phase contributes to it."""
         if not has_noise.all():
             rows = [row_subject.kind == "islr" for row_subject in self.subjects]
             is_new = ~np.isin(self.why, (Why.INPUT_IN_DOUBT, Why.AIR_STAYS))
@@ -409,7 +410,7 @@ class RowStatuses:
         return np.asarray((self.status != CODE["fail"]) & (self.status != CODE["not_declared"]))
 
     def waivers(self, today: date) -> NDArray[np.intp]:
-        """Place in the file of the first waiver that holds and covers each row that is broken; -1: none does."""
+        """Index in the file of the first valid waiver that covers each broken row; -1: no such waiver."""
         indices = np.full(self.status.shape, -1)
         if not self.mission.waivers:
             return indices
@@ -422,14 +423,14 @@ class RowStatuses:
         return np.where(np.isin(self.status, _BROKEN), indices, -1)
 
     def judges(self) -> Codes:
-        """Place in `KEYS` of the requirement that judges each row, -1: none, since it is not declared."""
+        """Index in `KEYS` of the requirement that judges each row; -1: no requirement, or not declared."""
         binding = np.array([row.binding for row in self.rows])
         metric = np.array([[KEYS.index(row.metric) if row.metric in KEYS else -1] for row in self.rows])
         judges = np.where((binding >= 0) & (binding < REQUIREMENTS.index(END_OF_IMAGE)), binding, metric)
         return np.where(self.why == Why.NOT_DECLARED_AS_REQUIRED, -1, judges).astype(np.int8)
 
     def rows_with(self, status: Codes) -> tuple[Judged, ...]:
-        """The rows with these statuses; one that has become `info` uses nothing."""
+        """The rows with these statuses; a row that has become `info` has no utilization."""
         rows = []
         for row, code, why in zip(self.rows, status, self.why, strict=True):
             is_info = (code == CODE["info"]) & (row.status != code)
@@ -439,7 +440,7 @@ class RowStatuses:
 
 
 def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None = None) -> list[Judged]:
-    """Rows of complete checks: of two each time the one with the stricter verdict, then the higher utilization."""
+    """Rows by both models merged: for each row the model with the stricter verdict, then the higher utilization."""
     if published is None:
         return list(full.values())
     stricter, only_published = [], dict(published)
@@ -455,4 +456,4 @@ def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None
         takes_published = (by_published.status < by_full.status) | (tie & ~is_equal & (use[1] > use[0]))
         takes_published |= tie & is_equal & ~is_as_high(size[1], size[0])
         stricter.append(by_full.where(takes_published, by_published))
-    return [*stricter, *only_published.values()]  # an aggregate that only one of them has
+    return [*stricter, *only_published.values()]  # an aggregate that only one model has

@@ -1,9 +1,10 @@
-"""Whether every requirement was judged: the rows that judge each, the effects that none takes, what must be declared.
+"""Judge every requirement: the rows that judge each, the effects that no requirement covers, the declared errors.
 
-Exit 0 means that every requirement was judged and is met. Each effect of each declared error is judged once: the
-quadratic phase by its requirement; the cubic by its own, else by ISLR; what spreads by ISLR; a tone by PSLR, else by
-ISLR; a displacement by the location. An effect that no requirement takes is negligible while all of it stays below a
-tenth of the quadratic requirement and below 0.08 rad. Above, the rows that make it up are `not_evaluated`.
+Exit 0 means that every requirement was judged and is met. Each effect of each declared error is judged once. The
+quadratic requirement judges the quadratic phase. The cubic requirement, else ISLR, judges the cubic phase. ISLR
+judges power that spreads. PSLR, else ISLR, judges a tone. The location requirement judges a displacement. An effect
+that no requirement covers is negligible while its total is below a tenth of the quadratic requirement and below
+0.08 rad. Above, the rows that make it up are `not_evaluated`.
 
 Every number is an array over the cases, (n,): a check is one case.
 """
@@ -23,26 +24,27 @@ from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
 UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
-EQUAL_USE_FRACTION = 1e-9  # of a utilization: what is nearer is the same, but for rounding
-NEGLIGIBLE_FRACTION, SMALL_RAD = 0.1, 0.08  # of the quadratic requirement; and of any image
-# Of the largest part: a row with less does not make an effect up, if all that have less are negligible.
+EQUAL_USE_FRACTION = 1e-9  # relative difference below which utilizations are equal, but for rounding
+NEGLIGIBLE_FRACTION, SMALL_RAD = 0.1, 0.08  # of the quadratic requirement; phase that is small in any image
+# Relative to the largest part: rows with smaller parts do not make up an effect if their sum is negligible.
 MAKER_FRACTION = 0.1
 
-# Requirements that take an effect, in the order in which one is suggested.
+# Requirements that cover an effect, in the order in which they are suggested.
 TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "islr")}
 
-EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}  # of lines to add
+EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}  # values of suggested lines
 
-_NONE = np.int8(len(STATUS))  # of a row that judges nothing
+_NONE = np.int8(len(STATUS))  # code of a row that judges nothing
 IS_JUDGED = np.array([status.is_judged for status in STATUS.values()])
-# Whether a status leaves a requirement met, with or without a warning; the last is that of `_NONE`.
+# Whether a requirement is met with a status, with or without a warning; the last value belongs to `_NONE`.
 IS_MET = np.array([*(status.complies for status in STATUS.values()), False])
 
 
 class UntakenEffect(NamedTuple):
-    """An effect that no requirement takes: where it is negligible, and the rows that make it up where it is not.
+    """An effect that no requirement covers: the cases in which it is negligible, and otherwise the rows in it.
 
-    Its total, each error's part by row id, and in `least` the smallest part of a row that makes it up. [rad]
+    `total` is the total of the effect, `parts` has each error's part by row id, and `least` is the smallest part of a
+    row that makes up the effect. [rad]
     """
 
     kind: str  # cubic, spread or tone
@@ -54,11 +56,11 @@ class UntakenEffect(NamedTuple):
 
 
 class RequirementState(NamedTuple):
-    """How a requirement stands: its status, the place of the row that decides or -1, and the places that judge it.
+    """A judged requirement: its status, the index of the row that decides (or -1), and the rows that judge it.
 
-    `utilization` is that of the requirement by the row at `user`. Where the requirement is met, with or without a
-    warning, that is the row with the largest utilization: a warning of the other model alone may use less.
-    `is_unjudged` is where it cannot be judged, be that waived or not.
+    `utilization` is the utilization of the requirement by the row at index `user`. If the requirement is met, with or
+    without a warning, this is the row with the largest utilization: a row with a warning by the second model alone
+    may use less. `is_unjudged`: the requirement cannot be judged, waived or not.
     """
 
     key: str
@@ -71,18 +73,18 @@ class RequirementState(NamedTuple):
 
 
 def first_highest(uses: Floats) -> NDArray[np.intp]:
-    """Place of the row that uses most, (cases,); of rows that use as much of it, but for rounding, the first."""
+    """Index of the row with the highest use, (cases,); the first of rows with equal use, but for rounding."""
     return np.asarray(is_as_high(uses, uses.max(axis=0)).argmax(axis=0))
 
 
 def is_as_high(uses: Any, other_uses: Any) -> Truths:
-    """Whether utilizations are as high as others, but for rounding."""
-    with np.errstate(invalid="ignore"):  # one that is endless is as high as itself
+    """Whether `uses` are as high as `other_uses`, but for rounding."""
+    with np.errstate(invalid="ignore"):  # an infinite utilization is as high as itself
         return np.asarray((uses >= other_uses - EQUAL_USE_FRACTION * np.abs(other_uses)) | (uses == other_uses))
 
 
 def negligible_rad(mission: Mission) -> Any:
-    """Total of an effect that no requirement takes, below which it is negligible. [rad]"""
+    """Total below which an effect that no requirement covers is negligible. [rad]"""
     return np.minimum(NEGLIGIBLE_FRACTION * np.asarray(mission.requirements.quadratic_phase_error), SMALL_RAD)
 
 
@@ -106,32 +108,33 @@ def requirement_states(
     is_misplaced: Any,
     unjudged: Mapping[str, Any],
 ) -> list[RequirementState]:
-    """Say how every requirement stands.
+    """Judge every requirement.
 
     Parameters
     ----------
     mission : Mission
-        Some of its numbers may be arrays (n,).
+        Numbers may be arrays (n,).
     codes : (rows, n)
-        Statuses of the judged rows, of those that are waived `waived`.
+        Statuses of the judged rows; `waived` for waived rows.
     utilization : (rows, n)
-        Theirs; not a number where there is none.
+        Utilizations of the rows; NaN without a value.
     judges : (rows, n)
-        Place in KEYS of the requirement that each is held to, -1: none.
+        Index in KEYS of the requirement that each row judges; -1: no requirement.
     quadratic_use : (rows, n)
-        Quadratic phase of each over what that may be, whatever sets its allowable; not a number where it has none.
+        Quadratic phase of each row over its limit, for any requirement that sets the allowable; NaN without a phase.
     waived : mapping of str to bool
         Keys of the requirements that a valid waiver names.
     before : (rows, n)
         Statuses of the rows before waivers.
     in_doubt : (rows, n)
-        Rows of oscillators whose noise is not what the file states.
+        Rows of oscillators with doubted noise: the computed noise may differ from the noise of the oscillator.
     has_noise : (n,) bool
-        Whether something that spreads, or a tone that ISLR holds, is declared: without it ISLR is not judged.
+        Whether an error that spreads, or a tone that ISLR limits, is declared: without such an error ISLR is not
+        judged.
     is_misplaced : (n,) bool
-        Whether a declared error displaces the image by an amount that no row holds.
+        Whether a declared error displaces the image by an amount that no row limits.
     unjudged : mapping of str to bool or (n,) bool
-        Keys of the requirements that are not evaluated, and in which cases: they rest on air that stays in a long
+        Keys of the requirements that are not evaluated, with the cases: they depend on constant air in a long
         aperture, or on half a cause.
     """
     uses, states = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
@@ -139,24 +142,24 @@ def requirement_states(
     for key in required_keys(mission):
         mine = IS_JUDGED[codes] & (judges == KEYS.index(key))
         levels, used = np.where(mine, codes, _NONE), uses
-        if key == QUADRATIC:  # a row that another requirement binds is held to this one too
+        if key == QUADRATIC:  # this requirement also limits a row that another requirement binds
             is_of_other = IS_JUDGED[codes] & ~mine & ~np.isnan(quadratic_use)
             by_autofocus = np.where(codes == RANK["pass_with_autofocus"], codes, RANK["pass"])
             broken = np.where(
                 codes == RANK["waived"], codes, RANK["fail"]
-            )  # a waiver of the row covers all it breaks
+            )  # a waiver of the row covers all that the row breaks
             breaks = np.nan_to_num(quadratic_use) > LIMIT_RATIO
             rests_on = in_doubt & is_open & (np.nan_to_num(quadratic_use) > MIN_USE_FRACTION)
             kept = np.where(rests_on, codes, by_autofocus)
             levels = np.where(is_of_other, np.where(breaks, broken, kept), levels)
             used = np.where(is_of_other, quadratic_use, uses)
             mine = mine | is_of_other
-        else:  # autofocus corrects a quadratic phase alone
+        else:  # autofocus corrects only a quadratic phase
             levels = np.where(levels == RANK["pass_with_autofocus"], RANK["pass"], levels)
         worst = levels.min(axis=0)
-        # What passes by itself may come nearer to breaking the requirement than what autofocus brings to pass.
+        # A row that passes by itself may be nearer to breaking the requirement than a row that passes by autofocus.
         is_met = (worst == RANK["pass_with_autofocus"]) & (levels == RANK["pass"])
-        # Of what is waived the first is what has a number that breaks the requirement.
+        # A waived row with a number that breaks the requirement comes before waived rows without a number.
         shown = np.where((codes == RANK["waived"]) & is_open, -0.5, used)
         decider = first_highest(np.where((levels == worst) | is_met, shown, -1.0))
         largest = first_highest(np.where(mine & IS_MET[levels], used, -1.0))

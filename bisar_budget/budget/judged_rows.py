@@ -1,4 +1,4 @@
-"""A row of the budget in many cases at once, and how it is judged; a check is one case."""
+"""A row of the budget in many cases at once, and the rules that judge it; a check is one case."""
 
 import math
 from abc import ABC, abstractmethod
@@ -22,7 +22,7 @@ from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Floats
 
-Codes = NDArray[np.int8]  # places of statuses in STATUS: the worst has the lowest
+Codes = NDArray[np.int8]  # indices of statuses in STATUS: the worst has the lowest
 
 LIMIT_RATIO = 1 + UTILIZATION_TOLERANCE
 CODE = {name: np.int8(rank) for name, rank in RANK.items()}
@@ -41,20 +41,20 @@ NUMBERS = (
     "islr_db",
     "equal_loss_qpe_rad",
     "rest_rad",
-)  # of columns
+)  # names of columns
 _columns_of_numbers = attrgetter(*NUMBERS)
 IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # columns in the unit of their row
 
 
 def statuses(codes: Any) -> Any:
-    """Name of a status by its code, or names by codes."""
+    """Name of the status with a code, or names for an array of codes."""
     return _NAMES[codes]
 
 
 class Why(IntEnum):
-    """Why a row has another status than its own numbers give it."""
+    """Why a row has a different status than its own numbers give it."""
 
-    OWN = 0  # it has not
+    OWN = 0  # the row's own numbers decide
     NOT_DECLARED_AS_REQUIRED = 1
     INPUT_IN_DOUBT = 2
     EFFECT_NOT_TAKEN = 3
@@ -65,9 +65,9 @@ class Why(IntEnum):
 
 
 class Judged(NamedTuple):
-    """One row of many cases: codes of statuses, by the place of each in `STATUS`, and numbers; NaN where none is.
+    """One row of many cases: codes of statuses (indices in `STATUS`) and numbers; NaN where a value does not exist.
 
-    Numbers from `allowable_published` on are found where the whole of a row is asked for.
+    Numbers from `allowable_published` on are computed only for complete rows (`Judging.is_complete`).
     """
 
     subject: Subject
@@ -75,12 +75,12 @@ class Judged(NamedTuple):
     declared: Floats
     allowable: Floats
     utilization: Floats
-    binding: Codes  # place in REQUIREMENTS of what sets the allowable, or -1: the row's metric
+    binding: Codes  # index in REQUIREMENTS of the requirement that sets the allowable, or -1: the row's metric
     why: Codes  # of `Why`
-    model: Codes  # place in MODELS of the model that judges
+    model: Codes  # index in MODELS of the model that judges
     qpe_published_rad: Floats
     cubic_rad: Floats
-    quadratic_use: Floats  # quadratic phase over its limit, whatever sets the allowable; NaN where it has none
+    quadratic_use: Floats  # quadratic phase over its limit, for any binding; NaN without a quadratic phase
     allowable_published: Floats
     allowable_full: Floats
     qpe_full_rad: Floats
@@ -88,7 +88,7 @@ class Judged(NamedTuple):
     equal_loss_qpe_rad: Floats
     rest_rad: Floats
     metric: str = QUADRATIC
-    is_of_ranges: bool = False  # `qpe_full_rad` is that of exact ranges
+    is_of_ranges: bool = False  # `qpe_full_rad` comes from exact ranges
 
     @classmethod
     def of_none(cls, row_subject: Subject, cases: int) -> "Judged":
@@ -108,50 +108,50 @@ class Judged(NamedTuple):
         return self._replace(**columns)
 
     def at(self, row_index: int, row_subject: Subject) -> "Judged":
-        """One of several rows that were judged together, (rows, cases), by its place."""
+        """The row at `row_index` of several rows that were judged together, (rows, cases)."""
         return self._of_columns(lambda column: column[row_index], _COLUMNS)._replace(subject=row_subject)
 
     def where(self, takes_other: Any, other: "Judged") -> "Judged":
-        """This row, but in some cases the other."""
+        """This row, with the values of `other` in the cases where `takes_other` is true."""
         columns: dict[str, Any] = {
             name: np.where(takes_other, getattr(other, name), getattr(self, name)) for name in _COLUMNS
         }
         return self._replace(**columns)
 
     def in_decibel(self) -> "Judged":
-        """The row with its factors of amplitude in decibel; its utilization stays that of amplitudes."""
+        """The row with its amplitude factors in decibel; the utilization remains a ratio of amplitudes."""
         return self._of_columns(decibels, IN_UNIT)
 
     def in_unit(self, factor: Any) -> "Judged":
-        """The row with its sizes in a unit of which a factor is one of before."""
+        """The row with its sizes in another unit: each size multiplied by `factor`."""
         return self._of_columns(lambda column: column * factor, IN_UNIT)
 
     def held_to(self, key: str) -> "Judged":
-        """The row with the requirement that sets its allowable."""
+        """The row with requirement `key` as its metric and as the requirement that sets the allowable."""
         return self._replace(metric=key, binding=np.full_like(self.binding, REQUIREMENTS.index(key)))
 
     def allowable_by(self, model: str) -> Floats:
-        """The allowable by a model, whichever gates."""
+        """The allowable by a model, independent of the gating model."""
         return self.allowable_published if model == "published" else self.allowable_full
 
     def requirement(self, case: Case) -> str | None:
-        """The requirement that sets the allowable in a case; None: its metric does."""
+        """The requirement that sets the allowable in a case; None: the row's metric sets it."""
         requirement_index = self.binding[case.place]
         return None if requirement_index < 0 else REQUIREMENTS[requirement_index]
 
     def numbers(self, case: int) -> dict[str, float | None]:
-        """Its numbers in a case, by the names of the columns; None where there is none."""
+        """The row's numbers in a case, by the names of the columns; None where a value does not exist."""
         columns = [column.item(case) for column in _columns_of_numbers(self)]
         return {name: None if math.isnan(number) else number for name, number in zip(NUMBERS, columns, strict=True)}
 
     @property
     def qpe_exact_rad(self) -> Floats:
-        """Quadratic phase by exact ranges, where the row is of an error that they follow. [rad]"""
+        """Quadratic phase by exact ranges; NaN for a row whose error is not computed by exact ranges. [rad]"""
         return self.qpe_full_rad if self.is_of_ranges else np.full(self.qpe_full_rad.shape, math.nan)
 
     @property
     def margin(self) -> Floats:
-        """Allowable over declared less one, as factors where the row has them in decibel."""
+        """Allowable over declared size, minus one; a ratio of amplitudes if the row is in decibel."""
         with np.errstate(all="ignore"):
             margin = 1 / self.utilization - 1
         margin[~np.isfinite(margin)] = math.nan
@@ -162,15 +162,15 @@ _COLUMNS = tuple(name for name in Judged._fields if name not in ("subject", "met
 
 
 def decibels(amplitude: Any) -> Floats:
-    """Levels of factors of amplitude; not a number where there is none. [dB]"""
+    """Levels of amplitude factors; NaN for a factor that is not above 0. [dB]"""
     with np.errstate(all="ignore"):
         return np.where(amplitude > 0, 20 * np.log10(amplitude) + 0.0, math.nan)
 
 
 class Judging(NamedTuple):
-    """How many cases there are, and from which utilization on a pass of each is a warning.
+    """Rules that judge rows: the number of cases, and the utilization above which a pass becomes a warning.
 
-    `is_complete` says whether all of a row is asked for, or what decides.
+    `is_complete`: compute all numbers of each row; otherwise only the numbers that decide.
     """
 
     cases: int
@@ -178,7 +178,7 @@ class Judging(NamedTuple):
     is_complete: bool = False
 
     def array(self, value: Any) -> Floats:
-        """One number for each case; not a number for None."""
+        """One number for each case, (cases,); NaN for None."""
         return np.full(self.cases, math.nan if value is None else value, dtype=float)
 
     def row(
@@ -193,11 +193,11 @@ class Judging(NamedTuple):
         is_unknown: Any = False,
         never_fails: bool = False,
     ) -> Judged:
-        """Judge a row: the first status that applies; where `is_unknown`, what is declared cannot be judged.
+        """Judge a row: the first status that applies; where `is_unknown`, the declared value cannot be judged.
 
-        What is declared is NaN in the cases that declare nothing.
+        `declared` is NaN in the cases that do not declare the error.
         """
-        shape = (self.cases,) if declared is None else declared.shape  # several rows judge alike: (rows, cases)
+        shape = (self.cases,) if declared is None else declared.shape  # several rows at once: (rows, cases)
         none = np.full(shape, math.nan)
         allowed = none if allowable is None else allowable
         if declared is None:
@@ -232,14 +232,14 @@ class Judging(NamedTuple):
 # ---------------------------------------------------------------------- one case in words
 @dataclass(frozen=True, slots=True, eq=False)
 class FamilyRow(ABC):
-    """A row as its family judges it by a model, in many cases; `is_there` are those that have it."""
+    """A row as its family judges it by a model, in many cases; `is_there` marks the cases that have the row."""
 
     judged: Judged
     is_there: Any = field(default=True, kw_only=True)
 
     @abstractmethod
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
 
 
 def worded(
@@ -247,17 +247,17 @@ def worded(
     row: Judged,
     *,
     unit: str,
-    path: KeyPath,  # of the declared value in the mission file
+    path: KeyPath,  # place of the declared value in the mission file
     equation: str,
-    over: Note = NOTHING,  # what to say where it fails
-    doubt: Note = NOTHING,  # what makes a pass a warning
-    no_limit: Note = NOTHING,  # why there is no allowable
-    not_evaluated: Note = NOTHING,  # why a declared value cannot be judged
-    info: Note = NOTHING,  # why the row judges nothing
-    without_autofocus: float = 0.0,  # utilization without its gain
+    over: Note = NOTHING,  # reason for a fail
+    doubt: Note = NOTHING,  # reason for a warning instead of a pass
+    no_limit: Note = NOTHING,  # reason for a missing allowable
+    not_evaluated: Note = NOTHING,  # reason why a declared value cannot be judged
+    info: Note = NOTHING,  # reason why the row judges nothing
+    without_autofocus: float = 0.0,  # utilization without the gain of autofocus
     **more_fields: Any,  # further fields of the row
 ) -> Row:
-    """Put a row as judged, in one case, into words: they follow from its status, and decide nothing."""
+    """Put a judged row, in one case, into words: the words follow from the status and decide nothing."""
     mission, status, numbers = case.mission, statuses(row.status[case.place]), row.numbers(case.place)
     allowable, utilization, full = numbers["allowable"], numbers["utilization"], numbers["qpe_full_rad"]
     reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...](more_fields.pop("remarks", ()))

@@ -1,7 +1,9 @@
-"""The row of what a smooth path leaves of a log, where the file does not say which of both the processor flies.
+"""The row of the residual of a log, if the file does not state which path the processor uses.
 
-Where it flies the fixes, the residual is a random error with a row of its own (`effects.navigation_errors`). Where
-it flies the smooth path there is none. Between both nothing can be judged: this row says so, whatever is required.
+The residual is the difference between the fixes of the log and the smooth path through them. A processor that uses
+the fixes has the residual as a random error, with a row of its own (`effects.navigation_errors`). A processor that
+uses the smooth path has no residual. Without this choice the residual cannot be judged: this row is not evaluated,
+for any set of requirements.
 """
 
 from collections.abc import Iterator
@@ -19,7 +21,7 @@ from bisar_budget.mission.model import Mission
 
 
 def log_rows(judging: Judging, mission: Mission) -> Iterator["UnsaidResidual"]:
-    """One row for each platform whose log leaves too much, in the cases in which it does."""
+    """One row for each platform whose log has too large a residual, in the cases in which it is too large."""
     for name in PLATFORMS:
         is_there = np.broadcast_to(leaves_unsaid(mission, name), (judging.cases,))
         if is_there.any():
@@ -34,9 +36,9 @@ def log_rows(judging: Judging, mission: Mission) -> Iterator["UnsaidResidual"]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UnsaidResidual(FamilyRow):
-    """The residual of a log in many cases; its reason is that of the doubt."""
+    """The residual of a log in many cases; the reason is the note of the input doubt."""
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case; models do not differ in it."""
+        """Row of a case in words; it is the same for both models."""
         path = ("platforms", self.judged.subject.owner, "trajectory", "processed")
         return worded(case, self.judged, unit="m", path=path, equation="residual of the smoothed log")

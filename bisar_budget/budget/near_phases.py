@@ -1,8 +1,8 @@
-"""Phases of tones between one and three cycles per aperture: their rows are held to them beside their echoes.
+"""Phases of tones between one and three cycles per aperture: limits on the phases, beside the limit on the echoes.
 
-Such a tone is an echo and, in its worst phase, a quadratic and a cubic phase. No sum counts these phases, because
-PSLR or ISLR already holds the motion. So the row itself holds them: the quadratic phase to the platform's share,
-autofocus included, the cubic phase to the whole requirement.
+Such a tone makes echoes and, in its worst phase, a quadratic and a cubic phase error. No sum counts these phases,
+because PSLR or ISLR already limits the motion. So the row of the tone limits them: the quadratic phase by the
+platform's share, autofocus included, the cubic phase by the full requirement.
 """
 
 import math
@@ -22,10 +22,10 @@ from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 
 class NearPhases(NamedTuple):
-    """Phases of a declared tone in its worst phase, in many cases; NaN where it is not so slow. [rad]
+    """Phases of a declared tone in its worst phase, in many cases; NaN for a faster tone. [rad]
 
-    `use` is the part of the stricter limit that they use, `quadratic_use` that of the quadratic one, and
-    `without_autofocus` that of the quadratic one without the gain of autofocus.
+    `use` is the utilization of the stricter limit, `quadratic_use` the utilization of the quadratic limit, and
+    `without_autofocus` the utilization of the quadratic limit without the gain of autofocus.
     """
 
     use: Floats
@@ -44,7 +44,7 @@ class NearPhases(NamedTuple):
         is_near: Truths,
         phases: tuple[Any, Any, Any, Any],
     ) -> "NearPhases":
-        """Phases of an owner's tone: quadratic and cubic, that of equal loss, and the judged one. [rad]"""
+        """Phases of an owner's tone: quadratic, cubic, equal-loss and judged phase. [rad]"""
         quadratic, cubic, equal_loss, judged = (np.where(is_near, phase, math.nan) for phase in phases)
         use = quadratic_use = judged / allocation.qpe_allowed(owner)
         allowed = mission.requirements.cubic_phase_error
@@ -55,11 +55,11 @@ class NearPhases(NamedTuple):
 
     @property
     def is_over(self) -> Truths:
-        """Whether they break a requirement."""
+        """Whether the phases break a requirement."""
         return np.asarray(self.use > LIMIT_RATIO)
 
     def limit(self, declared: Floats) -> Floats:
-        """Size of the tone that uses all of the stricter limit; infinite where nothing limits it."""
+        """Size of the tone that reaches the stricter limit; infinite without a limit."""
         with np.errstate(all="ignore"):
             return np.where(self.use > 0, declared / self.use, math.inf)
 
@@ -74,9 +74,10 @@ class NearPhases(NamedTuple):
         doubt: Any = False,
         is_unknown: Any = False,
     ) -> Judged:
-        """Judge the tone by its echoes, up to `by_echoes` where a requirement holds them, and by its phases.
+        """Judge the tone by its echoes and by its phases.
 
-        Where it `is_unknown` how high its echoes stand, what breaks a requirement by its phases fails all the same.
+        `by_echoes` is the allowable size by the echoes; None if no requirement limits them. If the level of the
+        echoes `is_unknown`, a tone whose phases break a requirement still fails.
         """
         limit = self.limit(declared)
         echoes = np.full(declared.shape, math.inf) if by_echoes is None else by_echoes
@@ -103,7 +104,7 @@ class NearPhases(NamedTuple):
 
 
 def phase_over(case: Case, judged: Judged) -> Note:
-    """Say by how much a tone breaks the requirement on a phase; nothing of one that something else limits."""
+    """Reason with the excess of a tone over the requirement on a phase; empty if another requirement limits it."""
     mission, allocation, owner = case.mission, case.allocation, judged.subject.owner
     binding = phase_requirement(case, judged)
     if binding is None:
@@ -117,6 +118,6 @@ def phase_over(case: Case, judged: Judged) -> Note:
 
 
 def phase_requirement(case: Case, judged: Judged) -> str | None:
-    """The requirement on a phase that sets the allowable of a tone; None where its echoes do."""
+    """The requirement on a phase that sets the allowable of a tone; None if its echoes set the allowable."""
     binding = judged.requirement(case)
     return binding if binding in (QUADRATIC, CUBIC) else None

@@ -1,7 +1,7 @@
-"""Rows of sensors, clocks and the air: how bad may a figure be, by its phases, displacement and what it spreads.
+"""Rows of sensors, clocks and the air: the allowable size of a figure, by its phases, displacement and spread power.
 
-Independent processes add their powers, whatever `allocation.combine` says of phases: what wideband vibration, noise
-of sensors and phase noise spread is held together to each platform's share of ISLR.
+Independent processes add their powers; the rule `allocation.combine` for phases does not apply to the powers. Each
+platform's share of ISLR limits the sum of the powers that wideband vibration, sensor noise and phase noise spread.
 """
 
 import math
@@ -55,12 +55,12 @@ from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 ISLR = "islr"
-HELD = (QUADRATIC, CUBIC, ISLR, LOCATION)  # requirements, in the order of what an error does
-_GOOD_FIT_FRACTION = 0.005  # of an Allan deviation, up to which a power law needs no word
+HELD = (QUADRATIC, CUBIC, ISLR, LOCATION)  # requirements, in the order of the effects of an error
+_GOOD_FIT_FRACTION = 0.005  # misfit to an Allan deviation, up to which a power law needs no remark
 
 
 class Limits(NamedTuple):
-    """Limits on the errors of an owner, each alone: phases and rms of what spreads [rad], displacement [m]."""
+    """Limits on each single error of an owner: phases and the rms phase that spreads [rad], displacement [m]."""
 
     quadratic: Any
     cubic: Any
@@ -69,17 +69,17 @@ class Limits(NamedTuple):
 
 
 def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: Any = 1.0) -> Limits:
-    """Limits on the errors of an owner by a model; `gain` is that of autofocus."""
+    """Limits on the errors of an owner by a model; `gain` is the gain of autofocus."""
     spread = spread_limit(mission, allocation, owner, model)
     needs = mission.requirements
     return Limits(allocation.qpe_limit(owner) * gain, needs.cubic_phase_error, spread, needs.location_error)
 
 
 def held_effect(mission: Mission, effect: RandomEffect, coverage: Any, gain: Any = 1.0) -> RandomEffect:
-    """An effect as requirements hold it: a cubic phase that none takes is power that ISLR holds, at one sigma.
+    """An effect as requirements limit it: without a cubic requirement, the cubic phase adds to ISLR, at one sigma.
 
-    Its quadratic phase is the judged one, with the `gain` of autofocus. `coverage` is the coverage factor that it has
-    in it.
+    The quadratic phase of the result is the judged phase, with the `gain` of autofocus. `coverage` is the coverage
+    factor that `effect` includes.
     """
     effect = effect._replace(quadratic=effect.judged(gain))
     if mission.requirements.cubic_phase_error is not None:
@@ -89,7 +89,7 @@ def held_effect(mission: Mission, effect: RandomEffect, coverage: Any, gain: Any
 
 
 def sizes_at(effect: RandomEffect, limits: Limits) -> list[Any]:
-    """Size at which an error reaches each requirement, in the order of `HELD`; infinite where it does not. [unit]"""
+    """Size at which an error reaches each requirement, in the order of `HELD`; infinite if never. [unit]"""
     with np.errstate(all="ignore"):
         return [
             math.inf
@@ -100,21 +100,21 @@ def sizes_at(effect: RandomEffect, limits: Limits) -> list[Any]:
 
 
 class RandomRows:
-    """Errors of sensors and clocks in many cases, and what spreads of them and of vibration."""
+    """Errors of sensors and clocks in many cases, and the power that they and vibration spread."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         self.judging, self.analysis, self.mission = judging, analysis, analysis.mission
         self.allocation, self.errors = analysis.allocation, analysis.random
 
     def _table(self, values: Sequence[Any]) -> Floats:
-        """Numbers, or numbers of cases, as (values, cases)."""
+        """Table (values, cases) of numbers, or of arrays (cases,)."""
         table = np.empty((len(values), self.judging.cases))
         for row, value in zip(table, values, strict=True):
             row[:] = value
         return table
 
     def _effects(self, model: str) -> RandomEffect:
-        """Effects of a unit of each error, (errors, cases)."""
+        """Effects of one unit of each error, (errors, cases)."""
         effects = [error.effect(model) for error in self.errors]
         quadratic, cubic, spread, east, north, hidden, rest = (
             self._table(column)
@@ -138,7 +138,7 @@ class RandomRows:
         return sizes
 
     def rows(self, model: str) -> Iterator["RandomRow"]:
-        """Rows of every error by a model, `published` or `full`, declared or not."""
+        """Rows of all errors by a model, `published` or `full`, declared or not."""
         if not self.errors:
             return
         other_model = OTHER_MODEL[model]
@@ -177,7 +177,7 @@ class RandomRows:
             binding=np.array([-1, *map(REQUIREMENTS.index, HELD)], np.int8)[binds + 1],
             qpe_published_rad=published.quadratic * declared,
             cubic_rad=mine.cubic * declared,
-            # Beside an aggregate, which holds it, a row that cannot be judged breaks no quadratic requirement.
+            # If an aggregate limits the phase, a row that cannot be judged breaks no quadratic requirement.
             quadratic_use=np.where(
                 is_open & (combine != "each"), math.nan, mine.judged(gain) * declared / (limit * gain)
             ),
@@ -202,7 +202,7 @@ class RandomRows:
             yield RandomRow(row.in_decibel() if error.unit == "dB" else row, error_index, *columns_of_error)
 
     def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Truths:
-        """Whether the use of a requirement by an error rests on noise below the first point of its mask."""
+        """Whether an error's use of a requirement depends on noise below the first point of its mask."""
         rests_on_mask = np.zeros(sizes.shape[1:], dtype=bool)
         for row, error in enumerate(self.errors):
             for effect_kind, limit in zip(("quadratic", "cubic", "spread", "displacement"), sizes, strict=True):
@@ -210,7 +210,7 @@ class RandomRows:
                     size = part_of(effects, effect_kind)[row] * error.declared
                     reached = (
                         limit[row] * part_of(effects, effect_kind)[row]
-                    )  # of the requirement, by the size that has it
+                    )  # effect of the error at the size that meets the requirement
                     rests_on_mask[row] |= np.isfinite(limit[row]) & rests_on_masks(
                         [error], effect_kind, size, reached
                     )
@@ -218,7 +218,10 @@ class RandomRows:
 
     # ---------------------------------------------------------------- powers together
     def islr_rows(self, model: str) -> Iterator["IslrRow"]:
-        """Rows of what spreads in sum: for the mission, and for each owner unless only wideband vibration spreads."""
+        """Rows of the sum of spread powers, for the mission and for each owner.
+
+        The owners have no rows if only wideband vibration and errors with a stated ISLR spread.
+        """
         mission, split = self.mission, self.allocation.islr
         owners = ("transmitter", "receiver", *(["clock"] if split.clock is not None else []), "mission")
         members = powers_held_by_islr(self.analysis, owners, model)
@@ -232,7 +235,7 @@ class RandomRows:
             phase.row_id.endswith("vibration.wideband") or phase.row_id in stated for phase in members[-1]
         ]
         is_there = np.array([has_variance[-1][~np.array(is_held_by_shares, dtype=bool)].any(axis=0)] * len(owners))
-        # Where only vibration spreads, its own rows hold it to the shares; what is stated has none.
+        # If only vibration spreads, its own rows apply the shares; a stated ISLR has no share.
         is_there[-1] = True
         is_declared = np.array([has_phase.any(axis=0) for has_phase in has_variance]) & is_there
         shares = np.sqrt(self._table([split.of(owner) for owner in owners]))
@@ -257,7 +260,8 @@ class RandomRows:
             is_unknown=is_in_doubt & is_there & ~(rms > limit * LIMIT_RATIO),
         )
         published, full = (limit, limit_of_other) if model == "published" else (limit_of_other, limit)
-        columns = (judged.declared, judged.allowable, published, full)  # by one rule: the whole reads as required
+        # The rule of one model for all columns: the total reads as the requirement.
+        columns = (judged.declared, judged.allowable, published, full)
         declared, allowable, by_published, by_full = (self._level(column, model) for column in columns)
         judged = judged._replace(
             declared=declared,
@@ -273,7 +277,7 @@ class RandomRows:
             )
 
     def stated_rows(self, model: str) -> Iterator["StatedRow"]:
-        """Rows of errors from elsewhere that state their ISLR: each may have all that is required."""
+        """Rows of errors from elsewhere that state their ISLR: each may use the full requirement."""
         mission = self.mission
         allowed = spread_limit(mission, self.allocation, "mission", model)
         for power in stated_powers(mission):
@@ -296,15 +300,16 @@ class RandomRows:
             )
 
     def _level(self, rms: Floats, model: str) -> Floats:
-        """ISLR of rms phases by a model; not a number where there is none. [dB]"""
+        """ISLR of rms phases by a model; NaN without a phase. [dB]"""
         return np.where(rms > 0, islr_db(rms**2, model, mainlobe_energy(self.mission)), math.nan)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RandomRow(FamilyRow):
-    """The row of one error in many cases, by its place among them.
+    """The row of one error in many cases; `error_index` is its index among the errors.
 
-    `is_over_other` says that the model that does not gate fails it, `bound_by_other` by which of `HELD`.
+    `is_over_other`: the model that does not gate fails the error. `bound_by_other`: index in `HELD` of the
+    requirement that the error breaks by that model.
     """
 
     place: int
@@ -313,7 +318,7 @@ class RandomRow(FamilyRow):
     without_autofocus: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         mission, allocation, error = case.mission, case.allocation, case.random[self.place]
         combine, binding, over, doubt = mission.allocation.combine, self.judged.requirement(case), NOTHING, NOTHING
         if self.judged.status[case.place] == CODE["fail"]:
@@ -352,10 +357,10 @@ class RandomRow(FamilyRow):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IslrRow(FamilyRow):
-    """Row of the phases of one owner that spread, taken together, in many cases.
+    """Row of the sum of all phases of one owner that spread, in many cases.
 
-    `variance` is that of the phase, `limit` and `limit_of_other` are the rms phases that the model that gates and the
-    other one allow. [rad², rad]
+    `variance` is the variance of the phase [rad²]. `limit` is the rms phase that the gating model allows,
+    `limit_of_other` the rms phase that the second model allows [rad].
     """
 
     members: Sequence[SpreadPhase]
@@ -364,7 +369,7 @@ class IslrRow(FamilyRow):
     limit_of_other: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         level = _levels(case.mission, gating)
         other_model, over, doubt = OTHER_MODEL[gating], NOTHING, NOTHING
         variance, limit, limit_by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
@@ -400,7 +405,7 @@ class StatedRow(FamilyRow):
     """Row of an error from elsewhere that states its ISLR, in many cases. [dB]"""
 
     def in_words(self, case: Case, _: str) -> Row:
-        """The row of one case."""
+        """Row of a case in words."""
         mission, row = case.mission, self.judged
         index, is_limited = row.subject.entry or 0, not math.isnan(row.allowable[case.place])
         missing, over = phrases.no_requirement_of(ISLR), NOTHING
@@ -421,14 +426,14 @@ class StatedRow(FamilyRow):
 
 
 def _is_open(mission: Mission, error: RandomError) -> Any:
-    """Whether an error's file leaves open what makes a part of it, in which cases: ISLR cannot be judged there."""
+    """Whether the file lacks a spectrum that makes part of an error, per case: ISLR cannot be judged without it."""
     is_shaken = error.subject.kind == "oscillator" and error.subject.axis == "acceleration"
     return is_shaken and lacks_a_spectrum(mission, error.owner)
 
 
 # ---------------------------------------------------------------------- in words
 def _displacement(error: RandomError, model: str) -> GroundVector | None:
-    """Sigmas of the displacement east and north, coverage factor included; None where they are not known. [m]"""
+    """Sigmas of the displacement east and north, coverage factor included; None if not known. [m]"""
     effect = error.effect(model)
     if error.declared is None or math.isnan(effect.displacement):
         return None
@@ -467,7 +472,7 @@ def _wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tup
         source = motion.imu.source if motion.imu and is_of_imu else None
         equation = "lever arm" if kind == "lever_arm" else "inertial sensor"
     notes = override_notes(error.owner, motion.overridden, figure)
-    if error.counted_in and error.declared is None:  # else it is the reason of the row
+    if error.counted_in and error.declared is None:  # otherwise the note is the reason of the row
         notes = (phrases.counted_in_another_row(error.counted_in), *notes)
     return equation, source or motion.evidence(figure), notes
 
@@ -511,7 +516,7 @@ def _oscillator_wording(mission: Mission, error: RandomError) -> tuple[str, str 
 
 
 def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
-    """Say what is left of an oscillator by how the clocks are kept together; nothing of a free one."""
+    """Note on the part of an oscillator's noise that remains after synchronisation; empty without synchronisation."""
     if sync is None:
         return
     if sync.interval is not None:
@@ -523,23 +528,23 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
 
 
 def _air_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
-    """The same of a delay on a leg."""
+    """Equation, evidence and notes of the row of a delay on a leg."""
     source = None if mission.propagation is None else mission.propagation.source_of(legs_of(error.owner)[0])
-    if error.counted_in and error.declared is None:  # else it is the reason of the row
+    if error.counted_in and error.declared is None:  # otherwise the note is the reason of the row
         return "delay of the air", source, (phrases.counted_in_another_row(error.counted_in),)
     notes = () if error.owner in PLATFORMS else (phrases.held_to_the_total("both legs, by one air"),)
     return "delay of the air", source, notes
 
 
 def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> Note:
-    """Say why nothing limits an error: it does nothing, or what it does is not required."""
+    """Reason why an error has no limit: it has no effect, or no requirement limits its effects."""
     effects = (("cubic phase", effect.cubic), ("ISLR", effect.spread), ("displacement", effect.displacement))
     does = [name for name, size in effects if size > 0]
     return phrases.no_requirement_limits(does) if does else no_effect(mission, error)
 
 
 def no_effect(mission: Mission, error: RandomError) -> Note:
-    """Say why an error does nothing."""
+    """Reason why an error has no effect."""
     if error.subject.kind in ("imu", *CORRELATED, "lever_arm", "vibration"):
         return phrases.across_the_line_of_sight()
     if error.subject.kind == "propagation":
@@ -571,7 +576,7 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
 
 
 def _continuation(case: Case, error: RandomError, model: str) -> Note:
-    """Say by how much a declared oscillator rests on noise below its mask, of the part of which it is most."""
+    """Note on a declared oscillator's share of noise below its mask, for the effect with the largest share."""
     effect, size, worst = error.effect(model), error.declared, NOTHING
     limits = limits_for(case.mission, case.allocation, error.owner, model, case.allocation.autofocus_gain)
     most = 0.0
@@ -586,7 +591,7 @@ def _continuation(case: Case, error: RandomError, model: str) -> Note:
 
 
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:
-    """Say by which requirement the model that does not gate fails a declared error."""
+    """Note on the requirement by which the model that does not gate fails a declared error."""
     other_model, size = OTHER_MODEL[gating], error.declared
     effect = held_effect(mission, error.effect(other_model), error.coverage(mission), autofocus_gain_of(mission))
     if binding == ISLR:
@@ -597,6 +602,6 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
 
 
 def _levels(mission: Mission, model: str) -> Callable[[float], float]:
-    """ISLR of an rms phase [rad] by a model, whatever the size that it is compared with. [dB]"""
+    """Function from an rms phase [rad] to its ISLR [dB] by a model."""
     energy = mainlobe_energy(mission)
     return lambda rms: float(islr_db(rms**2, model, energy)) if rms else 0.0

@@ -1,4 +1,4 @@
-"""Rows and requirements of one mission, as judged, in words: what is asked, what is reached, what decides."""
+"""Judged rows and requirements of one mission, in words: the limit, the value reached, the row that decides."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -50,7 +50,7 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
             continue
         model = MODELS[judged_row.model[case.place]]
         family = families.get((model, judged_row.subject.id))
-        if family is None:  # only other cases have it
+        if family is None:  # only other cases have the row
             continue
         row, status = family.in_words(case, model), statuses(judged_row.status[case.place])
         changes: dict[str, Any] = {"model": model, "status": status, "is_unjudged": status == "not_evaluated"}
@@ -61,7 +61,7 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
 
 
 def _declarations(case: Case, judged_row: Judged) -> Row:
-    """The row that says whether all is declared: of kinds, too, that have no row where nothing is declared."""
+    """The row that judges whether the file declares every required kind of error, also kinds without a row."""
     mission = case.mission
     missing, shifted = missing_declarations(mission), shifted_figures(mission)
     return Row(
@@ -83,7 +83,7 @@ def _declarations(case: Case, judged_row: Judged) -> Row:
 
 
 def _declarations_missing(missing: Sequence[Missing]) -> Note:
-    """Say what the file should declare and does not: whole errors first, then those of which it states half."""
+    """Name the errors that the file should declare and does not: missing errors first, then half-stated errors."""
     halves = [
         phrases.not_declared_as_required(declaration.key, declaration.lacks)
         for declaration in missing
@@ -96,7 +96,7 @@ def _declarations_missing(missing: Sequence[Missing]) -> Note:
 
 
 def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Note:
-    """Why a row is not judged by its own numbers."""
+    """Reason why the numbers of a row do not decide its status."""
     mission, why = case.mission, Why(judged_row.why[case.place])
     if why is Why.NOT_DECLARED_AS_REQUIRED:
         missing = (each for each in missing_declarations(mission) if is_asked_for(judged_row.subject, each))
@@ -115,7 +115,7 @@ def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Not
         return halves[0].then(*halves[1:])
     if why is Why.NOTHING_SPREADS:
         return phrases.nothing_judges("islr")
-    reasons = [row.reason] if row.status == "fail" and row.reason else []  # it is broken, and more of it not judged
+    reasons = [row.reason] if row.status == "fail" and row.reason else []  # fails, and an effect is not judged
     for each in judged.untaken:
         if row.id in each.makers and each.makers[row.id][case.place]:
             lines = [f"{key}: {EXAMPLES[key]}" for key in TAKEN_BY[each.kind]]
@@ -125,7 +125,7 @@ def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Not
 
 
 def unknown_place(judged: JudgedMission, case: Case) -> Note:
-    """Say what displaces the image by an amount that no row holds: clocks, by their setting, or a path."""
+    """Name the cause of a displacement that no row limits: clocks that are not set, or a path in doubt."""
     clocks = [row_id for row_id, is_there in judged.unplaced.items() if is_there[case.place]]
     if clocks:
         return phrases.clocks_are_not_set(clocks)
@@ -134,7 +134,7 @@ def unknown_place(judged: JudgedMission, case: Case) -> Note:
 
 
 def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
-    """Say which effects no requirement takes, and are too small for one."""
+    """Name the effects that no requirement limits and that are too small to need a requirement."""
     for effect in judged.untaken:
         if effect.is_negligible[case.place]:
             yield phrases.effect_is_negligible(effect.kind, case.number(effect.total), list(TAKEN_BY[effect.kind]))
@@ -143,9 +143,9 @@ def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
 
 # ---------------------------------------------------------------------- requirements
 def requirements_in_words(judged: JudgedMission, case: Case, waived: Waived) -> tuple[JudgedRequirement, ...]:
-    """How every requirement of one case stands; `waived` are its rows in words, after waivers."""
+    """Every requirement of one case as judged; `waived` has the rows of the case in words, after waivers."""
     rows = {row.id: row for row in waived.rows}
-    of_all = [rows.get(judged_row.subject.id) for judged_row in judged.before]  # None: only other cases have it
+    of_all = [rows.get(judged_row.subject.id) for judged_row in judged.before]  # None: only other cases have the row
     return tuple(_entry(state, judged, case, of_all, waived) for state in judged.requirements)
 
 
@@ -193,12 +193,12 @@ def _entry(
 def _waivers(
     status: str, of_requirement: Sequence[AppliedWaiver], judges: Sequence[Row]
 ) -> tuple[AppliedWaiver, ...]:
-    """Waivers that cover a requirement that is waived: its own, and those of the rows that judge it."""
+    """Waivers that cover a waived requirement: its own waivers, and the waivers of the rows that judge it."""
     return holding(status, in_order([*of_requirement, *(waiver for row in judges for waiver in row.waived_by)]))
 
 
 def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | None]) -> float | None:
-    """Total of the mission: that of its own row, or the largest quadratic phase of a single error."""
+    """Total of the mission: the value of the mission's row, or the largest quadratic phase of a single error."""
     row_of_mission = next((row for row in rows if row is not None and row.id == f"mission.{key}"), None)
     if row_of_mission is not None and key != DECLARE:
         return row_of_mission.declared
@@ -212,7 +212,7 @@ def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | Non
 
 
 def _share(row: Row, key: str, case: Case, utilization: float | None) -> DecidingShare | None:
-    """The share of a requirement that a row is held to; None where it is held to the whole."""
+    """The share of a requirement that limits a row; None if the full requirement limits the row."""
     of_kinds = {PULL_IN: "autofocus", "spatial_variance": "scene", "dispersion": "band"}
     if key == QUADRATIC and row.subject.kind in of_kinds:
         return DecidingShare(
@@ -230,7 +230,7 @@ def _share(row: Row, key: str, case: Case, utilization: float | None) -> Decidin
 
 
 def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
-    """Share of a requirement that the owner of a row has, without gain, and what the row reaches of it."""
+    """The owner's share of a requirement, without the gain of autofocus, and the value that the row reaches."""
     mission, allocation = case.mission, case.allocation
     if key == QUADRATIC:
         qpe = row.qpe_published_rad

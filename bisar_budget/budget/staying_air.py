@@ -1,9 +1,10 @@
-"""Delays of the air that stay in a long aperture, because the file does not say how fast they change.
+"""Constant delays of the air in a long aperture: the file does not state how fast the delays change.
 
-From a minute on the air is not the same at both ends of an aperture. A delay without `correlation_time` moves the
-image and bends its phase with the elevation alone: that is half of what air does. So delays are also taken as if they
-changed in ten minutes. A requirement is not evaluated where they would use more than a tenth of it, or would break it
-together with what is declared. What no requirement takes of them follows the rule of `UntakenEffect`.
+From one minute on the air is not the same at both ends of an aperture. A delay without `correlation_time` moves the
+image and bends its phase with the elevation alone: that is half of the effect of air. So the delays are also computed
+with a correlation time of ten minutes. A requirement is not evaluated if such delays would use more than a tenth of
+it, or would break it together with the declared errors. Effects of such delays that no requirement covers follow the
+rule of `UntakenEffect`.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,19 +29,19 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 
-LONG_APERTURE_S = 60.0  # from which on the air is not the same at both ends
-AIR_CHANGES_IN_S = 600.0  # correlation time of what a model or a map leaves of the delay of the zenith
+LONG_APERTURE_S = 60.0  # aperture time from which on the air differs at both ends
+AIR_CHANGES_IN_S = 600.0  # correlation time of the zenith delay that remains after correction by a model or a map
 
 
 class AirUse(NamedTuple):
-    """Size of what delays would do to a row if they changed, and its share of what the row may have, (cases,).
+    """Size of the effect of changing delays on a row, and its utilization of the row's limit, (cases,).
 
-    The size is a phase, an rms phase or a displacement. [rad] or [m] `is_doubted` says where no verdict may rest on
-    the delays staying.
+    The size is a phase, an rms phase or a displacement. [rad] or [m] `is_doubted` marks the cases in which no verdict
+    may rely on constant delays.
     """
 
     row_id: str
-    key: str  # of the requirement that holds the row
+    key: str  # of the requirement that limits the row
     size: Floats
     use: Floats
     is_doubted: Truths
@@ -49,10 +50,10 @@ class AirUse(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StayingAir:
-    """Delays that stay in long apertures: by row, the use that they would make of it if they changed.
+    """Constant delays in long apertures: for each row, the use by the delays if they changed.
 
-    `untaken` are effects that no requirement takes, with those of the delays in them. Both are empty where no case
-    has such a delay.
+    `untaken` are the effects that no requirement covers, with the effects of the changing delays included. `uses` and
+    `untaken` are empty if no case has such a delay.
     """
 
     errors: Sequence[RandomError] = ()
@@ -62,18 +63,19 @@ class StayingAir:
 
     @property
     def _delays(self) -> frozenset[str]:
-        """Ids of the delays' own rows, which the quadratic requirement holds with `combine: each`.
+        """Ids of the delays' own rows, which the quadratic requirement limits with `combine: each`.
 
-        Such a row may have the limit of another requirement, so that its status does not say how this one stands.
+        A different requirement may set the limit of such a row. Then the row's status is not the status of the
+        quadratic requirement.
         """
         return frozenset(error.id for error in self.errors)
 
     def doubted_rows(self) -> dict[str, Truths]:
-        """Rows of sums that are not evaluated, by their ids, and in which cases."""
+        """Ids of the rows of sums that are not evaluated, with the cases (cases,)."""
         return {row_id: use.is_doubted for row_id, use in self.uses.items() if row_id not in self._delays}
 
     def doubted_requirements(self) -> dict[str, Truths]:
-        """Requirements that are not evaluated as a whole, and in which cases: a platform's share is a row's alone."""
+        """Requirements that are not evaluated, with the cases; a platform's share concerns its row alone."""
         doubted: dict[str, Truths] = {}
         for use in self.uses.values():
             if use.row_id in self._delays or use.row_id == subject("mission", use.key).id:
@@ -81,7 +83,7 @@ class StayingAir:
         return doubted
 
     def untaken_rows(self) -> dict[str, Truths]:
-        """Rows of delays that would make up an effect which no requirement takes, and in which cases."""
+        """Rows of delays that would make up an effect which no requirement covers, with the cases."""
         return {
             error.id: np.any([effect.makers.get(error.id, False) & self.is_long for effect in self.untaken], axis=0)
             for error in self.errors
@@ -89,19 +91,19 @@ class StayingAir:
         }
 
     def reason(self, case: Case, row_id: str) -> Note:
-        """Say what the delays would do to a row of one case, and what to add to the file."""
+        """Note on the effect of changing delays on a row of a case, with the key to add to the file."""
         use = self.uses.get(row_id)
         if use is not None:
             return self._says(case, use)
         return self._says_of_untaken(case, row_id)
 
     def reason_of_requirement(self, case: Case, key: str) -> Note:
-        """Say what the delays would do to a requirement as a whole; nothing where it does not rest on them."""
+        """Note on the effect of changing delays on a requirement; empty if no verdict relies on constant delays."""
         doubted = [use for use in self.uses.values() if use.key == key and case.number(use.is_doubted)]
         return self._says(case, max(doubted, key=lambda use: case.number(use.use))) if doubted else phrases.NOTHING
 
     def note(self, case: Case) -> Iterator[Note]:
-        """Say that delays stay where no verdict rests on it."""
+        """Note that delays are taken as constant, if no verdict relies on it."""
         uses = [case.number(use.use) for use in self.uses.values()]
         is_open = any(case.number(use.is_doubted) for use in self.uses.values())
         is_open = is_open or any(case.number(is_made) for is_made in self.untaken_rows().values())
@@ -140,7 +142,7 @@ class StayingAir:
 
 
 def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
-    """Delays that stay in the long apertures of some cases, and the use that they would make of each row."""
+    """Constant delays in the long apertures of some cases, and the use of each row by the delays if they changed."""
     mission, cases = analysis.mission, analysis.cases
     is_long = np.broadcast_to(np.asarray(mission.collection.aperture_time) >= LONG_APERTURE_S, (cases,))
     if mission.propagation is None or not is_long.any():
@@ -164,14 +166,14 @@ def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
 
 
 def _rests_on(mission: Mission, use: AirUse, declared_use: Floats) -> Truths:
-    """Whether delays would use more than a tenth, or break a requirement together with what is declared."""
+    """Whether delays would use more than a tenth, or break a requirement together with the declared errors."""
     rule = "rss" if use.key == ISLR else mission.allocation.combine
     together = combined((use.use, declared_use), rule)
     return np.asarray((use.use > NEGLIGIBLE_FRACTION) | ((use.use > 0) & (together > LIMIT_RATIO)))
 
 
 def _uses(analysis: Analysis, errors: Sequence[RandomError], model: str) -> Iterator[AirUse]:
-    """Use of each row that a requirement holds, by delays that change, by one model."""
+    """Use of each row that a requirement limits, by changing delays, by one model."""
     mission, allocation = analysis.mission, analysis.allocation
     rule = mission.allocation.combine
     for key in HELD:
@@ -202,9 +204,10 @@ def _use(analysis: Analysis, row_id: str, key: str, size: Any, limit: Any, model
 
 
 def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> Any:
-    """Size of a delay's effect on a requirement, as that holds it, with the gain of autofocus. [rad] or [m]
+    """Size of a delay's effect, as the requirement limits it, with the gain of autofocus. [rad] or [m]
 
-    Of a displacement it is what the delay adds by changing: the image moves by as much as before, and farther.
+    For a displacement the size is the increase by the change of the delay, by root-sum-square: the image moves by the
+    constant displacement, and by this size besides.
     """
     effect = error.effect(model)
     judged_effect = held_effect(
@@ -222,7 +225,7 @@ def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> Any:
 
 
 def _keys(mission: Mission) -> list[str]:
-    """Keys to add: that of one air or of both legs, or of the leg that has none."""
+    """Keys to add: one key for one air or for both legs, else the key of the leg without a correlation time."""
     propagation = mission.propagation
     if propagation is None:
         return []

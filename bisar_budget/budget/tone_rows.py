@@ -36,10 +36,10 @@ SENSITIVITY = "acceleration_sensitivity"
 
 # ---------------------------------------------------------------------- all tones together
 def pslr_row(judging: Judging, tones: Sequence[Tone], required: Any) -> "PslrRow":
-    """Judge the highest echo that all tones make together, in the worst of their phases.
+    """Judge the highest echo that all tones make together, in the worst case of their phases.
 
-    From first principles by both models: the shares of the paper's rule stay 3 dB inside it. Tones at most 2.5 cycles
-    per aperture apart raise each other's echo, whoever makes them.
+    Both models use first principles: shares by the paper's rule are 3 dB stricter. Tones at most 2.5 cycles per
+    aperture apart raise each other's echo, also tones of different sources.
     """
     highest, allowed = highest_echo(tones, (judging.cases,)), judging.array(10 ** (np.asarray(required) / 20))
     row_subject = subject("mission", "pslr")
@@ -53,13 +53,13 @@ def pslr_row(judging: Judging, tones: Sequence[Tone], required: Any) -> "PslrRow
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PslrRow(FamilyRow):
-    """The `highest` echo that all tones make together in many cases; where PSLR is required."""
+    """The `highest` echo that all tones make together in many cases; a row of missions with a required PSLR."""
 
     tones: Sequence[Tone]
     highest: Echo | None
 
     def in_words(self, case: Case, _: str) -> Row:
-        """The row of one case."""
+        """Row of a case in words."""
         over = NOTHING
         if self.highest is not None:
             makers = [
@@ -81,14 +81,14 @@ class PslrRow(FamilyRow):
 
 # ---------------------------------------------------------------------- spurs
 def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["SpurRow"]:
-    """Judge the oscillators' tones by a model; they make paired echoes as vibrations do. [dB of echo to response]"""
+    """Judge the oscillators' tones by a model; they make paired echoes, as vibrations do. [dB of echo to response]"""
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
     for spur_index, spur in enumerate(spurs_of(mission, analysis.geometry) if has_instruments(mission) else ()):
         row_subject, phase, T = spur.subject, judging.array(spur.phase), mission.collection.aperture_time
         limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
         phases = _near_phases(judging, analysis, spur.name, _phases_beside(spur.left, spur.free, T))
-        level = phase / 2  # the amplitude of an echo over that of the response
+        level = phase / 2  # amplitude of an echo over the amplitude of the response
         if limits is None:
             judged = phases.row(judging, row_subject, metric, level, None)
         else:
@@ -111,19 +111,22 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
 
 
 def _is_used(size: Any, limit: Any) -> Truths:
-    """Where a size uses enough of its limit that a doubt about it counts, and does not break it."""
+    """Whether a size uses enough of its limit for a doubt about the size to count, and does not break the limit."""
     return np.asarray((size > MIN_USE_FRACTION * limit) & ~(size > limit * LIMIT_RATIO))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpurRow(FamilyRow):
-    """A tone of an oscillator in many cases, by its place, as echo over response in decibel; see `VibrationRow`."""
+    """A tone of an oscillator in many cases, as echo over response in decibel; see `VibrationRow`.
+
+    `spur_index` is the index of the tone among the spurs.
+    """
 
     spur_index: int
     is_over_other: Any
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         spur = spurs_of(mission)[self.spur_index]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
@@ -160,7 +163,7 @@ class SpurRow(FamilyRow):
 
 
 def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> tuple[Note, ...]:
-    """Say what of a tone is folded below one cycle per aperture, and of which row its phases are."""
+    """Note on the part of a tone that is folded below one cycle per aperture, and on the row that has its phases."""
     slow = [
         (float(share), float(frequency))
         for frequency, share in zip(folded.frequencies, folded.shares, strict=True)
@@ -176,9 +179,9 @@ def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> 
 
 # ---------------------------------------------------------------------- oscillators that vibrate
 def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["AcceleratedRow"]:
-    """Judge what each vibration does to an oscillator by a model: the sensitivity that it may have. [s²/m]
+    """Judge the effect of each vibration on an oscillator by a model: the allowable sensitivity. [s²/m]
 
-    Slower tones than one cycle per aperture are phases, which the row of the oscillator's random vibration has.
+    Tones below one cycle per aperture are phases; the row of the oscillator's random vibration counts these phases.
     """
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
@@ -213,13 +216,16 @@ def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AcceleratedRow(FamilyRow):
-    """A vibration of an oscillator in many cases, by its place among them; `is_there` where it is fast enough."""
+    """A vibration of an oscillator in many cases; `is_there` marks the cases in which it is fast enough.
+
+    `tone_index` is the index of the vibration among the accelerated tones.
+    """
 
     tone_index: int
     is_over_other: Any
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         tone = accelerated_tones(mission)[self.tone_index]
         T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
@@ -256,7 +262,7 @@ class AcceleratedRow(FamilyRow):
 
 
 def _phases_beside(folded: LeftTone, free: Any, aperture_time: Any) -> tuple[Any, Any]:
-    """Quadratic and cubic phase of the echoes that lie beside the mainlobe, in their worst phases. [rad]"""
+    """Quadratic and cubic phase of the echoes beside the mainlobe, in their worst phases. [rad]"""
     qpe: Any = 0.0
     cubic: Any = 0.0
     for frequency, share in zip(folded.frequencies, folded.echoes(aperture_time), strict=True):
@@ -267,24 +273,24 @@ def _phases_beside(folded: LeftTone, free: Any, aperture_time: Any) -> tuple[Any
 
 
 def _near_phases(judging: Judging, analysis: Analysis, name: str, phases: tuple[Any, Any]) -> NearPhases:
-    """Quadratic and cubic phase of a platform's tone, to which its row is held. [rad]"""
+    """Quadratic and cubic phase of a platform's tone, which limit its row. [rad]"""
     qpe, cubic = map(judging.array, phases)
     return NearPhases.of(analysis.mission, analysis.allocation, name, qpe + cubic > 0, (qpe, cubic, qpe, qpe))
 
 
 def evidence(oscillator: Oscillator) -> str | None:
-    """Where the sensitivity of an oscillator comes from: its part, else what the file says of it."""
+    """Source of the sensitivity of an oscillator: its part, else the `source` in the file."""
     return dict(oscillator.of_parts).get(SENSITIVITY, oscillator.source)
 
 
 def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
-    """Say that the vibration which an oscillator feels is that of its platform."""
+    """Note that an oscillator feels the vibration of its platform; empty if the oscillator has its own vibration."""
     felt_vibration = felt(mission, name)
     return () if felt_vibration is not None and felt_vibration.is_own else (phrases.vibration_of_the_platform(),)
 
 
 def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
-    """Say of the row of an oscillator's acceleration what counts in it, and what cannot."""
+    """Notes on the row of an oscillator's acceleration: which effects count in the row, and which cannot."""
     felt_vibration = felt(mission, name)
     oscillator: Oscillator = getattr(mission.platforms, name).oscillator
     notes = list[Note]()

@@ -1,4 +1,4 @@
-"""Consequences of images for the rows of a check, and which of the images are worth showing."""
+"""Consequences of images for the rows of a check, and the choice of images to show."""
 
 from collections.abc import Mapping, Sequence
 from datetime import date
@@ -14,24 +14,24 @@ from bisar_budget.findings.status import RANK
 from bisar_budget.phrases import NOTHING
 from bisar_budget.units import format_limit
 
-_SHOWN_ROWS = 4  # rows of a mission
+_SHOWN_ROWS = 4  # rows of a mission, at most
 
 
 def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: date | None = None) -> MissionFindings:
-    """Add verdicts to findings: a declared row, or a requirement's, whose limit an image refutes fails.
+    """Add verdicts to findings: a declared row fails if an image refutes its limit, and so does its requirement.
 
-    So does a row that passes by an autofocus that the image refutes. The refuted limit of a row of which the file
-    declares nothing is said at the row, one of no row of the check as a warning. That no image gave a verdict is a
-    warning too.
+    A row that passes by autofocus also fails if the image refutes the autofocus. If the file does not declare the
+    error of a row, the row reports its refuted limit. A refuted limit without a row in the check is a warning. It is
+    also a warning if no image gave a verdict.
 
     Parameters
     ----------
     findings : MissionFindings
-        Of the check.
+        Findings of the check.
     verified : VerifiedMission
-        What its images say.
+        Verdicts of the mission's images.
     today : date, optional
-        Day on which waivers cover what fails by an image, UTC; omitted: none does.
+        Day on which waivers cover rows that fail by an image, UTC; omitted: no waiver covers such a row.
     """
     verdicts = verified.rows
     by_id = {verdict.id: verdict for verdict in verdicts}
@@ -101,10 +101,10 @@ def _with_verdict(row: Row, verdict: Verdict) -> Row:
 
 
 def _is_gate(row: Row) -> bool:
-    """Whether a row fails by its image: something is declared that uses the limit, and it does not fail anyway.
+    """Whether a refuted limit makes a row fail: a declared error uses the limit, and the row does not already fail.
 
-    Along the scene's axes an error of another frame is only shown again. The pull-in range of autofocus is no
-    requirement: where it is stated too large, gains count up to what range walk leaves.
+    Rows that repeat an error of another frame along the scene's axes do not fail. The pull-in range of autofocus is
+    not a requirement: if it is stated too large, gains count up to the limit by range walk.
     """
     return (
         bool(row.utilization)
@@ -117,7 +117,7 @@ def _is_gate(row: Row) -> bool:
 def _with_refuted(
     requirement: JudgedRequirement, refuted: Sequence[Row], waivers: tuple[AppliedWaiver, ...]
 ) -> JudgedRequirement:
-    """A requirement of which images refute a row that judges it, or that it limits."""
+    """The requirement with the status of a refuted row that judges it or that it limits."""
     judges = [
         row
         for row in refuted
@@ -135,13 +135,13 @@ def _with_refuted(
     )
     if row.id == requirement.row:
         return refuted_requirement
-    # The row's own numbers are in its unit, and no part of the requirement: an image says that its limit is wrong.
+    # The row's numbers are in its own unit and no part of the requirement: the image refutes the row's limit.
     return refuted_requirement._replace(utilization=row.utilization, use_row=row.id, share=None)
 
 
 def _shown(verdict: Verdict) -> str:
     if verdict.measured_db is not None and verdict.requirement_db is not None:
-        digits = 1 if verdict.measured_db_interval is None else 2  # of noise half a decibel decides
+        digits = 1 if verdict.measured_db_interval is None else 2  # for noise, half a decibel decides
         levels = [f"{level:.{digits}f} dB" for level in (verdict.measured_db, verdict.requirement_db)]
         return f"the image shows {levels[0]} at it, {levels[1]} allowed"
     _, measured = verdict.judged_phases_rad
@@ -152,9 +152,9 @@ def _shown(verdict: Verdict) -> str:
 
 
 def rows_worth_showing(findings: MissionFindings) -> tuple[Verdict, ...]:
-    """Verdicts with a measured quadratic phase whose rows decide most: worst status, limits that images refute.
+    """Verdicts with a measured quadratic phase, for the most decisive rows: worst status first, then refuted limits.
 
-    A row that nobody declared is shown only if its limit is refuted, or if there is nothing else.
+    A row without a declared error is shown only if its limit is refuted, or if there is no other row.
     """
     rows = {row.id: row for row in findings.rows}
     measured = [v for v in findings.verdicts or () if v.measured_qpe_rad is not None and v.id in rows]
@@ -164,7 +164,7 @@ def rows_worth_showing(findings: MissionFindings) -> tuple[Verdict, ...]:
 
 
 def _urgency(row: Row, verdict: Verdict) -> tuple[int, bool, bool, float]:
-    # Shown again along the scene's axes, an error has the same image as in its own frame.
+    # A row that repeats an error along the scene's axes has the same image as the row in the error's own frame.
     return (RANK[row.status], not _is_refuted(verdict), not row.is_independent, -(row.utilization or 0.0))
 
 

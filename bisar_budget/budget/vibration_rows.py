@@ -1,4 +1,4 @@
-"""Rows about what vibrates: each line of a platform, lines near each other, and noise."""
+"""Rows of vibration: each line of a platform, lines near each other, and noise."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -40,11 +40,11 @@ from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.units import format_quantity
 
-_ROUNDING_DB = 1e-6  # by which a level may be above what is required
+_ROUNDING_DB = 1e-6  # by which a level may exceed the required level
 
 
 class Vibrations:
-    """Vibrations in many cases."""
+    """Rows of vibrations in many cases."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         mission, geometry, allocation = analysis.mission, analysis.geometry, analysis.allocation
@@ -73,9 +73,9 @@ class Vibrations:
         return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
 
     def rows(self, model: str) -> Iterator["VibrationRow"]:
-        """Every row about vibration by a model, `published` or `full`, declared or not, in the order of the contract.
+        """All rows of vibration by a model, `published` or `full`, declared or not, in the order of the contract.
 
-        A line that is slow in some cases only has a row of each kind.
+        A line that is slow in only some of the cases has a row of each kind.
         """
         everywhere = np.ones(self.judging.cases, dtype=bool)
         for name in PLATFORMS:
@@ -113,7 +113,7 @@ class Vibrations:
         allowable, is_over_other = None, np.zeros(self.judging.cases, dtype=bool)
         if limits is not None:
             allowable = self.array(limits.by(model))
-            if declared is not None and not self.mission.has_direct_path:  # which the published model does not know
+            if declared is not None and not self.mission.has_direct_path:  # the published model has none
                 is_over_other = declared > limits.by(OTHER_MODEL[model]) * LIMIT_RATIO
         if phases is None or declared is None:
             judged = self.judging.row(
@@ -141,9 +141,9 @@ class Vibrations:
         return judged._replace(allowable_published=published, allowable_full=full)
 
     def _line(self, model: str, name: str, index: int, is_there: Truths) -> "VibrationRow":
-        """A vibration from one cycle per aperture on: as its echoes, or, where ISLR holds it, the power they take.
+        """The row of a vibration of one or more cycles per aperture: its echoes, or their power if ISLR limits them.
 
-        Below three cycles it is held to its quadratic and cubic phase as well.
+        Below three cycles its quadratic and cubic phase are limited as well.
         """
         cycles, both = self.cycles[name][index], self._both[name][index]
         is_near, phases = cycles < ECHO_CYCLES, None
@@ -174,9 +174,9 @@ class Vibrations:
         )
 
     def _slow(self, name: str, index: int, is_there: Truths) -> "VibrationRow":
-        """A vibration below one cycle per aperture: as the quadratic and cubic phase that it is.
+        """The row of a vibration below one cycle per aperture, judged by its quadratic and cubic phase.
 
-        One along three axes is declared as the amplitude along the line of sight that uses as much.
+        A vibration along three axes is declared as the amplitude along the line of sight with the same utilization.
         """
         row_subject, cycles = subject(name, "vibration", "sinusoidal", entry=index), self.cycles[name][index]
         tone = self.slow_tones[row_subject.id]
@@ -215,7 +215,7 @@ class Vibrations:
         )
 
     def _near_each_other(self, model: str, name: str) -> Iterator["VibrationRow"]:
-        """Lines so near each other that their echoes add: each time the one line that has an echo as high."""
+        """Rows of lines so near each other that their echoes add: each row is one line with an equally high echo."""
         for index, (members, amplitude) in enumerate(self._near[name]):
             row_subject = subject(name, "vibration", "sinusoidal.sum", entry=index)
             is_there = np.asarray(members.any(axis=0))
@@ -223,14 +223,14 @@ class Vibrations:
 
     @cached_property
     def _near(self) -> dict[str, list[tuple[Truths, Floats]]]:
-        """Lines near each other of each platform, and the amplitude of one line with an echo as high. [m]"""
+        """Lines near each other on each platform, and the amplitude of one line with an equally high echo. [m]"""
         return {name: list(_together(self.amplitudes[name], self.cycles[name])) for name in PLATFORMS}
 
     @cached_property
     def _both(self) -> dict[str, Floats]:
-        """Peak phase that each line has together with near ones of the other platform. [rad]
+        """Peak phase of each line together with near lines of the second platform. [rad]
 
-        Their echoes add in the worst phases; NaN where there are none, or no amplitude, or nothing is required.
+        The echoes add in the worst phases. NaN without a near line, without an amplitude, or without a required PSLR.
         """
         ours = self.count[PLATFORMS[0]]
         amplitudes, cycles = (
@@ -245,7 +245,7 @@ class Vibrations:
 
 
 def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Truths, Floats]]:
-    """Lines near each other, and the amplitude of one line with an echo as high; 0 where a case has none. [m]"""
+    """Lines near each other, and the amplitude of one line with an equally high echo, or 0 without lines. [m]"""
     groups = near_groups(cycles)
     for index in range(groups.max(initial=-1) + 1):
         members = groups == index
@@ -256,13 +256,14 @@ def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Truths, Floa
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VibrationRow(FamilyRow):
-    """One row about vibration in many cases: a line, lines near each other, or the noise of a platform.
+    """One row of vibration in many cases: a line, lines near each other, or the noise of a platform.
 
-    `members` are the lines near each other. `qpe` and `cubic` are the quadratic and cubic phases that a motion below
-    three cycles per aperture has in its worst phase [rad]: where it `is_slow` it is judged by them alone, else by its
-    echoes too. `is_over_other` says that the model that does not gate fails it. `both` is the peak phase of one line
-    with an echo as high as those of near frequencies on both platforms [rad], `level` the level of that echo [dB];
-    `is_over_both` says that it is too high. Sizes of the row are `per_metre` times those in metres.
+    `members` are the lines near each other. `qpe` and `cubic` are the quadratic and cubic phases of a motion below
+    three cycles per aperture, in its worst phase [rad]. A motion that `is_slow` is judged by these phases alone, a
+    faster motion by its echoes too. `is_over_other`: the model that does not gate fails the row. `both` is the peak
+    phase of one line with an echo as high as the sum of echoes of near frequencies on both platforms [rad]. `level`
+    is the level of that echo [dB], `is_over_both`: the level is too high. Sizes of the row are `per_metre` times the
+    sizes in metres.
     """
 
     limits: VibrationLimits | None = None
@@ -279,13 +280,13 @@ class VibrationRow(FamilyRow):
     per_metre: Any = 1.0
 
     def in_unit(self, per_metre: Floats) -> "VibrationRow":
-        """The row in the unit that the file states its line in."""
+        """The row in the unit that the file uses for the line."""
         if np.all(per_metre == 1):
             return self
         return replace(self, judged=self.judged.in_unit(per_metre), per_metre=per_metre)
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
+        """Row of a case in words, by the model that judges it."""
         row_subject = self.judged.subject
         error: MotionError = getattr(case.mission.platforms, row_subject.owner).motion_error
         if self.is_slow:
@@ -351,7 +352,7 @@ def _row(
     more: Sequence[Note] = (),
     doubt: Note = NOTHING,
 ) -> Row:
-    """A row of echoes or noise: `notes` stand before what is said of its limit, `more` after it."""
+    """A row of echoes or noise: `notes` come before the notes on its limit, `more` after them."""
     row_subject, metric = vibration_row.judged.subject, vibration_row.judged.metric
     equation = f"Section V, {key[0]}" if model == "published" else "first principles"
     missing, margin = phrases.no_requirement_of(metric), None

@@ -1,6 +1,7 @@
-"""Decisions beside the errors: waivers of rows and requirements, and what from outside a file bears on its verdict.
+"""Decisions beside the errors: waivers of rows and requirements, and influences from outside a file on its verdict.
 
-What is waived, expired or useless is said; so are options, settings, the environment and parts of a project.
+Findings list valid, expired and useless waivers. They also list options, settings, environment variables and parts
+of a project that bear on the verdict.
 """
 
 import os
@@ -28,17 +29,18 @@ _PLANNED = "the orbit is the plan: neither its age nor its interpolation counts"
 class Waived(NamedTuple):
     """Rows after waivers, and the waivers that name requirements.
 
-    Rows that fail or are not evaluated, and that a valid waiver names, are `waived`; one with expired waivers keeps
-    its status and has the last of them. `requirements` has the first valid waiver of each requirement, by its id.
+    A row that fails or is not evaluated becomes `waived` if a valid waiver names it. A row with expired waivers keeps
+    its status and has the waiver that expired last. `requirements` has the first valid waiver of each requirement, by
+    its id.
     """
 
     mission: Mission
     rows: list[Row]
     requirements: Mapping[str, tuple[AppliedWaiver, ...]]
-    covered: Sequence[tuple[int, int]]  # rows that it names, and those of them that are broken
+    covered: Sequence[tuple[int, int]]  # per waiver: numbers of named rows and of broken rows among them
 
     def unused(self, judged: Sequence[JudgedRequirement]) -> Iterator[tuple[KeyPath, Note]]:
-        """Say which waivers name nothing, everything, or nothing that is broken."""
+        """Warn of waivers that name no row, every row, or no broken row."""
         broken = {requirement.id for requirement in judged if requirement.status in (*BROKEN, "waived")}
         ids = [requirement.id for requirement in judged]
         for index, (waiver, (named, failing)) in enumerate(zip(self.mission.waivers, self.covered, strict=True)):
@@ -68,7 +70,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
     broken = {position for position, row in enumerate(rows) if row.status in BROKEN}
     requirements = [f"mission.{key}" for key in KEYS]
     missing = [n for n, row in enumerate(rows) if row.is_of_declare and row.status == "not_evaluated"]
-    # A thousand waivers of one row would fill a report: it has the first that holds and the one that held longest.
+    # A thousand waivers of one row would fill a report: a row has its first valid waiver and its last expired waiver.
     holding: dict[int, AppliedWaiver] = {}
     of_requirements: dict[str, tuple[AppliedWaiver, ...]] = {}
     over: list[tuple[AppliedWaiver, set[int]]] = []
@@ -76,7 +78,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
     for index, waiver in enumerate(mission.waivers):
         line = mission.line(("waivers", index, "id"))
         named = named_by(waiver.id, ids)
-        if any(rows[position].metric == DECLARE for position in named):  # it stands for all that is missing
+        if any(rows[position].metric == DECLARE for position in named):  # the waiver covers all missing declarations
             named = sorted({*named, *missing})
         failing = broken.intersection(named)
         covered.append((len(named), len(failing)))
@@ -101,7 +103,7 @@ def _waived(row: Row, holding: AppliedWaiver | None, last: AppliedWaiver | None)
 
 
 def holding_place(mission: Mission, today: date, ids: Sequence[str]) -> int:
-    """Place in the file of the first waiver that holds and names one of some ids; -1: none does."""
+    """Index in the file of the first valid waiver that names any of the ids; -1: no such waiver."""
     valid = (
         waiver_index
         for waiver_index, waiver in enumerate(mission.waivers)
@@ -111,7 +113,7 @@ def holding_place(mission: Mission, today: date, ids: Sequence[str]) -> int:
 
 
 def named_by(pattern: str, ids: Sequence[str]) -> list[int]:
-    """Places of the ids that a waiver names; an id may hold a bracket of its own."""
+    """Indices of the ids that a waiver names; an id may contain a bracket."""
     if not any(char in pattern for char in "*?["):
         return [id_index for id_index, row_id in enumerate(ids) if row_id == pattern]
     matches = map(re.compile(translate(pattern)).match, ids)
@@ -120,16 +122,16 @@ def named_by(pattern: str, ids: Sequence[str]) -> list[int]:
 
 # ---------------------------------------------------------------------- from outside the file
 def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override, ...]:
-    """Gather what from outside the file bears on the verdict of one mission.
+    """Gather the influences from outside the file on the verdict of one mission.
 
     Parameters
     ----------
     mission : Mission
-        As loaded, with the options that changed it and the parts that it takes figures from.
+        Mission as loaded, with the options that changed it and the parts that it takes figures from.
     outside : Outside
-        Of the run.
+        Influences on all missions of the run.
     today : date
-        Day on which waivers are judged, UTC. It bears on the verdict where the file has a waiver.
+        Day on which waivers are judged, UTC. It bears on the verdict if the file has a waiver.
     """
     from_outside = list(outside.options)
     if mission.waivers or outside.is_day_given:
@@ -142,7 +144,7 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
 
 
 def _planned_orbits(mission: Mission) -> Iterator[Override]:
-    """Orbits that are flown as they stand: a verdict then rests on the plan, not on what the file knows of it."""
+    """Orbits that are flown as planned: a verdict then depends on the plan, not on its age or interpolation."""
     for name in PLATFORMS:
         orbit = getattr(mission.platforms, name).orbit
         if orbit is not None and orbit.planned:
@@ -150,7 +152,7 @@ def _planned_orbits(mission: Mission) -> Iterator[Override]:
 
 
 def _own_parts(mission: Mission) -> Iterator[Override]:
-    """Parts of the project that stand in for those of the catalogue with the same name."""
+    """Parts of the project that replace parts of the catalogue with the same name."""
     catalogue = str(resource("specs", "sensors")) if mission.parts else ""
     for name, file, _ in mission.parts:
         if name.endswith((".yaml", ".yml")) or os.path.dirname(file) == catalogue:
@@ -162,7 +164,7 @@ def _own_parts(mission: Mission) -> Iterator[Override]:
 
 
 def _shown(file: str, mission_file: str) -> str:
-    """Path of a file from the folder of the mission file, the same wherever the command runs."""
+    """Path of a file relative to the folder of the mission file, independent of the current folder."""
     try:
         path = os.path.relpath(file, os.path.dirname(mission_file) or os.curdir)
     except (OSError, ValueError):  # the current folder is gone; another drive

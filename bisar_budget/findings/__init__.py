@@ -1,4 +1,4 @@
 """Findings of a check, as frozen data: statuses, rows, missions, verdicts of images."""
 
-# What other rooms may use.
+# Modules that other rooms may use.
 __all__ = ["images", "mission", "monte_carlo", "requirement", "row", "specification", "status", "trade"]

@@ -1,6 +1,6 @@
 """Findings of images, as frozen data: verdicts on limits, and the pictures behind them.
 
-Field names of verdicts are the JSON contract's of `verify`. Axes of pictures are those of the rotated image: x′ along
+Field names of verdicts come from the JSON contract of `verify`. Pictures have the axes of the rotated image: x′ along
 the bistatic look direction φ_b, y′ across it, counter-clockwise.
 """
 
@@ -12,18 +12,18 @@ from bisar_budget.findings.requirement import Override
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import NOTHING, Note
 
-FLOOR_DB = -40.0  # of the error-free peak: black in a chip
+FLOOR_DB = -40.0  # relative to the error-free peak: black in a chip
 
 
 class Verdict(NamedTuple):
-    """Verdict of the image on one limit. None where a value does not exist; `reason` says why.
+    """Verdict of the image on one limit. A value that does not exist is None; `reason` gives the reason.
 
     Phases are magnitudes at the aperture edge [rad]: by Table II, by the full model's closed form, predicted from
-    exact ranges, and measured, `…_inside` and `…_beyond` at 0.9 and 1.1 times the limit. Displacements are on the
+    exact ranges, and measured; `…_inside` and `…_beyond` are at 0.9 and 1.1 times the limit. Displacements are on the
     ground (east, north) [m]: `displacement_m` by exact ranges, `…_published_m` by (25), `…_full_m` by the full
-    model. The smear azimuth is that of a line, from 0 to π; `…_published_rad` by (31). For vibration and noise
-    `measured_db` stands against `requirement_db`, of noise with its standard error and its interval at 95 %. With
-    autofocus the row is formed again at `boundary_autofocus` and refocused.
+    model. The smear azimuth is the direction of a line, from 0 to π; `…_published_rad` by (31). For vibration and
+    noise `measured_db` is compared with `requirement_db`; for noise it has a standard error and an interval at 95 %.
+    With autofocus the image is formed again at `boundary_autofocus` and refocused.
     """
 
     id: str
@@ -65,9 +65,9 @@ class Verdict(NamedTuple):
 
     @property
     def judged_phases_rad(self) -> tuple[float | None, float | None]:
-        """The phase that the budget bounds, as exact ranges predict it and as the image shows it. [rad]
+        """The phase that the budget limits: predicted by exact ranges, and measured in the image. [rad]
 
-        The cubic phase where the row holds it, else the quadratic phase of equal loss.
+        The cubic phase if the row limits it, else the quadratic phase of equal loss.
         """
         if self.measured_cubic_rad is not None:
             return self.predicted_cubic_rad, self.measured_cubic_rad
@@ -77,17 +77,17 @@ class Verdict(NamedTuple):
 
     @property
     def of_equal_loss(self) -> str:
-        """Words that name the judged phase where the quadratic part of it is less than 0.99."""
+        """Words that name the judged phase if its quadratic part is less than 0.99."""
         phase, quadratic = self.measured_equal_loss_qpe_rad, self.measured_qpe_rad
         is_more = self.measured_cubic_rad is None and phase is not None and (quadratic or 0.0) < 0.99 * phase
         return " of equal loss" if is_more else ""
 
 
 class VerifiedMission(NamedTuple):
-    """The verdicts on one mission's limits; `conditions` says of what images they are.
+    """The verdicts on one mission's limits; `conditions` describes the images.
 
-    `changes` are values that options put in place of the file's, `overrides` is all that from outside the file bears
-    on the verdicts.
+    `changes` are values that options put in place of the file's values. `overrides` are all influences from outside
+    the file on the verdicts.
     """
 
     file: str
@@ -101,7 +101,7 @@ class VerifiedMission(NamedTuple):
     def status(self) -> str:
         """`fail` if a limit of the gating model is optimistic, with or without autofocus.
 
-        `not_evaluated` if no limit got a verdict: nothing was verified, which is no pass. Else `pass`.
+        `not_evaluated` if no limit got a verdict: nothing was verified, which is not a pass. Else `pass`.
         """
         verdicts = {row.verdict for row in self.rows} | {row.verdict_autofocus for row in self.rows}
         if "optimistic" in verdicts:
@@ -110,7 +110,7 @@ class VerifiedMission(NamedTuple):
 
     @property
     def doubt(self) -> Note:
-        """Say that no limit got a verdict; empty if one did."""
+        """Note that no limit got a verdict; empty if any limit did."""
         if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
             return NOTHING
         return phrases.nothing_verified(len(self.rows))
@@ -119,10 +119,10 @@ class VerifiedMission(NamedTuple):
 class PointImage(NamedTuple):
     """Image of the point with an error, its cut along y′, and the cut without error at the same place.
 
-    `chip` holds `columns` × `rows` bytes, row by row from the largest y′ to the smallest, in each from the smallest
-    x′ to the largest: 0 is `FLOOR_DB` or less, 255 the peak without error. `pixel_m` are its steps along x′ and y′;
-    along y′ a pixel stands for `thinned` samples, of which a resolution cell has as many as along x′. The cuts are
-    powers over the error-free peak [dB], `step_m` apart, with y′ = 0 at index `len // 2`.
+    `chip` holds `columns` × `rows` bytes. Rows run from the largest y′ to the smallest, columns from the smallest x′
+    to the largest. The value 0 is `FLOOR_DB` or less, 255 the peak without error. `pixel_m` are the steps of the chip
+    along x′ and y′. A pixel along y′ represents `thinned` samples; a resolution cell has as many samples along y′ as
+    along x′. The cuts are powers over the error-free peak [dB], `step_m` apart, with y′ = 0 at index `len // 2`.
     """
 
     columns: int
@@ -141,7 +141,7 @@ class PointImage(NamedTuple):
 
 
 class ImageEvidence(NamedTuple):
-    """The images behind one verdict: at the limit, and with autofocus at its limit, before and after."""
+    """The images of one verdict: at the limit, and at the limit with autofocus, before and after autofocus."""
 
     file: str
     verdict: Verdict

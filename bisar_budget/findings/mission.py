@@ -1,4 +1,4 @@
-"""Findings about one mission file, and about all of a run."""
+"""Findings about one mission file, and about all files of a run."""
 
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 
 class FileWarning(NamedTuple):
-    """Something about the mission file that should not go unsaid.
+    """A warning about the mission file.
 
-    Most change no verdict. One that `is_doubt` puts in doubt what was checked: the status is `warn` at least.
-    `is_of_options` marks the one that says which options changed the mission.
+    Most warnings change no verdict. A warning with `is_doubt` doubts the checked mission: the status is `warn` at
+    least. `is_of_options` marks the warning that names the options that changed the mission.
     """
 
     line: int | None
@@ -39,7 +39,8 @@ class FileWarning(NamedTuple):
 class MissionFindings(NamedTuple):
     """Findings about one mission file that can be used.
 
-    `analysis` is that of the check, for whoever goes on from it; None where a thousand would fill memory.
+    `analysis` is the analysis of the check, for further computations. It is None if a run has many missions: a
+    thousand analyses would fill memory.
     """
 
     analysis: "Analysis | None"
@@ -53,27 +54,27 @@ class MissionFindings(NamedTuple):
     aperture_time: float
     scene_radius: float | None
     resolution: Resolution
-    peak_loss_db: float | None  # by all declared errors; None where there is no image, or nothing is declared
+    peak_loss_db: float | None  # by all declared errors; None without an image or a declared error
     allocation: Allocation
     rows: tuple[Row, ...]
     warnings: tuple[FileWarning, ...]
     notes: tuple[Note, ...]
-    place: str = ""  # of the scene on the Earth, and the instant of mid-aperture, where the file says them
-    paths: tuple[tuple[str, FlownPath], ...] = ()  # of platforms whose path the file does not state itself
+    place: str = ""  # of the scene on the Earth, and the instant of mid-aperture, if the file states them
+    paths: tuple[tuple[str, FlownPath], ...] = ()  # of platforms whose path the mission file does not state
     scene: "SceneEdge | None" = None  # of missions with a scene.radius and declared errors
-    verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
-    is_unverified: bool = False  # images were asked for, and none gave a verdict
-    image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
+    verdicts: "tuple[Verdict, ...] | None" = None  # verdicts of images, if any were formed
+    is_unverified: bool = False  # images were required, and no image gave a verdict
+    image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of the images, if a report shows them
     monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
     document: Document = Document()
-    study: "TradeStudy | None" = None  # of other values, if a report shows them
-    sheet: "SpecificationSheet | None" = None  # of the errors that the file has specified, likewise
-    changes: tuple[SetValue, ...] = ()  # values that options put in place of the file's
+    study: "TradeStudy | None" = None  # sweep of values, if a report shows it
+    sheet: "SpecificationSheet | None" = None  # of the errors that the file specifies, if a report shows it
+    changes: tuple[SetValue, ...] = ()  # values that options put in place of the file's values
     requirements: tuple[JudgedRequirement, ...] = ()
     kinds: DeclaredKinds = DeclaredKinds()
-    overrides: tuple[Override, ...] = ()  # what from outside the file bears on the verdict
-    model_doubt: Note = NOTHING  # where the published model judges and does not hold
-    confidence: Note = NOTHING  # with which its requirements are met, should they be
+    overrides: tuple[Override, ...] = ()  # influences from outside the file on the verdict
+    model_doubt: Note = NOTHING  # if the published model judges and does not hold
+    confidence: Note = NOTHING  # with which requirements are met, if they are met
 
     def __repr__(self) -> str:
         """File, name and status, on one line."""
@@ -81,7 +82,7 @@ class MissionFindings(NamedTuple):
 
     @property
     def mission(self) -> Mission | None:
-        """The mission that was checked; None where its analysis was not kept."""
+        """The mission that was checked; None if its analysis was not kept."""
         return None if self.analysis is None else self.analysis.mission
 
     def analysed(self) -> "Analysis":
@@ -90,7 +91,7 @@ class MissionFindings(NamedTuple):
         Raises
         ------
         ValueError
-            It was left out.
+            The findings have no analysis.
         """
         if self.analysis is None:
             raise ValueError("these findings do not carry their analysis")
@@ -98,20 +99,21 @@ class MissionFindings(NamedTuple):
 
     @property
     def is_empty(self) -> bool:
-        """The file declares no error at all: nothing was judged."""
+        """Whether the file declares no error: nothing was judged."""
         return all(row.status == "not_declared" or row.is_of_declare for row in self.rows)
 
     @property
     def status(self) -> str:
-        """Worst of its statuses."""
+        """Worst status of the mission."""
         return worst(self.statuses)
 
     @property
     def statuses(self) -> frozenset[str]:
-        """Statuses of the rows, of the requirements and of what is doubtful about the whole.
+        """Statuses of the rows, of the requirements and of doubts about the mission.
 
-        `not_evaluated` is one if nothing was judged, or if images were formed and verified nothing; `warn` if a
-        warning doubts what was checked. Strictness needs all of them: what is waived may also warn.
+        They include `not_evaluated` if nothing was judged, or if images were formed and no image gave a verdict. They
+        include `warn` if a warning doubts the checked mission. A strict run needs all statuses: a waived mission may
+        also have a warning.
         """
         doubts = ["not_evaluated"] if self.is_unverified or self.is_empty else []
         doubts += ["warn" for warning in self.warnings if warning.is_doubt]
@@ -133,7 +135,7 @@ class MissionFindings(NamedTuple):
 
 
 class UnusableMission(NamedTuple):
-    """A mission file that cannot be used, with its faults; `data` is the file as read, where it was."""
+    """A mission file that cannot be used, with its faults; `data` is the content of the file, if it was read."""
 
     file: str
     faults: tuple[Fault, ...]
@@ -142,15 +144,15 @@ class UnusableMission(NamedTuple):
 
     @property
     def statuses(self) -> frozenset[str]:
-        """Its one status."""
+        """The single status of an unusable file."""
         return frozenset([self.status])
 
 
 class Report(NamedTuple):
-    """The findings about every mission file of a run.
+    """The findings about all mission files of a run.
 
-    `options` are those of the run that bear on it. `day` is the date that somebody gave it, or on which its waivers
-    were judged; None where it decides nothing.
+    `options` are the options of the run that bear on it. `day` is the date that the user gave, or on which waivers
+    were judged; None if no verdict depends on the date.
     """
 
     version: str

@@ -8,11 +8,12 @@ from bisar_budget.phrases import Note
 class Requirement(NamedTuple):
     """How often one requirement holds.
 
-    `sum` and `rss` are what these rules of `allocation.combine` would hold to the limit, by the full model with the
-    coverage factor; None where a declared error leaves no image. `sigma_rss` is the standard uncertainty by
-    root-sum-square, `sigma` that of the draws that have an image, None where none has; of displacements, rms lengths.
-    `probability` is of the draws, with the ends of its Wilson interval; `probability_normal` is that of a normal
-    distribution with `sigma_rss`. `dominant` is the error with the largest share of the variance.
+    `sum` and `rss` are the values that these rules of `allocation.combine` would compare with the limit, by the full
+    model with the coverage factor; None if a declared error leaves no image. `sigma_rss` is the standard uncertainty
+    by root-sum-square. `sigma` is the standard uncertainty of the draws with an image, None without such a draw. For
+    displacements both are rms lengths. `probability` comes from the draws, with the ends of its Wilson interval.
+    `probability_normal` comes from a normal distribution with `sigma_rss`. `dominant` is the error with the largest
+    share of the variance.
     """
 
     id: str
@@ -32,9 +33,10 @@ class Requirement(NamedTuple):
 
 
 class MonteCarlo(NamedTuple):
-    """Result of the draws. `probability` is that all requirements hold at once; None without a requirement.
+    """Result of the draws.
 
-    `is_exact` says that every draw went through exact ranges: the errors are too large for sums of effects.
+    `probability` is the probability that all requirements hold at once; None without a requirement. `is_exact`: exact
+    ranges computed every draw, because the errors are too large for sums of effects.
     """
 
     draws: int

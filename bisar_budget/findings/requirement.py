@@ -1,4 +1,4 @@
-"""The table of requirements: what each asks for, what is reached, and which row decides."""
+"""The table of requirements: the limit of each, the value reached, and the row that decides."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -19,11 +19,11 @@ NAMES = {
 
 @dataclass(frozen=True, kw_only=True)
 class DecidingShare:
-    """A share of a requirement that decides in place of the whole, in the unit of the requirement; without gain.
+    """A share of a requirement that decides in place of the full requirement, in its unit, without gain.
 
-    `owner` is the platform or the clock that has the share; `autofocus`, where the sum of all phases is held to what
-    autofocus pulls in; `scene`, where the difference at the scene's edge is held to the requirement; `band`, where
-    the phase is that of dispersion over the band.
+    `owner` is the platform or the clock that has the share. It is `autofocus` if the pull-in range of autofocus
+    limits the sum of all phases, `scene` if the requirement limits the difference at the scene's edge, and `band` for
+    the phase of dispersion over the band.
     """
 
     owner: str
@@ -33,15 +33,15 @@ class DecidingShare:
 
 
 class JudgedRequirement(NamedTuple):
-    """A requirement of the mission and how it stands. Numbers in SI, radians and decibel; None where there is none.
+    """A judged requirement of the mission. Numbers in SI, radians and decibel; None if a value does not exist.
 
-    `value` and `allowed` are the requirement as the file, or the default, states it; `reached` is the total of the
-    mission, with `combine: each` the largest row's. `utilization` is that of what decides: the ratio of the two, or
-    that of `share`, where a share decides. `autofocus_gain` is the factor by which autofocus lets quadratic phases
-    exceed what is allowed, in all and of a platform's share; None of other requirements. `row` is the row that
-    decides the status, `use_row` the one with the utilization, `rows` are all that judge the requirement. `reason`
-    says why it cannot be judged, or why it is not met. `waivers` cover it or rows that judge it; empty unless it is
-    waived. `is_unjudged` is whether it cannot be judged, be that waived or not.
+    `value` and `allowed` are the requirement as the file, or the default, states it. `reached` is the total of the
+    mission, with `combine: each` the value of the largest row. `utilization` is the ratio of `reached` and `allowed`,
+    or the utilization of `share` if a share decides. `autofocus_gain` is the factor by which quadratic phases may
+    exceed the requirement and the platforms' shares with autofocus; None for requirements on anything else. `row` is
+    the row that decides the status, `use_row` the row with the utilization, and `rows` are all rows that judge the
+    requirement. `reason` says why the requirement cannot be judged, or why it is not met. `waivers` cover the
+    requirement or rows that judge it; empty unless it is waived. `is_unjudged`: it cannot be judged, waived or not.
     """
 
     key: str
@@ -63,29 +63,29 @@ class JudgedRequirement(NamedTuple):
     use_row: str | None = None
 
     def __repr__(self) -> str:
-        """Key, what is reached of what is allowed, and status, on one line."""
+        """Key, reached and allowed value, and status, on one line."""
         sizes = ("-" if one is None else f"{one:.6g}" for one in (self.reached, self.allowed))
         return f"<{self.key}: {' of '.join(sizes)} {self.unit}, {self.status}>"
 
     @property
     def waived_by(self) -> tuple[AppliedWaiver, ...]:
-        """Waivers that hold; none unless it is waived."""
+        """Valid waivers; empty unless the requirement is waived."""
         return holding(self.status, self.waivers)
 
     @property
     def id(self) -> str:
-        """Its name in waivers and reports: that of the mission's own row, should there be one."""
+        """Name of the requirement in waivers and reports: the id of the mission's own row, if there is such a row."""
         return f"mission.{self.key}"
 
     @property
     def name(self) -> str:
-        """Its name in a sentence."""
+        """Name of the requirement in a sentence."""
         return NAMES[self.key]
 
 
 @dataclass(frozen=True)
 class ShiftedFigure:
-    """Figures of a kind of error that the file shifts by a level off what their source states."""
+    """Figures of a kind of error that the file shifts by a level from the values of their source."""
 
     kind: str
     key: str
@@ -99,7 +99,7 @@ class ShiftedFigure:
 
     @property
     def off(self) -> str:
-        """Where from the figures are shifted."""
+        """Words for the origin of the shift: the source of the figures."""
         if self.source is not None:
             return f"off {printable(self.source)}"
         return "off the file's own spectrum" if self.key.endswith("spectrum_level") else "off the data sheet"
@@ -108,8 +108,8 @@ class ShiftedFigure:
 class DeclaredKinds(NamedTuple):
     """Kinds of error that a mission can declare, by the names of `requirements.declare` with their owner.
 
-    `declared` and `missing` are all of them; `without_source` are the declared ones that state no source, `shifted`
-    what a level shifts off its source.
+    `declared` and `missing` together are all kinds. `without_source` are the declared kinds that state no source.
+    `shifted` are the figures that a level shifts from their source.
     """
 
     declared: tuple[str, ...] = ()
@@ -119,12 +119,12 @@ class DeclaredKinds(NamedTuple):
 
     @property
     def in_all(self) -> int:
-        """Number of kinds in all."""
+        """Number of all kinds."""
         return len(self.declared) + len(self.missing)
 
 
 class Override(NamedTuple):
-    """Something from outside the file that bears on the verdict: its name, its value, and where it came from."""
+    """An influence from outside the file on the verdict: its name, its value and its origin."""
 
     name: str
     value: str
@@ -132,12 +132,12 @@ class Override(NamedTuple):
 
 
 class Outside(NamedTuple):
-    """Influences on all missions of a run: options that somebody gave, and where the day of waivers comes from."""
+    """Influences on all missions of a run: options that the user gave, and the origin of the day for waivers."""
 
     options: tuple[Override, ...] = ()
     day_origin: str = "the caller"
-    is_day_given: bool = False  # by the option --date, which is said even where no waiver stands
-    set_origin: str = "command line"  # of values in place of the file's
+    is_day_given: bool = False  # by the option --date, which is reported also without a waiver
+    set_origin: str = "command line"  # origin of values in place of the file's values
 
 
 NOTHING_OUTSIDE = Outside()

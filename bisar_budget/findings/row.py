@@ -1,4 +1,4 @@
-"""One row of a budget: what it is about, its numbers, its status."""
+"""One row of a budget: its subject, its numbers, its status."""
 
 from collections.abc import Iterable, Sequence
 from datetime import date
@@ -13,13 +13,14 @@ from bisar_budget.mission.readers import did_you_mean
 from bisar_budget.phrases import Note
 
 DECLARE = "declare"  # requirements.declare, and the metric of its row
-SPECIFICATION = "specification"  # the metric of rows that hold what is declared to `specifications`
+SPECIFICATION = "specification"  # the metric of rows that compare declared errors with `specifications`
 
 
 class AppliedWaiver(NamedTuple):
     """A waiver that names a failing row or requirement; expired if its last day is over.
 
-    Line of the file, last day, reason, and `id` as the file writes it, which is the `place`-th of the file's waivers.
+    It has its line in the file, last day, reason, and `id` as written in the file. `place` is its index among the
+    file's waivers.
     """
 
     line: int | None
@@ -41,21 +42,22 @@ def in_order(waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaiver, ...]:
 
 
 def holding(status: str, waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaiver, ...]:
-    """Waivers that something of a status is waived by; none if it is not."""
+    """Valid waivers of a row or requirement with a status; empty if the status is not `waived`."""
     return tuple(waiver for waiver in waivers if not waiver.is_expired) if status == "waived" else ()
 
 
 class Row(NamedTuple):
-    """One line of the budget. Numbers in SI and radians; None where a value does not exist.
+    """One line of the budget. Numbers in SI and radians; None if a value does not exist.
 
-    `is_independent` marks the rows that sums run over: errors as the file states them. Along the scene's axes an
-    error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is `qpe_full_rad`, which is
-    that of exact ranges; `published_margin_db` how far the published rule of a vibration stays inside first
-    principles. `binding_requirement` is the requirement that sets `allowable`, `cubic_rad` the magnitude of the
-    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds.
-    `equal_loss_qpe_rad` is the quadratic phase of as much loss of the peak as `qpe_full_rad` and what band and turn
-    do not resolve, `rest_rad` the rms phase beyond the cubic, `model` the one whose numbers these are. `waivers` name
-    the row while it fails, valid or expired; `refuted` says by which images its limit does not hold.
+    `is_independent` marks the rows that sums count: errors as the file states them. Further rows repeat an error of
+    another frame along the scene's axes; sums do not count these rows. `qpe_exact_rad` is equal to `qpe_full_rad`,
+    which comes from exact ranges. `published_margin_db` is the margin of the published rule of a vibration to first
+    principles. `binding_requirement` is the requirement that sets `allowable`. `cubic_rad` is the magnitude of the
+    declared error's cubic phase at the aperture edge. `islr_db` is the ISLR that a declared random error adds.
+    `equal_loss_qpe_rad` is the quadratic phase with the same loss of the peak as `qpe_full_rad` together with the
+    phase that band and turn do not resolve. `rest_rad` is the rms phase beyond the cubic. `model` is the model that
+    gives these numbers. `waivers` name the row while it fails, valid or expired. `refuted` names the images that
+    refute the limit of the row.
     """
 
     subject: Subject
@@ -88,44 +90,44 @@ class Row(NamedTuple):
     model: str | None = None
     waivers: tuple[AppliedWaiver, ...] = ()
     refuted: tuple[Note, ...] = ()
-    is_unjudged: bool = False  # it cannot be judged, be that waived or not
+    is_unjudged: bool = False  # the row cannot be judged, waived or not
 
     def __repr__(self) -> str:
-        """Id, what is declared of what is allowed, and status, on one line."""
+        """Id, declared and allowed size, and status, on one line."""
         sizes = ("-" if one is None else f"{one:.6g}" for one in (self.declared, self.allowable))
         return f"<{self.id}: {' of '.join(sizes)} {self.unit}, {self.status}>"
 
     @property
     def id(self) -> str:
-        """Its name in reports, waivers and the mission file's `requirement_ids`."""
+        """Name of the row in reports, waivers and the mission file's `requirement_ids`."""
         return self.subject.id
 
     @property
     def owner(self) -> str:
-        """Whose share it counts against: transmitter, receiver, clock or mission."""
+        """Owner of the share that the row counts against: transmitter, receiver, clock or mission."""
         return self.subject.owner
 
     @property
     def waived_by(self) -> tuple[AppliedWaiver, ...]:
-        """Waivers that hold; none unless it is waived."""
+        """Valid waivers; empty unless the row is waived."""
         return holding(self.status, self.waivers)
 
     @property
     def is_of_declare(self) -> bool:
-        """Whether its status says what `requirements.declare` asks for, and nothing of an error's size."""
+        """Whether the status concerns only `requirements.declare`, and not the size of an error."""
         return self.metric == DECLARE or (
             isinstance(self.reason, Note) and self.reason.code == "not-declared-as-required"
         )
 
     @property
     def decisive(self) -> tuple[Note, ...]:
-        """Notes that decide its status: the reason, waivers, and what images say against its limit."""
+        """Notes that decide the status: the reason, waivers, and images that refute the limit."""
         reason = (self.reason,) if self.reason else ()
         return (*reason, *(waiver.words for waiver in self.waivers), *self.refuted)
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """All there is to say besides the reason."""
+        """All notes besides the reason."""
         if not (self.waivers or self.refuted):
             return self.remarks
         return (*self.remarks, *(waiver.words for waiver in self.waivers), *self.refuted)
@@ -139,15 +141,15 @@ def where_ids_are(file: str) -> str:
 
 
 def unknown_id(row_id: str, known: Iterable[str], file: str, of_what: str = "row") -> str:
-    """Say that nothing of a mission has an id, where ids are found, and which is the nearest."""
+    """Sentence on an id that a mission does not have, with the command that lists the ids and the nearest id."""
     problem = f"no {of_what} has this id; {where_ids_are(file)}"
     return sentences(problem, did_you_mean(row_id, tuple(known)))
 
 
 def worst_first(rows: Sequence[Row]) -> list[Row]:
-    """Sort rows by status, then by utilization, the highest first; equals keep their order.
+    """Sort rows by status, then by utilization, the highest first; equal rows keep their order.
 
-    A specification that is met comes last of what passes: it may be used in full.
+    A specification that is met comes after all rows that pass: an error may use its full specification.
     """
 
     def use(row: Row) -> float:

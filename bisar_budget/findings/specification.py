@@ -1,4 +1,4 @@
-"""The sheet of specifications that hold together: what is to be ordered, and what each limit is used by."""
+"""The sheet of specifications that hold together: the values to order, and the errors that use each limit."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 
 class Specification(NamedTuple):
-    """The largest size of one error, and what is to be ordered.
+    """The largest size of one error, and the value to order.
 
-    `value` is the size as found, `ordered` the same rounded down, `text` that as the file would have it; None, and
-    empty, where no requirement limits it. `found_text` is the value in the same unit, `remark` what the number means
-    to a supplier. `declared` is what the file has today, the largest of three axes. `shares` are the parts of what
-    each requirement may use, by its row in which the error takes most of it. `parts` are those of the catalogue that
-    keep to what is ordered.
+    `value` is the computed size, `ordered` the size rounded down, and `text` the ordered value as written in a file;
+    None and empty if no requirement limits the error. `found_text` is `value` in the same unit. `remark` explains the
+    number to a supplier. `declared` is the declared size in the file, the largest of three axes. `shares` are the
+    error's shares of each requirement, by the row of the requirement in which the error uses most. `parts` are the
+    parts of the catalogue that meet the ordered value.
     """
 
     key: str
@@ -35,7 +35,7 @@ class Specification(NamedTuple):
     remark: str = ""
 
     def holds(self, value: float | None) -> bool:
-        """Whether a size keeps to what is ordered: where nothing is ordered it does, where none is stated not."""
+        """Whether a size meets the specification. True without an ordered value, False without a declared size."""
         if self.ordered is None:
             return True
         if value is None:
@@ -45,11 +45,12 @@ class Specification(NamedTuple):
 
 
 class RowUse(NamedTuple):
-    """How one row that can fail is used by the sizes as found.
+    """Use of one row that can fail by the computed sizes.
 
-    `requirement` judges it; None: the effect has no requirement, and must stay negligible. `used` is its utilization,
-    `allowed` what it may be; `fixed` is the part of that which all other errors take, `shares` those of the specified
-    ones. `multiplier` says what the row is worth: Σ multiplier·share over rows is the weight of each error.
+    `requirement` judges the row; None: the effect has no requirement and must stay negligible. `used` is the
+    utilization of the row, `allowed` its limit. `fixed` is the share of the limit that all errors without a
+    specification use, `shares` are the shares of the specified errors. `multiplier` is the price of the row: the
+    weight of each error is Σ multiplier·share over rows.
     """
 
     id: str
@@ -61,13 +62,13 @@ class RowUse(NamedTuple):
     multiplier: float
 
 
-LEAST_ROOM = 1e-6  # of a limit, that other errors must leave
+LEAST_ROOM = 1e-6  # of a limit, that errors without a specification must leave free
 
 
 class Broken(NamedTuple):
-    """A row that the other errors leave no room in, by its requirement, with what they use of it.
+    """A row in which errors without a specification leave no room, by its requirement, with their utilization.
 
-    `used` is None where they have no image.
+    `used` is None if these errors leave no image.
     """
 
     id: str
@@ -79,10 +80,10 @@ class Broken(NamedTuple):
 class SpecificationSheet(NamedTuple):
     """Specifications of one mission that hold together.
 
-    `status` is that of the check with what is ordered in place, and `requirements` how each then stands. `rows` are
-    those that limit a specification, `broken` those in which there is no room: then there are no values. `reserve` is
-    the part of every limit that is kept free. `notes` say what was taken otherwise than the file has it. `findings`
-    are those of the check.
+    `status` is the status of the check with the ordered values in place, and `requirements` are the requirements as
+    judged by that check. `rows` are the rows that limit a specification. `broken` are the rows without room: with
+    such a row there are no values. `reserve` is the part of every limit that is kept free. `notes` name the
+    differences from the file. `findings` are the findings of the check.
     """
 
     file: str
@@ -99,14 +100,14 @@ class SpecificationSheet(NamedTuple):
     changes: tuple[SetValue, ...] = ()
     overrides: tuple[Override, ...] = ()
     findings: "MissionFindings | None" = None
-    is_equal: tuple[SetValue, ...] = ()  # what balanced shares were replaced by
+    is_equal: tuple[SetValue, ...] = ()  # values that replaced balanced shares
 
     @property
     def complies(self) -> bool:
-        """Whether the mission meets every requirement with what is ordered."""
+        """Whether the mission meets every requirement with the ordered values."""
         return not self.broken and exit_code({self.status}, strict=False) == 0
 
     @property
     def ordered(self) -> tuple[SetValue, ...]:
-        """The values set in the mission file with which `check` holds it to what is ordered."""
+        """The values to set in the mission file, so that `check` uses the ordered values."""
         return (*self.is_equal, *(SetValue(one.key, one.text) for one in self.specifications if one.text))

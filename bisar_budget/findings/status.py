@@ -1,6 +1,6 @@
-"""The statuses of rows, missions and runs: what each gates, and how every format says it.
+"""The statuses of rows, missions and runs: the verdicts that each gates, and its words in every format.
 
-One line here is all that a new status needs, besides the rule that gives it (`budget.judged_rows`).
+A new status needs one line here, and the rule that gives it (`budget.judged_rows`).
 """
 
 from collections.abc import Container, Iterable, Mapping
@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 
 class Status(NamedTuple):
-    """One status. Formats are told apart by fields: none holds a list of statuses of its own.
+    """One status, with a field for each format: no format has a list of statuses of its own.
 
-    `gates` is whether a mission can have it. `fails` and `fails_strict` are whether it breaks a run. `is_judged` is
-    whether a requirement was held to a number or could not be; `is_met`, that it is met; `is_explained`, that its
-    reason decides something. `sarif` and `github` are levels, empty: not a finding there. `junit` is the outcome of a
-    test case: failure, skipped, passed, or passed with a remark. `verdict` is what a compliance report says of a
-    mission. `sgr` is its colour on a terminal (ECMA-48), `color` that on a page, and `symbol` the mark before it.
+    `gates`: a mission can have the status. `fails` and `fails_strict`: the status breaks a run. `is_judged`: a number
+    was compared with a requirement, or could not be. `is_met`: the requirement is met. `is_explained`: the reason of
+    the status decides something. `sarif` and `github` are levels; empty: not a finding in that format. `junit` is the
+    outcome of a test case: failure, skipped, passed, or passed with a remark. `verdict` is the verdict on a mission
+    in a compliance report. `sgr` is the colour on a terminal (ECMA-48), `color` the colour on a page, and `symbol`
+    the mark before the status.
     """
 
     name: str
@@ -37,16 +38,16 @@ class Status(NamedTuple):
 
     @property
     def is_held(self) -> bool:
-        """Whether a number was held to a limit and the outcome stands: neither waived nor without a value."""
+        """Whether a number was compared with a limit and decides: neither waived nor without a value."""
         return self.is_judged and not self.junit_words
 
     @property
     def complies(self) -> bool:
-        """Whether all was judged and is met, with warnings or without; a waiver meets nothing."""
+        """Whether everything was judged and is met, with or without warnings; a waiver meets no requirement."""
         return self.is_held and not self.fails
 
 
-# Worst first. What is waived breaks its requirement: it breaks no run, and is worse than all that meets one.
+# Worst first. A waived row breaks its requirement: it breaks no run, and is worse than any row that meets it.
 _WORST_FIRST = (
     Status(
         "error", "ERROR", "unusable",
@@ -91,19 +92,19 @@ _WORST_FIRST = (
     Status("not_declared", "not decl", "not declared", junit="skipped", junit_words="not declared", sgr="2"),
 )  # fmt: skip
 STATUS = {status.name: status for status in _WORST_FIRST}
-RANK = {name: place for place, name in enumerate(STATUS)}  # the worst has the lowest
+RANK = {name: place for place, name in enumerate(STATUS)}  # the worst status has the lowest rank
 BROKEN = tuple(name for name, one in STATUS.items() if one.fails)  # a waiver covers them
-# In the order of summaries: what a mission can have, then what gates nothing.
+# In the order of summaries: statuses that a mission can have, then statuses that gate nothing.
 STATUSES = tuple(sorted(STATUS, key=lambda name: not STATUS[name].gates))
 
 
 def worst(statuses: Iterable[str]) -> str:
-    """Return the worst of the statuses that gate; `pass` if there is none."""
+    """Return the worst of the statuses that gate; `pass` without such a status."""
     return min((name for name in statuses if STATUS[name].gates), key=RANK.__getitem__, default="pass")
 
 
 def complying(counts: Mapping[str, int]) -> int:
-    """Number of missions that comply, by the number of each status; those that are waived do not."""
+    """Number of missions that comply, from the number of missions of each status; waived missions do not comply."""
     return sum(count for name, count in counts.items() if STATUS[name].complies)
 
 

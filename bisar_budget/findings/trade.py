@@ -15,8 +15,8 @@ Floats = NDArray[np.float64]
 class Axis(NamedTuple):
     """A key that varies.
 
-    `values` (n,) rise, in `unit`, of which one is `scale` in SI; of a key with words they are the places of `words`,
-    from 0. `own` is the value of the mission itself, None where it has none, or none of the words.
+    `values` (n,) rise, in `unit`; one `unit` is `scale` in SI. For a key with words, `values` are the indices of
+    `words`, from 0. `own` is the mission's own value, None without a value or if the value is not in `words`.
     """
 
     key: str
@@ -29,7 +29,7 @@ class Axis(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Name and unit."""
+        """Name and unit of the key."""
         return f"{self.key} [{self.unit}]" if self.unit else self.key
 
     @property
@@ -44,8 +44,8 @@ class Axis(NamedTuple):
 class Trade(NamedTuple):
     """A sweep over one or two keys: arrays with one axis for each, in the order of `axes`.
 
-    `column` is what a heat map shows, `heading` its name and unit; empty where the status is shown. `fixed` are the
-    keys with a single value.
+    `column` names the column that a heat map shows, `heading` is its name and unit; both are empty if the map shows
+    the status. `fixed` are the keys with a single value.
     """
 
     axes: tuple[Axis, ...]
@@ -63,10 +63,11 @@ class Trade(NamedTuple):
 class TradeStudy(NamedTuple):
     """A sweep that a report of the mission shows.
 
-    `asked` is what stood behind each option; `rows` are the utilizations of the rows that are the worst anywhere,
-    over the one key that varies. Of `cases` `complying` meet every requirement, `waived` are waived, by `waived_by`;
-    of `unevaluated` something could not be evaluated or nothing is declared, and `missing` are no mission. `model`
-    is the one that an option put in place of the mission's own, `day` that on which waivers were judged.
+    `asked` is the text after each option. `rows` are the utilizations, over the single key that varies, of the rows
+    that are the worst at any value. The sweep has `cases`: `complying` of them meet every requirement, `waived` are
+    waived, by `waived_by`, `unevaluated` have no complete evaluation or no declared error, and `missing` give no
+    usable mission. `model` is the model that an option put in place of the mission's own model, `day` the date on
+    which waivers were judged.
     """
 
     asked: tuple[str, ...]
