@@ -204,7 +204,7 @@ def clocks_without_oscillator(mission: Mission) -> tuple[str, ...]:
 
 
 def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Phase noise of a platform's oscillator, or the part left by exchanged pulses, and the spurs that they make slow."""
+    """Phase noise of a platform's oscillator, or the part left by exchanged pulses, and spurs that they make slow."""
     mission = seen.mission
     oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
     if oscillator is None:
