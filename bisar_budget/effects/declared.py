@@ -374,7 +374,7 @@ class ErrorBlock:
 
     @property
     def paths(self) -> PointPaths:
-        """The paths of the image point by the errors that displace it; the positive sign of each error comes first."""
+        """Paths of the image point by the errors that displace it; the positive sign of each error comes first."""
         if self._follows is None:
             table, full = self.table, self.effects["full"]
             lanes = table.lanes(*(self.sources[index] for index in self.moves), signs=(1.0, -1.0))
@@ -593,13 +593,13 @@ class DeclaredErrors:
         return Lanes(case, at_nodes.reshape(len(at_nodes), -1), (u, v), (x, y, z), order, of_receiver, tags)
 
     def edge_of(self, error: ErrorSource) -> Any:
-        """Position error at the aperture's edge by a unit of an error, the larger of both platforms; a clock has 0."""
+        """Position error at the aperture's edge by a unit of an error, the larger of both platforms; 0 by a clock."""
         if not error.is_time_tag:
             return self.edge.get(error.unit, 0.0)
         return np.max([norm(error.direction_of(platform)).max(axis=0) for platform in error.platforms], axis=0)
 
     def bent(self, error: ErrorSource, size: Floats) -> Floats:
-        """Largest distance of a time tag's shift, of either sign, from a shift along the velocity, both platforms. [m]"""
+        """Distance of a time tag's shift, of either sign, from a shift along the velocity, platforms added. [m]"""
         times, bend = self.exact.times, np.zeros(self.cases)
         for platform in error.platforms:
             path, straight = self.geometries.both[platform], error.direction_of(platform)
@@ -634,7 +634,7 @@ class DeclaredErrors:
         return np.asarray(((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
 
     def _of_each(self, values: Sequence[Any], signs: int) -> Any:
-        """One value of each error for its lanes, or the value that all errors share; turning directions at each node."""
+        """One value of each error for its lanes, or the value that all share; turning directions at each node."""
         if any(np.ndim(value) > 1 for value in values):
             count = self.exact.fit.shape[1]
             turning = np.stack([np.broadcast_to(value, (count, self.cases)) for value in values], axis=1)
@@ -741,7 +741,7 @@ class Model:
         return self.allowed(source, [limit if name == requirement else None for name in HELD])[0]
 
     def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
-        """Size at which an error would reach a limit if its effects were proportional to the size; infinite: never."""
+        """Size at which an error would reach a limit if its effects were proportional to it; infinite: never."""
         block, index = self.errors.block_of(source)
         per_unit = float(block.per_unit(self.name)[HELD.index(requirement), index, 0])
         return limit / per_unit if per_unit else math.inf
