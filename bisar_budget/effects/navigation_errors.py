@@ -210,7 +210,7 @@ def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions
 
 
 def _walk_of(kind: str, count: int) -> "_Walks":
-    """Position error by the noise of a figure: a white acceleration, or a white tilt rate that turns specific force."""
+    """Position error by the noise of a figure: a white acceleration, or a white tilt rate turning specific force."""
     order = 1 if kind == "velocity_random_walk" else 2
     return _walks(order, order, count)
 

@@ -196,7 +196,7 @@ def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] 
 
 
 def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) -> Floats:
-    """Time error by a unit of Γ along each axis of the scene, v(τ) − v(0), or the rest after exchanges, (n, times, …).
+    """Time error by a unit of Γ along each scene axis, v(τ) − v(0), or the rest after exchanges. (n, times, …).
 
     The exchanges begin anywhere in their interval. Each of several beginnings has an equal part of the mean square.
     """
@@ -243,7 +243,7 @@ def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
 
 
 def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
-    """Spectrum of an oscillator's phase by random vibration, per unit of Γ; empty without vibration. [rad²/Hz/unit²]"""
+    """Spectrum of an oscillator's phase by random vibration, per unit of Γ; may be empty. [rad²/Hz/unit²]"""
     felt_vibration = felt(mission, name)
     is_heard = not mission.has_direct_path or name == "receiver"
     if felt_vibration is None or felt_vibration.vibration.spectrum is None or not is_heard:
