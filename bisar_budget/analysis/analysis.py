@@ -1,6 +1,6 @@
 """The analysis that a mission's checks share: geometry, every error it can have, and the effects by both models.
 
-Cases of one shape are analysed together. `Case` gives one of them in plain numbers, for the words of a report.
+Cases of one shape are analysed together. `Case` gives plain numbers of a single case, for the words of a report.
 """
 
 import math
@@ -159,7 +159,7 @@ class Analysis:
 
     @cached_property
     def stated(self) -> list[ErrorSource]:
-        """Declared errors, along the axes that the file states them in."""
+        """Declared errors along the axes in which the file states them."""
         return [source for source in self.sources if source.declared is not None and source.is_independent]
 
     @cached_property

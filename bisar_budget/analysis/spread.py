@@ -1,8 +1,8 @@
 """Phases that make echoes and phases that spread: tones, noise, and the cubic phase without a requirement of its own.
 
-Independent powers add, whatever rule `allocation.combine` sets for phases. Each effect is judged once. A tone counts
-against PSLR, or without that requirement with its power φ²/2 against ISLR. A cubic phase counts against its own
-requirement, or without it with its power against ISLR, since the cubic phase is in the image's sidelobes.
+Independent powers add, also where `allocation.combine` sets another rule for phases. Each effect is judged once. A
+tone counts against PSLR, or without that requirement with its power φ²/2 against ISLR. A cubic phase counts against
+its own requirement, or without it with its power against ISLR, since the cubic phase is in the image's sidelobes.
 
 Noise of a phase variance σ² leaves exp(-σ²) of the energy in the response and spreads the rest over the image. A
 share E of the response lies within the first nulls, which an image counts as its mainlobe, so noise adds (exp(σ²) -
@@ -140,7 +140,7 @@ def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
 
 
 def _echoes(alone: Tone, free: Any, remaining: LeftTone, mission: Mission) -> list[Tone]:
-    """Echoes of an oscillator's tone. A folded tone has one at each frequency, or all power at the largest echo."""
+    """Echoes of an oscillator's tone: for a folded tone one per frequency, or all power at the largest echo."""
     if not remaining.is_folded:
         return [alone]
     T = mission.collection.aperture_time

@@ -32,7 +32,7 @@ from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 
 
 class TonePart(NamedTuple):
-    """A tone along one way: amplitudes of its orders 0 to 3 at the aperture edge, and displacement by a metre of each.
+    """A tone along one way: amplitudes of its orders 0 to 3 at the aperture edge, displacement by a metre of each.
 
     Signed, (4, n) [m] and (4, 2, n), east and north [m/m].
     """
@@ -42,7 +42,7 @@ class TonePart(NamedTuple):
 
     @property
     def displacement(self) -> Floats:
-        """East and north, each in its worst phase, (2, n). [m]"""
+        """Displacement east and north, each in its worst phase, (2, n). [m]"""
         constant, linear, quadratic, cubic = self.orders[:, None] * self.per_metre
         return np.asarray(np.hypot(constant - quadratic, linear - cubic))
 

@@ -1,4 +1,4 @@
-"""Random delays in the air: what correction leaves makes each leg longer than the processor assumes.
+"""Random delays in the air: after correction each leg is longer than the processor assumes.
 
 The delay of a leg is the zenith delay times a factor of the leg's elevation, seen from the scene. The elevation
 changes over the aperture, and the delay with it. Orders 0 and 1 of the delay displace the image; orders from 2 on
@@ -138,7 +138,7 @@ def dispersed(mission: Mission, geometry: BistaticGeometry) -> Any:
 
 
 def legs_of(owner: str) -> tuple[str, ...]:
-    """Platforms whose legs have an error of the air: one platform, or both if the air is one."""
+    """Platforms whose legs have an error of the air. The mission's error is on both legs."""
     return PLATFORMS if owner == "mission" else (owner,)
 
 
@@ -166,7 +166,7 @@ def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
 
 
 def _groups_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Floats]:
-    """Group delay at the nodes by a unit at the zenith on one leg, as it turns and held at mid-aperture. [m/unit]"""
+    """Group delay at the nodes by a unit at the zenith, for a leg as it turns and held at mid-aperture. [m/unit]"""
     exact, middle = seen.exact, getattr(seen.geometry, name).position
     scale = metres_per_unit(seen.mission, delay)
     moving = group_at_nodes(delay, exact.tracks[PLATFORMS.index(name)], middle, scale)

@@ -46,12 +46,13 @@ END_OF_IMAGE = "end_of_image"  # no requirement: no ground point has the range h
 MODELS = ("published", "full")
 OTHER_MODEL = {"published": "full", "full": "published"}
 
-# No navigation error: it takes the platform, within the aperture, farther than this part of its slant range.
+# A larger error is no navigation error: within the aperture it takes the platform farther than this part of its slant
+# range.
 FARTHEST_RANGE_FRACTION = 0.1
 SECOND_ORDER_FRACTION = 0.004  # that the second order may add to a phase, a displacement or a limit; the aim is 1 %
 FLOOR_RAD, FLOOR_M = 1e-3, 2e-5  # that the second order may always add
 
-_LANES_AT_ONCE_COUNT = 1 << 13  # lanes of a block
+_LANES_AT_ONCE_COUNT = 1 << 13  # lanes in a block
 _FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)
 
 
@@ -211,10 +212,7 @@ class ErrorBlock:
 
     # ---------------------------------------------------------------- small errors
     def per_unit(self, model: str) -> Floats:
-        """Magnitudes of the judged phase and the cubic [rad], and of the displacement [m], by a small unit.
-
-        (3, errors, cases).
-        """
+        """Magnitudes of judged phase, cubic phase [rad] and displacement [m] by a small unit, (3, errors, cases)."""
         if model not in self._per_unit:
             effect = self.effects[model]
             moved = np.hypot(*self.table.planes[model].displacement(effect, 1.0))
@@ -418,7 +416,7 @@ class ErrorBlock:
                 size[index] = FARTHEST_RANGE_FRACTION * nearer / self.edge[index]
             else:
                 # A clock takes no platform anywhere. No range sum is shorter than the distance of the platforms, and
-                # that is at least the sum less twice the nearer range: by then an image has ended.
+                # this distance is at least the sum less twice the nearer range: by then an image has ended.
                 course = self.exact.clock_course(source.clock or ())
                 size[index] = 2 * np.minimum(*slant) / np.abs(course).max(axis=0)
         return size
@@ -529,7 +527,7 @@ class DeclaredErrors:
     gain : float or (cases,)
         Factor by which autofocus lets quadratic phases be larger. Hidden phases get no such factor.
     is_complete : bool
-        Compute all numbers of each row, and alike whatever the number of cases.
+        Compute all numbers of each row, in the same way for any number of cases.
 
     Attributes
     ----------
@@ -570,7 +568,7 @@ class DeclaredErrors:
         self._does: dict[tuple[str, int], Declared] = {}
 
     def array(self, value: Any) -> Floats:
-        """One number for each case."""
+        """One number for each case, (cases,)."""
         return np.full(self.cases, value, dtype=float)
 
     def lanes(self, *errors: ErrorSource, signs: Sequence[float] = (1.0,)) -> Lanes:
@@ -693,7 +691,7 @@ class Model:
     def __init__(self, errors: DeclaredErrors, name: str) -> None:
         self.errors, self.exact, self.name = errors, errors.exact, name
         self.is_published = name == "published"
-        self.is_blind = self.is_published and errors.has_direct_path  # to what the collection has
+        self.is_blind = self.is_published and errors.has_direct_path  # to the direct path
         self.plane, self.degeneracy = errors.planes[name], errors.degeneracy(name)
 
     def effect(self, source: ErrorSource) -> Effect | FullEffect:

@@ -1,7 +1,7 @@
 """Effect of one unit of an error on the range history and the image, by both models; its subject and its name.
 
-The published effects are those of Rigling & Moses (Tables I and II). The full model lets the line of sight turn and
-counts the phase that the displacement of the image adds (`ranges.exact_ranges`).
+The published effects follow Rigling & Moses (Tables I and II). The full model lets the line of sight turn and counts
+the phase that the displacement of the image adds (`ranges.exact_ranges`).
 """
 
 import math

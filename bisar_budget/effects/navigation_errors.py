@@ -101,7 +101,7 @@ def specific_force(mission: Mission, state: PlatformState) -> Vector:
     It is zero where the platform falls freely. On the Earth g includes the terms of the Earth's rotation
     (`earth.free_fall`).
     """
-    from bisar_budget.paths.earth import free_fall  # 8 ms, and most missions name no sensor
+    from bisar_budget.paths.earth import free_fall  # the import takes 8 ms, and most missions name no sensor
 
     x, y, z = state.acceleration
     u, v, w = free_fall(state.position, state.velocity, mission.scene.axes)
@@ -339,7 +339,7 @@ class _Walks(NamedTuple):
 def _walks(first: int, second: int, count: int) -> _Walks:
     """The noise integrated `first` + 1 and `second` + 1 times, at `count` nodes; 0 is a walk."""
     places, weights = np.polynomial.legendre.leggauss(2 * count)
-    start, weight = (1 + places) / 2, weights / 2  # on one side
+    start, weight = (1 + places) / 2, weights / 2  # on one side of the middle
     number = np.arange(count)
 
     def order_of(times: int) -> Floats:

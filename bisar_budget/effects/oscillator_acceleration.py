@@ -108,12 +108,12 @@ class AcceleratedTone(NamedTuple):
 
     @property
     def per_unit(self) -> Any:
-        """Peak phase of its echo at the centre frequency by a unit of Γ. [rad/(s²/m)]"""
+        """Peak phase of the tone's echo at the centre frequency by a unit of Γ. [rad/(s²/m)]"""
         return self.free * self.echo
 
     @property
     def phase(self) -> Any:
-        """Peak phase of its echo at the centre frequency. [rad]"""
+        """Peak phase of the tone's echo at the centre frequency. [rad]"""
         return self.per_unit * self.sensitivity
 
 
@@ -227,7 +227,7 @@ def _falls(mission: Mission, state: PlatformState) -> Any:
 
 
 def flies_a_turn(mission: Mission, name: str) -> bool:
-    """Whether an oscillator feels the path of its platform, in any case."""
+    """Whether an oscillator feels a turn of its platform's path, in any case."""
     state: PlatformState = getattr(mission.geometry, name)
     bends = not state.is_quadratic or norm(state.acceleration) > _FELT_ACCELERATION_MPS2
     return bool(np.any(bends & ~np.asarray(_falls(mission, state))))

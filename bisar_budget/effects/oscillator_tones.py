@@ -125,7 +125,7 @@ class Spur(NamedTuple):
 
     @property
     def phase(self) -> Any:
-        """Peak phase of its echo. [rad]"""
+        """Peak phase of the spur's echo. [rad]"""
         return self.free * self.echo
 
     def slow_parts(self, aperture_time: Any) -> Parts | None:

@@ -93,7 +93,7 @@ class SlowTone(NamedTuple):
 
 
 def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict[str, SlowTone]:
-    """Every declared vibration that has fewer than three cycles per aperture in any case, by the id of its row."""
+    """Every declared vibration with fewer than three cycles per aperture in any case, by the id of its row."""
     T, is_heard, slow = mission.collection.aperture_time, mission.has_direct_path, dict[str, SlowTone]()
     exact: ExactRanges | None = None
     for platform_index, name in enumerate(PLATFORMS):
@@ -122,7 +122,7 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
 
 
 def slow_phases(mission: Mission, slow: Mapping[str, SlowTone], gain: Any) -> list[DeclaredPhase]:
-    """Phases of the vibrations below one cycle per aperture, which count with those of other errors."""
+    """Phases of the vibrations below one cycle per aperture, which count with the phases of other errors."""
     T, phases = mission.collection.aperture_time, []
     for row_id, tone in slow.items():
         line = getattr(mission.platforms, tone.subject.owner).motion_error.vibration.sinusoidal[

@@ -432,8 +432,8 @@ def _along_scene_axis(
 ) -> Any:
     """Size along one axis of the scene of errors stated along the axes of another frame.
 
-    The three are independent, so one-sigma values add as squares and bounds add as magnitudes: a signed rotation
-    would let them cancel. The sign is the sign of the signed rotation.
+    The three errors are independent, so one-sigma values add as squares and bounds add as magnitudes: a signed
+    rotation would let them cancel. The sign is the sign of the signed rotation.
     """
     a, b, c = (value * direction[axis] for value, direction in zip(declared, axes, strict=True))
     size = np.sqrt(a * a + b * b + c * c) if distribution == "normal" else np.abs(a) + np.abs(b) + np.abs(c)
@@ -474,7 +474,7 @@ def _axis_of(frame: str, axis: str) -> str:
 
 
 def _no_limit(kind: str, axis: str) -> Note:
-    """Reason why an error has no QPE limit, for the case that it has none."""
+    """Reason for the case that an error has no QPE limit."""
     if kind == "position":
         return phrases.no_quadratic_term_of_position()
     cause = "velocity" if kind == "velocity" else "line of sight"

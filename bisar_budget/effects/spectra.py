@@ -1,6 +1,6 @@
 """Phase noise over an aperture: spectra as pieces of power laws, and their integrals with a tone's parts.
 
-Spectra are one-sided, for phase at the radar's centre frequency. [rad²/Hz] A data sheet's L(f) is half of a one-sided
+Spectra are one-sided, for phase at the radar's centre frequency. [rad²/Hz] A data sheet's L(f) is half of such a
 spectrum.
 
 In the angle x = πfT the edges of panels are the same for every aperture time T, and so is the integral of a power law
@@ -105,16 +105,16 @@ def held(step: Any) -> Any:
     return np.sinc(step / (2 * math.pi)) ** 4
 
 
-_INTEGRAL_COUNT = 7  # parts of any spectrum, in their order
+_INTEGRAL_COUNT = 7  # leading fields of `Parts` that any spectrum has
 _FOLLOWED_TURN_COUNT = 24  # half turns of a tone within the aperture up to which panels resolve them
 _FAST = _FOLLOWED_TURN_COUNT * math.pi  # angle from which terms that turn with a tone are averaged
-_RESOLVED_TURN_COUNT = 1.5  # half turns within a panel, up to which its nodes follow a tone however fast
+_RESOLVED_TURN_COUNT = 1.5  # half turns within a panel up to which its nodes resolve any tone
 _FIRST_POWER_ANGLE_RAD = (
     0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
 )
 _OCTAVE_RATIO = 2.0
 _SAME_EDGE_RATIO = 1.000001  # of two computations of the same edge
-_MIN_EDGE_RATIO = 1 + 1e-10  # ratio of two edges of panels, at least
+_MIN_EDGE_RATIO = 1 + 1e-10  # least ratio of two edges of panels
 _FOLLOWED_IMAGE_COUNT = 10  # sampling rates up to which each image is followed
 _PASSED_IMAGE_COUNT = 50  # sampling rates beyond which straight lines pass less than 1e-4 of a tone's amplitude
 _NEAR_ALIAS_COUNT = 3  # rates, plus one for each two powers of a slope, within which each alias is counted

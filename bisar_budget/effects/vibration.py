@@ -119,7 +119,7 @@ def worst_phases(amplitudes: Any, cycles: Any, is_member: Truths | None = None) 
     here = np.arange(frequencies.shape[1])
     order = np.argsort(frequencies, axis=0, kind="stable")[:count]
     sizes, frequencies = sizes[order, here], frequencies[order, here]
-    if is_member is not None:  # where a case has fewer, lines without an amplitude beside the last
+    if is_member is not None:  # a case with fewer lines gets lines without an amplitude at the last frequency
         is_line = np.isfinite(frequencies)
         sizes = np.where(is_line, sizes, 0.0)
         frequencies = np.where(is_line, frequencies, np.where(is_line, frequencies, 0.0).max(axis=0))

@@ -112,7 +112,7 @@ class PointSettings:
 
 SETTINGS = PointSettings()
 
-# Arrays of all samples that hold measured paths, and those with the arrays that a step works on.
+# Number of arrays of all samples that hold measured paths, and the number together with the arrays of a step.
 _MEASURED_ARRAY_COUNT, _ARRAY_COUNT = 8, 16
 
 
@@ -238,7 +238,7 @@ class Lanes:
         return replace(self.of(case), case=np.arange(case.size))
 
     def shifts(self, size: Any) -> list[Any]:
-        """Shift of each platform by errors of sizes at the nodes. [m]"""
+        """Shift of each platform at the nodes by errors of given sizes. [m]"""
         along = [self.at_nodes * (size * component) for component in self.direction]
         both = [along, along]
         if self.of_receiver is not None:
@@ -261,7 +261,7 @@ class Lanes:
         return of_transmitter, of_receiver
 
     def clock(self, size: Any) -> Any:
-        """Range error by clocks of errors of sizes at the nodes. [m]"""
+        """Range error at the nodes by clock errors of given sizes. [m]"""
         transmitter, receiver = self.moves
         is_clock = 1.0 - np.maximum(transmitter, receiver)
         return self.at_nodes * (size * is_clock) if np.any(is_clock) else np.zeros_like(self.at_nodes)
@@ -283,7 +283,7 @@ class SmallErrors(NamedTuple):
 
     @classmethod
     def of(cls, errors: Sequence[Lanes]) -> "SmallErrors":
-        """Errors whose lanes are the cases."""
+        """Small errors from lanes, one `Lanes` per error, whose lanes are the cases."""
         courses: dict[Any, Floats] = {}
         components = [
             component
@@ -446,7 +446,7 @@ class ExactRanges:
 
     @cached_property
     def slopes(self) -> Floats:
-        """Decrease of the range at the nodes per metre east, and north, (2, nodes, n): u_t + u_r on the ground."""
+        """Decrease of the range at the nodes per metre east, and north, u_t + u_r on the ground, (2, nodes, n)."""
         (p, q), (R, S) = self.tracks, self.ranges
         return np.array([p[axis] / R + q[axis] / S for axis in (0, 1)])
 
@@ -627,8 +627,8 @@ class ExactRanges:
         """Find the point to which errors of given sizes move a point at the centre, and the defocus there.
 
         The search starts `near` [m]. It finds a point where it settles at once, or, `is_at_fold`, where V leads down
-        to the point from the start. `paths` follows a point. The search does not find a point beyond a line on which
-        range and Doppler gradients are parallel: no growing error leads there.
+        to the point from the start. `point_paths` follows a point. The search does not find a point beyond a line on
+        which range and Doppler gradients are parallel: no growing error leads there.
         """
         return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
@@ -1032,4 +1032,4 @@ def _take(arrays: Sequence[Floats], indices: Indices) -> list[Floats]:
     return [array if array.shape[-1] == 1 else array.take(indices, axis=-1) for array in arrays]
 
 
-_take_cases = _take  # of cases, arrays (nodes, cases) or (cases,): a single case is shared by all lanes
+_take_cases = _take  # for cases, arrays (nodes, cases) or (cases,): all lanes share a single case

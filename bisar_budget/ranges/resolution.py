@@ -101,7 +101,7 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
     frequencies, of_band = np.polynomial.legendre.leggauss(_BAND_NODE_COUNT)
     wavenumbers = k * (1 + np.multiply.outer(frequencies, relative_band / 2))
     mean = np.multiply.outer(of_band / 2, nodes(len(slopes)).fit[0])[..., None]
-    rates = wavenumbers[:, None] * slopes  # of phase [rad/m]
+    rates = wavenumbers[:, None] * slopes  # change of phase by a metre [rad/m]
     rates -= (mean * rates).sum(axis=(0, 1))
     unit = math.sqrt(_HALF_POWER) / np.sqrt((mean * rates**2).sum(axis=(0, 1)))
     rates *= unit
