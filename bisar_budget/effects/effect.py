@@ -91,12 +91,15 @@ class ErrorSource(NamedTuple):
 
     `declared` is signed and includes the coverage factor. It is None where the file declares no size.
     `is_independent` marks the errors as the file states them. Sums and root-sum-squares run over these errors alone,
-    so that an error stated along the track is not counted again by its components along the scene's axes. `direction`
-    is a unit vector of the scene, or zero for an error that is no motion. For an error of the mission, `direction`
-    holds for both platforms, unless `of_receiver` gives the receiver a direction of its own. The direction of a time
-    tag is the velocity at the nodes of the aperture, (nodes, cases), along which a small time tag moves the platform.
-    [m/s] `clock` holds t̃₀ … t̃₃ of a unit of a clock error, zeros where synchronisation removes the error. It is
-    None for any other error.
+    so that an error stated along the track is not counted again by its components along the scene's axes.
+
+    `direction` is a unit vector of the scene, or zero for an error that is no motion. For an error of the mission,
+    `direction` holds for both platforms, unless `of_receiver` gives the receiver a direction of its own. The
+    direction of a time tag is the velocity at the nodes of the aperture, (nodes, cases), along which a small time tag
+    moves the platform. [m/s]
+
+    `clock` holds t̃₀ … t̃₃ of a unit of a clock error, zeros where synchronisation removes the error. It is None for
+    any other error.
     """
 
     subject: Subject

@@ -305,7 +305,7 @@ def _with_arm(
     at_mid_aperture = [np.einsum("ac,eac->ec", seen.vector(state.look), way) for way in (directions, at_middle)]
     fit, half, k, count = seen.exact.fit, seen.exact.half, seen.exact.k, len(times)
     covariance, beyond, orders, beyond_cubic = (np.zeros(()) for _ in range(4))
-    for (i, a), (j, b) in product(enumerate((2, 0)), repeat=2):  # numbers of integrations
+    for (i, a), (j, b) in product(enumerate((2, 0)), repeat=2):  # number of integrations of each walk
         walk, scale = _walks(a, b, count), half ** (a + b + 1)
         moved = np.einsum("anc,amc->nmc", along[i], along[j])
         covariance = covariance + scale * walk.at_nodes[..., None] * moved

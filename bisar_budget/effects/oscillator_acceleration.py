@@ -196,9 +196,10 @@ def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] 
 
 
 def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) -> Floats:
-    """Time error by a unit of Γ along each scene axis, v(τ) − v(0), or the rest after exchanges. (n, times, …).
+    """Time error by a unit of Γ along each axis, v(τ) − v(0), or its rest after exchanges, (n, moments, …).
 
-    The exchanges begin anywhere in their interval. Each of several beginnings has an equal part of the mean square.
+    The axes are the axes of the scene. The exchanges begin anywhere in their interval. Each of several beginnings has
+    an equal part of the mean square.
     """
 
     def gained(tau: Any) -> Floats:

@@ -113,7 +113,7 @@ _FIRST_POWER_ANGLE_RAD = (
     0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
 )
 _OCTAVE_RATIO = 2.0
-_SAME_EDGE_RATIO = 1.000001  # of two computations of the same edge
+_SAME_EDGE_RATIO = 1.000001  # largest ratio of two computations of the same edge
 _MIN_EDGE_RATIO = 1 + 1e-10  # least ratio of two edges of panels
 _FOLLOWED_IMAGE_COUNT = 10  # sampling rates up to which each image is followed
 _PASSED_IMAGE_COUNT = 50  # sampling rates beyond which straight lines pass less than 1e-4 of a tone's amplitude

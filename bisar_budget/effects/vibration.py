@@ -276,7 +276,7 @@ def projected(
 def quadratic_part(cycles: Any) -> Any:
     """Worst quadratic phase at the aperture edge of a sinusoid, over its peak phase: 7.5·j₂(π·cycles).
 
-    It is the least-squares quadratic of cos(πnx) over the aperture, half of a Taylor term where n is small.
+    It is the least-squares quadratic of cos(πnx) over the aperture. Where n is small it is the Taylor term (πn)²/2.
     """
     return np.abs(tone(math.pi * cycles)[0])
 
@@ -344,7 +344,7 @@ def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -
         factor, slope = factor / DISPLACED[0], slope - DISPLACED[1]
     pieces = []
     for (f, density), (g, last) in pairwise(spectrum.points):
-        if not (density and last):  # the density underflowed to 0, which has no logarithm
+        if not (density and last):  # a density so small that it became 0 has no logarithm
             continue
         own_slope = math.log(density / last) / math.log(g / f)
         if abs(own_slope) <= _STEEP_DENSITY_EXPONENT:
