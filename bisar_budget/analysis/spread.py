@@ -5,8 +5,8 @@ tone counts against PSLR, or without that requirement with its power φ²/2 agai
 its own requirement, or without it with its power against ISLR, since the cubic phase is in the image's sidelobes.
 
 Noise of a phase variance σ² leaves exp(-σ²) of the energy in the response and spreads the rest over the image. A
-share E of the response lies within the first nulls, which an image counts as its mainlobe, so noise adds (exp(σ²) -
-1)/E to the ISLR. The paper's rule takes σ² instead.
+share E of the response lies within the first nulls, which an image counts as its mainlobe. So noise adds to the ISLR
+(exp(σ²) - 1)/E. The paper's rule takes σ² instead.
 """
 
 import math

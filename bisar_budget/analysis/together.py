@@ -155,7 +155,7 @@ class Together:
         return [(phase.row_id, phase.cubic_rad / phase.coverage) for phase in members if phase.cubic_rad is not None]
 
     def cubic_without_coverage(self, split: Shares, owner: str) -> Floats:
-        """Sum of these cubic phases: linear with `combine: sum`, else root-sum-square, since powers add. [rad]"""
+        """Combined cubic phase of an owner at the declared sigmas: `combine: sum` adds, else root-sum-square. [rad]"""
         return self.combined(self.cubics_without_coverage(split, owner), self.rule_of_all)
 
     def moves(self, rule: str) -> Moves:

@@ -4,9 +4,8 @@ Over an aperture a tone of amplitude A and x = πfT has the mean A·j₀(x) and,
 They displace like the parts of any range error: by (25), or, as a line of sight turns, by orders 0 to 3 over exact
 ranges. Orders 0 and 2 are largest together, orders 1 and 3 a quarter of a cycle later, so that with the phase of the
 tone the image runs on an ellipse. East and north each count in their worst phase. Their root-sum-square is √2 times
-the rms displacement over all phases, which is between the largest displacement and √2 times the largest. Derived
-here, to first order in the amplitude. Exact ranges in all phases check it
-(`tests/analysis/test_tone_displacement.py`).
+the rms displacement over all phases. It lies between the largest displacement and √2 times the largest. Derived here,
+to first order in the amplitude. Exact ranges in all phases check it (`tests/analysis/test_tone_displacement.py`).
 
 The axes of a vibration may be in any phase: their displacements add. A faster tone displaces less, as 1/(fT).
 """

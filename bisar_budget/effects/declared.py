@@ -49,7 +49,7 @@ OTHER_MODEL = {"published": "full", "full": "published"}
 # A larger error is no navigation error: within the aperture it takes the platform farther than this part of its slant
 # range.
 FARTHEST_RANGE_FRACTION = 0.1
-SECOND_ORDER_FRACTION = 0.004  # of a phase, a displacement or a limit, added by the second order at most; the aim is 1 %
+SECOND_ORDER_FRACTION = 0.004  # of a phase, a displacement or a limit; the second order may add it; the aim is 1 %
 FLOOR_RAD, FLOOR_M = 1e-3, 2e-5  # amounts that the second order may always add
 
 _LANES_AT_ONCE_COUNT = 1 << 13  # lanes in a block
