@@ -155,7 +155,10 @@ class Together:
         return [(phase.row_id, phase.cubic_rad / phase.coverage) for phase in members if phase.cubic_rad is not None]
 
     def cubic_without_coverage(self, split: Shares, owner: str) -> Floats:
-        """Combined cubic phase of an owner at the declared sigmas: `combine: sum` adds, else root-sum-square. [rad]"""
+        """Combined cubic phase of an owner at the declared sigmas: a sum with `combine: sum`, else the rss. [rad]
+
+        Root-sum-square, since powers add.
+        """
         return self.combined(self.cubics_without_coverage(split, owner), self.rule_of_all)
 
     def moves(self, rule: str) -> Moves:
