@@ -23,18 +23,19 @@ from bisar_budget.geometry import BistaticGeometry
 
 Floats = NDArray[np.float64]
 
-# Way of a platform in half an aperture, over its slant range, up to which so many nodes change phases by less than
-# 1e-6 of themselves up to 0.5, and by less than 1e-4 beyond.
+# Path of a platform in half an aperture over its slant range, and the number of nodes that serves up to this path:
+# it changes phases by less than 1e-6 of themselves up to a path of 0.5, and by less than 1e-4 beyond.
 NODES = ((0.1, 6), (0.5, 10), (1.0, 16), (2.0, 32), (math.inf, 64))
 FEWEST_NODES = NODES[0][1]
 OF_ENDS = 16  # polynomials that follow a line of sight around a full circle to 1e-6
-# Paths in pieces turn faster than their way says: 1.5 nodes to a piece change phases by less than 1e-4 of themselves.
+# Paths in pieces turn faster than their length suggests. With 1.5 nodes per piece, phases change by less than 1e-4 of
+# themselves.
 _NODES_PER_PIECE, _PIECE_NODES = 1.5, np.array((16, 32, 64, 128, 256))
 OWN_AREA = (
-    0.5  # of the determinant of H, which mean gradient and mean Doppler gradient span where they tell sides apart
+    0.5  # of the determinant of H; if mean gradient and mean Doppler gradient span less, they do not tell sides apart
 )
 MIN_SINE = math.sin(math.radians(MIN_GRADIENT_ANGLE_DEG))
-STANDS = 1e-9  # of what both lines of sight turn by alone: by less their sum does not turn
+STANDS = 1e-9  # of the turns of both lines of sight; a sum of lines of sight that turns by less does not turn
 
 
 class Band(Protocol):
@@ -71,7 +72,7 @@ class Sampling:
         return self.weights_at(np.array((-1.0, 1.0)))
 
     def weights_at(self, slow_times: Floats) -> Floats:
-        """Weights (places, samples) that carry a smooth history from the samples to other places over −1 … 1."""
+        """Weights (times, samples) that carry a smooth history from the samples to other slow times over −1 … 1."""
         degree = min(self.places.size, OF_ENDS) - 1
         polynomials = np.polynomial.legendre.legvander(self.places, degree)
         return np.asarray(np.polynomial.legendre.legvander(slow_times, degree) @ np.linalg.pinv(polynomials))
@@ -89,7 +90,7 @@ def nodes(count: int) -> Sampling:
 
 
 def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_path: bool = False) -> Any:
-    """Number of nodes that cases need: of the lines of sight, and of the direct path where that counts."""
+    """Number of nodes that cases need, for the lines of sight, and for the direct path if it counts."""
     half = aperture_time_s / 2
     turning = (*geometry.both, *((geometry.apart,) if has_direct_path else ()))
     way = reduce(np.maximum, [path.travelled(half) / path.slant_range for path in turning])
@@ -109,12 +110,12 @@ def band_variance(radar: Band) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class GroundMatrix:
-    """The matrix H: half the second derivative of V over the ground, at a point that leaves no range error.
+    """The matrix H: half the second derivative of V over the ground, at a point without range error.
 
     Attributes
     ----------
     slopes : (2, nodes, cases)
-        What a metre east, and north, adds to the range error at the nodes. [m/m]
+        Range error at the nodes by a metre east, and north. [m/m]
     fit : (4, nodes)
         Weights of `Sampling.fit`.
     band : (cases,)
@@ -122,7 +123,7 @@ class GroundMatrix:
     range_gradient : (2, cases)
         Mean gradient of the range over the ground, east and north. [m/m]
     covariance : (2, 2, cases)
-        Of the gradient over the aperture.
+        Covariance of the gradient over the aperture.
     projection : (2, nodes, cases)
         Takes range errors ρ at the nodes to ⟨g, ρ⟩ in the product of V, with g the gradient.
     xx, xy, yy : (cases,)
@@ -141,7 +142,7 @@ class GroundMatrix:
 
     @classmethod
     def of(cls, slopes: Floats, fit: Floats, band: Floats) -> "GroundMatrix":
-        """Matrix of what a metre east, and north, adds to the range error at the nodes, (2, nodes, cases)."""
+        """Matrix H from the range error at the nodes by a metre east, and north, (2, nodes, cases)."""
         weights, gradient = fit[0][:, None], fit[0] @ slopes
         apart = slopes - gradient[:, None]
         weighted = weights * apart
@@ -160,7 +161,7 @@ class GroundMatrix:
 
     @property
     def least(self) -> Floats:
-        """The smaller eigenvalue of H: how fast V grows along the direction that is resolved worst."""
+        """The smaller eigenvalue of H: the growth of V along the direction with the worst resolution."""
         half, apart = (self.xx + self.yy) / 2, np.hypot((self.xx - self.yy) / 2, self.xy)
         return np.asarray(self.determinant / (half + apart))
 
@@ -190,7 +191,7 @@ class GroundMatrix:
 
     @property
     def turning(self) -> Floats:
-        """Edge of the P₁ part of the gradient across the mean gradient, as the variance there has it. [m/m]"""
+        """Edge of the P₁ part of the gradient across the mean gradient, from the variance in that direction. [m/m]"""
         x, y = self.range_gradient
         along = self.xx * x * x + 2 * self.xy * x * y + self.yy * y * y
         with np.errstate(all="ignore"):
@@ -205,12 +206,12 @@ class GroundMatrix:
         return np.where(determinant_of_both >= OWN_AREA * self.determinant, area, 0.0)
 
     def projected(self, values: Floats) -> Floats:
-        """Weights of the product of V with values at the nodes, (nodes, cases): their sum with others is that."""
+        """Weights at the nodes, (nodes, cases), whose sum with a history is its product of V with `values`."""
         average = self.fit[0] @ values
         return np.asarray(self.fit[0][:, None] * ((1 + self.band) * (values - average) + self.band * average))
 
     def turned_from(self, centre: "GroundMatrix", case: NDArray[np.intp]) -> Floats:
-        """Area that gradients span, over that of the centre's of some cases; below 0 where they are turned around."""
+        """Area that gradients span, over their area at the centre of some cases; below 0 if turned around."""
         determinant, orientation = centre.determinant, centre.orientation
         if determinant.size > 1:
             determinant, orientation = determinant[case], orientation[case]
@@ -219,10 +220,10 @@ class GroundMatrix:
 
 
 def spans_ground(geometry: BistaticGeometry, radar: Band, aperture_time_s: Any, cases: int = 1) -> tuple[Any, Any]:
-    """Whether lines of sight turn within the aperture, and the sine that `GroundMatrix.sine` is, (cases,).
+    """Whether lines of sight turn within the aperture, and the sine of `GroundMatrix.sine`, (cases,).
 
     Full circles, and apertures that pass through a moment at which range and Doppler gradient are parallel, have an
-    image plane; what has none is within a degree of parallel over the whole aperture.
+    image plane. A collection without an image plane is within a degree of parallel over the whole aperture.
     """
     half = np.array(np.broadcast_to(np.asarray(aperture_time_s, dtype=float) / 2, (cases,)))
     sampling = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_NODES)))
@@ -240,7 +241,7 @@ def spans_ground(geometry: BistaticGeometry, radar: Band, aperture_time_s: Any, 
 
 
 def degeneracy(geometry: BistaticGeometry, radar: Band, aperture_time_s: float) -> str:
-    """Say why one collection has no image plane; empty where it has one."""
+    """Reason why one collection has no image plane; empty if it has one."""
     turns, sine = spans_ground(geometry, radar, aperture_time_s)
     if not turns[0]:
         return "both look vectors have a sum that never turns, so that Doppler does not change over the ground"

@@ -1,4 +1,4 @@
-"""Division of the budgets between transmitter, receiver and clock; the gain of autofocus, and how far it goes."""
+"""Division of the budgets between transmitter, receiver and clock; the gain of autofocus and its bounds."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -14,16 +14,17 @@ from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import format_quantity
 
-BALANCED_RANGE = (0.05, 0.95)  # neither platform is left without a budget
+BALANCED_RANGE = (0.05, 0.95)  # each platform keeps a budget
 
 
 EQUAL = Shares(transmitter=0.5, receiver=0.5)
 
 
 class Allocation(NamedTuple):
-    """The budgets as divided. `qpe_total` and limits in [rad], before autofocus; PSLR and ISLR share power.
+    """The divided budgets. `qpe_total` and limits are in [rad], before autofocus; PSLR and ISLR share power.
 
-    `n_pull` is what counts of the file's `autofocus.n_pull`, see `effective_n_pull`; `n_pull_stated` is the file's.
+    `n_pull` is the part of the file's `autofocus.n_pull` that counts, see `effective_n_pull`. `n_pull_stated` is the
+    file's value.
     """
 
     qpe_total: float
@@ -47,13 +48,13 @@ class Allocation(NamedTuple):
         return self.qpe_limit(owner) * self.autofocus_gain
 
     def of(self, case: int) -> "Allocation":
-        """Those of one of many cases, in plain numbers."""
+        """The budgets of one of many cases, in plain numbers."""
         return Allocation._make(_plain(figure, case) for figure in self)
 
     def passes_with(self, qpe: float, hidden: float, owner: str, mission: Mission) -> Note:
-        """Say from which N_pull a QPE of an owner would pass, or that no autofocus corrects it.
+        """Note on the N_pull from which a QPE of an owner would pass, or on why no autofocus corrects it.
 
-        Autofocus corrects nothing of the `hidden` phase, what remains is for the quadratic one. [rad]
+        Autofocus does not correct the `hidden` phase. The rest of the limit is for the quadratic phase. [rad]
         """
         room = 1 - (hidden / self.qpe_limit(owner)) ** 2
         if room <= 0:
@@ -65,11 +66,11 @@ def _gain(n_pull: Any, qpe_total: Any) -> Any:
     if n_pull is None:
         return 1.0
     gain = evaluators.autofocus_gain(n_pull, qpe_total)
-    return gain * (gain > 1) + 1.0 * (gain <= 1)  # the larger one, of arrays too
+    return gain * (gain > 1) + 1.0 * (gain <= 1)  # the larger number, also of arrays
 
 
 def autofocus_gain_of(mission: Mission) -> Any:
-    """Return the factor on QPE limits that the autofocus of a mission gives, however its budget is divided."""
+    """Return the factor on QPE limits by a mission's autofocus. It does not depend on the division of the budget."""
     return _gain(effective_n_pull(mission), mission.requirements.quadratic_phase_error)
 
 
@@ -80,20 +81,20 @@ def _plain(figure: Any, case: int) -> Any:
 
 
 def is_balanced(mission: Mission) -> bool:
-    """Whether the shares of the phase follow from what is declared."""
+    """Whether the shares of the phase follow from the declared errors."""
     split = mission.allocation.split
     return (split.quadratic_phase_error if isinstance(split, MetricSplits) else split) == "balanced"
 
 
 def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
-    """Divide the budgets of a mission as its `allocation.split` says.
+    """Divide the budgets of a mission by its `allocation.split`.
 
     Parameters
     ----------
     mission : Mission
-        Some of its numbers may be arrays (cases,); shares that are `balanced` then are, too.
+        Some of its numbers may be arrays (cases,). Shares that are `balanced` are then arrays too.
     gates : iterable of Together
-        Declared errors by each model that gates. `balanced` weighs their phases, and nothing else asks for them.
+        Declared errors by each model that gates. Only `balanced` needs them: it weighs their phases.
     """
     split = mission.allocation.split
     qpe, pslr, islr = (
@@ -110,12 +111,12 @@ def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
 
 
 def _balanced(gates: Sequence[Together]) -> Shares:
-    """Shares as the declared errors need them; by several models the larger judged phase of each error."""
+    """Shares in proportion to the declared errors; with several models, by the larger judged phase of each error."""
     weights = []
     for owner in ("transmitter", "receiver"):
         by_model = zip(*(together.judged_parts(together.owed(EQUAL, owner)) for together in gates), strict=True)
         phases = [(of_platform[0][0], _largest([phase for _, phase in of_platform])) for of_platform in by_model]
-        # An error that leaves no image has no finite phase: it takes all that it may.
+        # An error that leaves no image has no finite phase: it takes the largest share allowed.
         weights.append(np.minimum(gates[0].combined(phases), 1e300))
     total = weights[0] + weights[1]
     with np.errstate(invalid="ignore"):
@@ -139,19 +140,19 @@ def _shares(split: str | Shares) -> Shares:
 
 
 # ---------------------------------------------------------------------- autofocus
-ROOM = {"pga": 3.0, "map_drift": 1.5}  # patch over smear
+ROOM = {"pga": 3.0, "map_drift": 1.5}  # smallest patch over smear
 
 
 class Caps(NamedTuple):
-    """Largest N_pull by range walk, f₀/B, and by the scene's size; None where the file gives none.
+    """Largest N_pull by range walk, f₀/B, and by the scene's size; None if the file gives no size.
 
-    No gain goes beyond that of range walk; beyond that of the scene a warning stands.
+    No gain exceeds the bound of range walk; beyond the bound of the scene the report has a warning.
 
     A phase of π·N at the aperture edge walks λN/2 in range, N·B/2f₀ cells, and smears a point over 4N cross-range
     cells. Measured on images of points (`tests/simulate/test_pull_in_caps.py`): one-dimensional autofocus works up to
-    half a cell of walk and beyond, but half a cell costs 0.6 dB that no phase takes out, a whole one 1.3 dB. What
-    makes it give out is the patch, whatever walk and bandwidth: phase gradient needs three times the smear, map drift
-    one and a half; with less they leave the image smeared at a hundredth of a cell of walk as at a third of one.
+    half a cell of walk and beyond, but half a cell costs 0.6 dB that no phase removes, a whole cell 1.3 dB. The patch
+    makes autofocus fail, for any walk and bandwidth: phase gradient needs three times the smear, map drift one and a
+    half times. With less they leave the image smeared at a hundredth of a cell of walk as at a third of a cell.
     """
 
     walk: float
@@ -159,7 +160,7 @@ class Caps(NamedTuple):
 
 
 def caps(mission: Mission) -> Caps:
-    """Bounds on N_pull that no autofocus of a mission goes beyond."""
+    """Bounds on N_pull that no autofocus of a mission exceeds."""
     walk = range_walk_cap(mission)
     if mission.scene.radius is None:
         return Caps(walk)
@@ -173,22 +174,22 @@ def range_walk_cap(mission: Mission) -> float:
 
 
 def effective_n_pull(mission: Mission) -> float | None:
-    """N_pull that autofocus counts with: the file's, up to the cap of range walk; None: no autofocus is declared."""
+    """N_pull of the autofocus: the file's value, up to the cap of range walk; None: no autofocus is declared."""
     stated, cap = mission.autofocus.n_pull, range_walk_cap(mission)
     if stated is None:
         return None
-    return stated * (stated <= cap) + cap * (stated > cap)  # the smaller one, of arrays too
+    return stated * (stated <= cap) + cap * (stated > cap)  # the smaller number, also of arrays
 
 
 def needed_sentence(n_pull: float, caps: Caps) -> Note:
-    """Say from which N_pull an error would pass, or that none can correct it.
+    """Note on the N_pull from which an error would pass, or that no N_pull can correct it.
 
     Parameters
     ----------
     n_pull : float
         Smallest N_pull with which the error passes.
     caps : Caps
-        What `caps` says of the mission.
+        Bounds of the mission by `caps`.
     """
     if caps.scene is not None and caps.scene < min(n_pull, caps.walk):
         allowed = f"the scene's size allows {rounded_down(caps.scene)}"

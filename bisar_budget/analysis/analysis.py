@@ -1,6 +1,6 @@
-"""The analysis that a mission's checks share: geometry, every error it can have, and what the models say of them.
+"""The analysis that a mission's checks share: geometry, every error it can have, and the effects by both models.
 
-Cases of one shape are analysed together; one of them in plain numbers is put into words.
+Cases of one shape are analysed together. `Case` gives plain numbers of a single case, for the words of a report.
 """
 
 import math
@@ -38,7 +38,7 @@ __all__ = ["Analysis", "Case", "Model", "by_nodes"]
 def by_nodes(
     mission: Mission, cases: int, geometry: BistaticGeometry
 ) -> Iterator[tuple[int, NDArray[np.intp], Mission, BistaticGeometry]]:
-    """Cases of a mission that need the same number of nodes: the number, their places, mission and geometry."""
+    """Cases of a mission that need the same number of nodes: the number, their indices, mission and geometry."""
     T = np.broadcast_to(mission.collection.aperture_time, (cases,))
     counts = np.broadcast_to(nodes_for(geometry, T, has_direct_path=mission.has_direct_path), (cases,))
     for nodes in np.unique(counts).tolist():
@@ -58,17 +58,18 @@ class Analysis:
     mission : Mission
         Some of its numbers may be arrays (cases,).
     cases : int
-        How many.
+        Number of cases.
     geometry : BistaticGeometry, optional
-        Of many cases; omitted: that of a mission by itself.
+        Geometry of many cases; omitted: the geometry of a single mission.
     nodes : int, optional
-        Of the aperture, that all cases need.
+        Number of nodes of the aperture that all cases need.
     shown : mapping of str to Subject, optional
-        Ids of rows of which the allowable is asked though nothing is declared; omitted: all.
+        Ids of rows whose allowable is needed although the file declares no error; omitted: all rows.
     is_complete : bool
-        All of each row is asked for, not only what decides; a case is then the same however many there are.
+        Compute all numbers of each row, not only the deciding numbers. A case then does not depend on the number of
+        cases.
     is_of_sums : bool
-        Only what errors add up to is asked for: one that counts in a sum needs no allowable of its own.
+        Compute only the sums of errors: an error that counts in a sum needs no allowable of its own.
     """
 
     def __init__(
@@ -105,7 +106,7 @@ class Analysis:
 
     @cached_property
     def errors(self) -> DeclaredErrors:
-        """Every error that the cases can have, declared or not, or those that are shown."""
+        """Every error that the cases can have, declared or not, or the errors that are shown."""
         return DeclaredErrors(
             self.mission,
             self.cases,
@@ -149,7 +150,7 @@ class Analysis:
         return tone_displacements(self.mission, self.geometry, self.exact)
 
     def together(self, model: str) -> Together:
-        """The declared errors together, by a model."""
+        """The combined declared errors, by a model."""
         if model not in self._together:
             self._together[model] = Together(
                 self.errors, model, self.slow, self.displacing_tones, self.random, self.groups
@@ -158,12 +159,12 @@ class Analysis:
 
     @cached_property
     def stated(self) -> list[ErrorSource]:
-        """Declared errors, along the axes that the file states them in."""
+        """Declared errors along the axes in which the file states them."""
         return [source for source in self.sources if source.declared is not None and source.is_independent]
 
     @cached_property
     def published(self) -> Model:
-        """Tables I and II, and (25); they do not know a direct path."""
+        """Tables I and II, and (25), which do not know a direct path."""
         return Model(self.errors, "published")
 
     @cached_property
@@ -178,16 +179,16 @@ class Analysis:
 
     @property
     def gates(self) -> list[str]:
-        """Names of the models whose limits the mission is held to: one, or both where the stricter decides."""
+        """Names of the models whose limits the mission must meet: one, or both if the stricter model decides."""
         return [name for name in ("published", "full") if self.mission.gating_model in (name, "strictest")]
 
     def models(self, gating: str) -> tuple[Model, Model]:
-        """The model that gates, `published` or `full`, and the other one."""
+        """The model that gates, `published` or `full`, and then the second model."""
         return (self.full, self.published) if gating == "full" else (self.published, self.full)
 
     @cached_property
     def allocation(self) -> Allocation:
-        """Budgets as divided; `balanced` weighs phases by the gating model, under `strictest` the larger of both."""
+        """Divided budgets; `balanced` weighs phases by the gating model, under `strictest` the larger of both."""
         return allocate(self.mission, (self.together(model) for model in self.gates))
 
 
@@ -197,45 +198,45 @@ class Case:
     Parameters
     ----------
     analysis : Analysis
-        Of the cases.
+        Analysis of the cases.
     mission : Mission, optional
-        That of this case, as loaded; omitted: the analysed one, which is the only case.
+        Mission of this case, as loaded; omitted: the analysed mission, which is the only case.
     place : int
-        Of this case among them.
+        Index of this case.
     """
 
     def __init__(self, analysis: Analysis, mission: Mission | None = None, place: int = 0) -> None:
         self.analysis, self.mission, self.place = analysis, mission or analysis.mission, place
 
     def number(self, column: Any) -> float:
-        """The number that this case has in a column (cases,); a number that all cases have is its own."""
+        """The number of this case in a column (cases,). A single number counts for every case."""
         return plain(column, self.place)
 
     @cached_property
     def geometry(self) -> BistaticGeometry:
-        """Its geometry."""
+        """Geometry of this case."""
         return self.mission.geometry
 
     @cached_property
     def resolution(self) -> Resolution:
-        """Widths of its response without errors."""
+        """Widths of this case's response without errors."""
         return Resolution._make(map(self.number, self.analysis.resolution))
 
     @cached_property
     def peak_loss_db(self) -> float | None:
-        """Loss of its peak by all declared errors; None where there is no image, or nothing is declared. [dB]"""
+        """Loss of this case's peak by all declared errors; None without an image or a declared error. [dB]"""
         loss = self.number(self.analysis.peak_loss_db)
         return loss if math.isfinite(loss) else None
 
     @cached_property
     def allocation(self) -> Allocation:
-        """Its budgets as divided."""
+        """Divided budgets of this case."""
         allocation = self.analysis.allocation
         return allocation if self.analysis.is_by_itself else allocation.of(self.place)
 
     @cached_property
     def random(self) -> list[RandomError]:
-        """Its errors of sensors and clocks, in the order of the analysis."""
+        """Errors of sensors and clocks of this case, in the order of the analysis."""
         if self.analysis.is_by_itself:
             return self.analysis.random
         return [in_one_case(self.mission, error, self.place) for error in self.analysis.random]
@@ -245,7 +246,7 @@ class Case:
         return self.analysis.errors.does(model.name, source).in_one_case(self.place)
 
     def moved_by_tone(self, row_subject: Subject, model: str) -> GroundVector | None:
-        """Displacement by the tone of a row in the worst phases, by a model; None of a row that is no tone's. [m]"""
+        """Displacement by the tone of a row in the worst phases, by a model; None for a row without a tone. [m]"""
         for tone in self.analysis.displacing_tones:
             if tone.subject.id == row_subject.id:
                 east, north = map(self.number, tone.by(model))
@@ -253,5 +254,5 @@ class Case:
         return None
 
     def degeneracy(self, model: str) -> Note:
-        """Why a model has no displacement here; nothing where it has one."""
+        """Why a model has no displacement in this case; empty where it has a displacement."""
         return self.analysis.errors.degeneracy(model, self.place)

@@ -3,7 +3,7 @@
 At the image point an error of motion or of a clock leaves a range error ρ over the aperture. The peak keeps
 |⟨exp(ikρf/f₀)⟩|² of its power, with ⟨ ⟩ the mean over aperture and band: a direct sum. A random error keeps exp(-σ²)
 of the power, with σ² the variance of its phase; so does a tone of any phase. Losses of independent errors add in
-decibels, as the variances of their phases do to second order. Derived here; against images formed by direct sums:
+decibels, as the variances of their phases do to second order. Derived here. Images formed by direct sums check it in
 `tests/theory/test_image_point.py`.
 """
 
@@ -31,8 +31,8 @@ _DB_OF_VARIANCE = 10 / math.log(10)
 def peak_loss_db(analysis: "Analysis") -> Floats:
     """Loss of the peak, (cases,). [dB]
 
-    The mission's rule combines the losses of the errors: root-sum-square adds their decibels, a sum the roots, and
-    with each error alone the largest counts. Not a number where an error leaves no image, or nothing is declared.
+    The mission's rule combines the losses of the errors: root-sum-square adds their decibels, a sum adds their roots,
+    and `each` takes the largest loss. NaN where an error leaves no image, or no error is declared.
     """
     errors, together = analysis.errors, analysis.together("full")
     losses = list(_losses_of_motion(analysis, together.motion))
@@ -56,9 +56,9 @@ def peak_loss_db(analysis: "Analysis") -> Floats:
 
 
 def _losses_of_motion(analysis: "Analysis", motion: Sequence[ErrorSource]) -> list[Floats]:
-    """Losses by errors of motion and of clocks, of the worse sign each. [dB]
+    """Losses by errors of motion and of clocks, each by its worse sign. [dB]
 
-    The six errors of a covariance count as the independent errors that they are made of.
+    The six errors of a covariance count as the independent errors that compose them.
     """
     errors, together = analysis.errors, analysis.together("full")
     if not motion:
@@ -86,11 +86,11 @@ def _range_errors_left(errors: DeclaredErrors, motion: Sequence[ErrorSource]) ->
 
 
 def peak_losses(exact: ExactRanges, remaining: Floats) -> Floats:
-    """Losses of the peak by range errors that are left at the nodes, (..., nodes, cases) [m]; (..., cases). [dB]"""
+    """Losses of the peak by range errors left at the nodes, (..., nodes, cases) [m]; (..., cases). [dB]"""
     sampling = exact.sampling
-    if sampling.places.size <= OF_ENDS:  # few nodes carry a smooth range error, and not the turns of its phase
+    if sampling.places.size <= OF_ENDS:  # a few nodes resolve a smooth range error, but not the turns of its phase
         remaining, sampling = sampling.weights_at(nodes(_SUMMED_NODES).places) @ remaining, nodes(_SUMMED_NODES)
     phase, relative_band = exact.k * remaining, np.sqrt(12 * exact.band)
     of_band = np.sinc(phase * relative_band / (2 * math.pi))  # the mean over the band, in closed form
     amplitude = np.abs(np.einsum("n,...nc->...c", sampling.fit[0], np.exp(1j * phase) * of_band))
-    return np.asarray(np.maximum(-20 * np.log10(amplitude), 0.0))  # less than rounding leaves is none
+    return np.asarray(np.maximum(-20 * np.log10(amplitude), 0.0))  # a loss below rounding is 0

@@ -1,12 +1,12 @@
-"""Phases that make echoes and phases that spread: tones, noise, and the cubic where nothing else holds it.
+"""Phases that make echoes and phases that spread: tones, noise, and the cubic phase without a requirement of its own.
 
-Independent powers add, whatever `allocation.combine` says of phases. Each effect is judged once: a tone by PSLR, and
-without that requirement its power φ²/2 by ISLR; a cubic phase by its own requirement, and without one its power by
-ISLR, since it is in the image's sidelobes.
+Independent powers add, also where `allocation.combine` sets another rule for phases. Each effect is judged once. A
+tone counts against PSLR, or without that requirement with its power φ²/2 against ISLR. A cubic phase counts against
+its own requirement, or without it with its power against ISLR, since the cubic phase is in the image's sidelobes.
 
-Noise of a phase variance σ² leaves exp(-σ²) of the energy in the response and spreads the rest over the image. Of the
-response a share E lies within the first nulls, which an image counts as its mainlobe, so that noise adds
-(exp(σ²) - 1)/E to the ISLR. The paper's rule takes σ² for it.
+Noise of a phase variance σ² leaves exp(-σ²) of the energy in the response and spreads the rest over the image. A
+share E of the response lies within the first nulls, which an image counts as its mainlobe. So noise adds to the ISLR
+(exp(σ²) - 1)/E. The paper's rule takes σ² instead.
 """
 
 import math
@@ -27,7 +27,7 @@ from bisar_budget.mission.model import Mission, Simulation, has_instruments
 if TYPE_CHECKING:
     from bisar_budget.analysis.analysis import Analysis
 
-CUBIC_POWER = 4 / 175  # of a cubic phase φ₃ at the edge: its Legendre part 2/5·φ₃, whose mean square is (4/25)/7·φ₃²
+CUBIC_POWER = 4 / 175  # a cubic phase φ₃ at the edge has the Legendre part 2/5·φ₃, with the mean square (4/25)/7·φ₃²
 SMALLEST_CUBIC_RAD = 1e-3  # a power of -76 dB, which no image shows
 SMALLEST_REST_RAD = 1e-3  # rms, a power of -60 dB
 
@@ -35,18 +35,18 @@ SMALLEST_REST_RAD = 1e-3  # rms, a power of -60 dB
 class Tone(NamedTuple):
     """A vibration, a spur of an oscillator, or its own vibration: peak phase [rad] and cycles per aperture.
 
-    `in_quadrature` is the row of a tone from whose phase this one is a quarter of a turn away; None: of any phase.
+    `in_quadrature` is the row of a tone whose phase is a quarter of a turn away from this tone's; None: any phase.
     """
 
     subject: Subject
     phase: Any
     cycles: Any
-    is_there: Any = True  # in which cases a vibration is fast enough
+    is_there: Any = True  # cases in which a vibration is fast enough
     in_quadrature: str | None = None
 
 
 class SpreadPhase(NamedTuple):
-    """A row, whose share it counts against, and the variance of the phase that it spreads. [rad²]"""
+    """A row, the owner of the share that it counts against, and the variance of its spread phase. [rad²]"""
 
     row_id: str
     owner: str
@@ -54,13 +54,13 @@ class SpreadPhase(NamedTuple):
 
 
 class StatedPower(NamedTuple):
-    """An error from elsewhere, and the ISLR that it is stated to add. [dB]"""
+    """An error from elsewhere, and the ISLR that it adds according to the file. [dB]"""
 
     subject: Subject
     islr: Any
 
     def rms(self, model: str, energy: float) -> Any:
-        """Phase that spreads as much by a model, rms; see `spread_phase`. [rad]"""
+        """Rms phase that spreads the same power by a model; see `spread_phase`. [rad]"""
         return spread_phase(10 ** (np.asarray(self.islr) / 10), model, energy)
 
 
@@ -77,7 +77,7 @@ def spread_phase(ratio: Any, model: str, energy: float) -> Any:
     ratio : float or array
         ISLR, a power ratio.
     model : str
-        `published` for the paper's rule; any other is what an image shows.
+        `published` for the paper's rule; any other name for the ISLR of an image.
     energy : float
         Share E, see `mainlobe_energy`.
     """
@@ -85,24 +85,24 @@ def spread_phase(ratio: Any, model: str, energy: float) -> Any:
 
 
 def islr_db(variance: Any, model: str, energy: float) -> Any:
-    """ISLR that noise of a phase variance [rad²], above 0, adds: σ² by the paper's rule, else as an image shows. [dB]
+    """ISLR that noise of a phase variance [rad²] above 0 adds: by the paper's rule σ², else as in an image. [dB]
 
-    Parameters are those of `spread_phase`.
+    `spread_phase` documents the parameters.
     """
     if model == "published":
         return 10 * np.log10(variance)
-    # Of (exp(σ²) - 1)/E, without exp(σ²), which overflows.
+    # The logarithm of (exp(σ²) - 1)/E, without exp(σ²), which overflows.
     return 10 / math.log(10) * (variance + np.log(-np.expm1(-variance)) - math.log(energy))
 
 
 def islr_of(mission: Mission, variance: Any) -> Any:
-    """ISLR that noise of a phase variance [rad²] adds to an image; not a number where there is none. [dB]"""
+    """ISLR that noise of a phase variance [rad²] adds to an image; NaN without noise. [dB]"""
     with np.errstate(all="ignore"):
         return np.where(variance > 0, islr_db(variance, "full", mainlobe_energy(mission)), math.nan)
 
 
 def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> Any:
-    """Rms phase that an owner may spread, by the paper's rule or as an image shows it. [rad]"""
+    """Rms phase that an owner may spread, by the paper's rule or as in an image. [rad]"""
     if mission.requirements.islr is None:
         return None
     rms_of_mission = spread_phase(10 ** (np.asarray(mission.requirements.islr) / 10), model, mainlobe_energy(mission))
@@ -110,9 +110,9 @@ def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: st
 
 
 def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
-    """List what makes paired echoes: vibrations from one cycle per aperture on, their oscillators' tones, and spurs.
+    """List the tones that make paired echoes: vibrations from one cycle per aperture on, tones of oscillators, spurs.
 
-    `geometry` is that of many cases, where numbers of the mission are arrays.
+    `geometry` holds many cases where numbers of the mission are arrays.
     """
     T, echoes = mission.collection.aperture_time, []
     for name in PLATFORMS:
@@ -140,7 +140,7 @@ def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
 
 
 def _echoes(alone: Tone, free: Any, remaining: LeftTone, mission: Mission) -> list[Tone]:
-    """Echoes of an oscillator's tone; of one that is folded where each lies, or all power where the largest does."""
+    """Echoes of an oscillator's tone: for a folded tone one per frequency, or all power at the largest echo."""
     if not remaining.is_folded:
         return [alone]
     T = mission.collection.aperture_time
@@ -155,7 +155,7 @@ def _echoes(alone: Tone, free: Any, remaining: LeftTone, mission: Mission) -> li
 
 
 def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links, powers stated."""
+    """List the phases that spread beyond the cubic: wideband vibration, sensor noise, phase noise, links, powers."""
     mission, spreads = analysis.mission, []
     for name in PLATFORMS:
         wideband = getattr(mission.platforms, name).motion_error.vibration.wideband
@@ -173,10 +173,10 @@ def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
 
 
 def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List what errors of motion, clocks, sensors and slow vibrations leave beyond the cubic, where it shows.
+    """List the phases beyond the cubic by errors of motion, clocks, sensors and slow vibrations, where they show.
 
-    It is at one sigma. Short apertures leave next to nothing, a quarter of a circle does. The published model knows
-    none; where a line of sight turns by more than a radian the phase of equal loss holds it.
+    They are at one sigma. Short apertures leave next to nothing; a quarter of a circle leaves more. The published
+    model has no such phase. Where a line of sight turns by more than a radian, the phase of equal loss holds it.
     """
     if model == "published":
         return []
@@ -204,7 +204,7 @@ def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
 
 
 def stated_powers(mission: Mission) -> list[StatedPower]:
-    """List what errors from elsewhere spread that state their ISLR."""
+    """List the errors from elsewhere whose ISLR the file states."""
     return [
         StatedPower(subject("mission", "other", f"{stated.name}.islr", entry=index), stated.islr)
         for index, stated in enumerate(mission.other_errors)
@@ -213,11 +213,12 @@ def stated_powers(mission: Mission) -> list[StatedPower]:
 
 
 def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str) -> list[list[SpreadPhase]]:
-    """List the phases that count against ISLR, of each owner; against the mission's all do.
+    """List the phases that count against ISLR, for each owner; all phases count against the mission's.
 
-    They are noise, what other errors leave beyond the cubic, the tones that no other requirement takes, and the power
-    of the cubic where nothing else holds it: that of an owner at one sigma, none where it is too small to show, or
-    where an error has no image. A variance is not a number where a case does not have the phase.
+    They are noise, the rests of errors beyond the cubic, the tones that no other requirement takes, and the power of
+    the cubic phase if no requirement of its own holds it. The cubic phase of an owner is at one sigma. It is left out
+    where it is too small to show, or where an error has no image. A variance is NaN where a case does not have the
+    phase.
     """
     mission, split, together = analysis.mission, analysis.allocation.islr, analysis.together(model)
     spreads = noise(analysis, model) + rests(analysis, model)

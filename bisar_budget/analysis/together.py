@@ -1,4 +1,4 @@
-"""Declared errors of many cases together: their phases and displacements, and whose share they count against."""
+"""Declared errors of many cases together: their phases and displacements, and the owners whose share they use."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -26,18 +26,18 @@ from bisar_budget.ranges.exact_ranges import Floats
 
 
 class Together:
-    """Declared errors of many cases by one model, along the axes that the file states them in.
+    """Declared errors of many cases by one model, along the axes in which the file states them.
 
     Parameters
     ----------
     errors : DeclaredErrors
-        Of the cases.
+        Errors of the cases.
     model : str
         `published` or `full`.
     slow : sequence of DeclaredPhase
         Vibrations below one cycle per aperture.
     tones : sequence of ToneDisplacement
-        Vibrations, and tones of oscillators, by what they displace.
+        Displacements by vibrations and by tones of oscillators.
     random : sequence of RandomError
         Errors of sensors and clocks, declared or not.
     groups : sequence of Correlated
@@ -60,12 +60,12 @@ class Together:
 
     @property
     def rule_of_all(self) -> str:
-        """Rule by which all declared errors add up: the mission's, and root-sum-square where each stands alone."""
+        """Rule that adds up all declared errors: the mission's rule, and root-sum-square instead of `each`."""
         return "rss" if self.rule == "each" else self.rule
 
     @cached_property
     def own(self) -> list[DeclaredPhase]:
-        """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""
+        """Phases of errors without a displacement of their own: slow vibrations, declared sensor and clock errors."""
         array = self.errors.array
         phases = [
             vibration._replace(qpe_rad=array(vibration.qpe_rad), cubic_rad=array(vibration.cubic_rad))
@@ -84,7 +84,7 @@ class Together:
 
     @cached_property
     def phases(self) -> list[DeclaredPhase]:
-        """Phases of every declared error: of motion and the clock, of what is a phase alone, and `own`."""
+        """Phases of every declared error: of motion, of the clock, of pure phase errors, and `own`."""
         phases_of_motion, factor = [], self.errors.mission.allocation.coverage_factor
         for error in self.errors.stated:
             does, coverage = self.errors.does(self.model, error), factor if error.is_covered else 1.0
@@ -94,13 +94,13 @@ class Together:
         return [*phases_of_motion, *self.own]
 
     def owed(self, split: Shares, owner: str) -> list[DeclaredPhase]:
-        """Those that count against the share of an owner; against the mission's all."""
+        """Phases that count against the share of an owner; all phases count against the mission's."""
         return [phase for phase in self.phases if split.includes(phase.owner, owner)]
 
     def judged_parts(self, members: Sequence[DeclaredPhase], rule: str = "", gain: Any = None) -> Phases:
-        """List the judged phases that a rule combines, with the mission's gain or another. [rad]
+        """List the judged phases that a rule combines, with the mission's gain or the given gain. [rad]
 
-        Under root-sum-square the six of a covariance are one, as their correlations make it.
+        Under root-sum-square the six phases of a covariance are one phase, by their correlations.
         """
         gain, groups = self.errors.gain if gain is None else gain, self.groups
         judged = {member.row_id: member.judged(gain) for member in members}
@@ -115,12 +115,12 @@ class Together:
         return list(judged.items())
 
     def judged(self, members: Sequence[DeclaredPhase], rule: str = "", gain: Any = None) -> Floats:
-        """Combine the judged phases of errors by the mission's rule, or another. [rad]"""
+        """Combine the judged phases of errors by the mission's rule, or by the given rule. [rad]"""
         return self.errors.array(combined_phase(self.judged_parts(members, rule, gain), rule or self.rule))
 
     @cached_property
     def _hidden_of_groups(self) -> dict[str, Any]:
-        """Hidden phase of the six errors of each covariance; none by the published model. [rad]"""
+        """Hidden phase of the six errors of each covariance; 0 in the published model. [rad]"""
         if self.model == "published":
             return {group.id: 0.0 for group in self.groups}
         stated = {error.subject.id for error in self.motion}
@@ -137,15 +137,16 @@ class Together:
         return np.asarray(np.sqrt(np.square(hidden).sum(axis=0)))
 
     def independent(self, group: Correlated, remaining: Floats) -> Floats:
-        """Range errors at the nodes of independent errors that together are those of a covariance. [m]
+        """Range errors at the nodes of independent errors that together have a covariance. [m]
 
-        Those of its six errors are (6, nodes, cases). A root of their correlations turns them.
+        `remaining` are the range errors of the covariance's six errors, (6, nodes, cases). A root of their
+        correlations turns them.
         """
         correlation = np.array([[self.errors.array(rho) for rho in row] for row in group.correlation])
         return np.asarray(np.einsum("cij,inc->jnc", factor(np.moveaxis(correlation, 2, 0)), remaining))
 
     def combined(self, phases: Phases, rule: str = "") -> Floats:
-        """Combine phases by the mission's rule, or another. [rad]"""
+        """Combine phases by the mission's rule, or by the given rule. [rad]"""
         return self.errors.array(combined_phase(phases, rule or self.rule, self.groups))
 
     def cubics_without_coverage(self, split: Shares, owner: str) -> Phases:
@@ -154,14 +155,17 @@ class Together:
         return [(phase.row_id, phase.cubic_rad / phase.coverage) for phase in members if phase.cubic_rad is not None]
 
     def cubic_without_coverage(self, split: Shares, owner: str) -> Floats:
-        """The same added up: with `combine: sum`, else by root-sum-square, since powers add. [rad]"""
+        """Combined cubic phase of an owner at the declared sigmas: a sum with `combine: sum`, else the rss. [rad]
+
+        Root-sum-square, since powers add.
+        """
         return self.combined(self.cubics_without_coverage(split, owner), self.rule_of_all)
 
     def moves(self, rule: str) -> Moves:
         """Displacement of each error of motion, to be combined by a rule. [m]
 
-        By the sign that moves farther. For a sum over all signs half of what lies between the two signs, and once the
-        rest, which all signs have in common.
+        By the sign that moves farther. For a sum over all signs: half of the difference between the two signs, and
+        once the rest, which all signs share.
         """
         does = {error.subject.id: self.errors.does(self.model, error) for error in self.motion}
         if rule != "sum":
@@ -176,9 +180,9 @@ class Together:
 
     @cached_property
     def undirected_moves(self) -> Moves:
-        """Displacement of what has no sign: sigmas of sensors and clocks, and tones in their worst phases. [m]
+        """Displacement by errors without a sign: sigmas of sensors and clocks, and tones in their worst phases. [m]
 
-        None of a clock that the file leaves open.
+        A clock whose displacement the file leaves open has 0.
         """
         moves = []
         for error in self.random:
@@ -199,10 +203,10 @@ class Together:
         return bool(self.motion or self.undirected_moves)
 
     def moved(self, rule: str) -> Floats:
-        """Displacements combined by a rule; not a number where an error has no image to place. [m]
+        """Displacements combined by a rule; NaN where an error has no image to place. [m]
 
-        One at random, or of a tone, has no direction: to a sum over all signs it adds its length, whatever the others
-        do.
+        A random error or a tone has no direction. To a sum over all signs it adds its length, independent of all
+        other errors.
         """
         if rule != "sum":
             moves = [*self.moves(rule), *self.undirected_moves]
@@ -210,24 +214,24 @@ class Together:
         largest = combined_displacement(self.moves(rule), rule, self.groups)
         return self.errors.array(largest + sum(np.hypot(*move) for _, move in self.undirected_moves))
 
-    # ---------------------------------------------------------------- of one case
+    # ---------------------------------------------------------------- one case
     def phase_parts(self, phases: Phases, rule: str = "", case: int = 0) -> list[tuple[str, float]]:
-        """List the parts of phases that the mission's rule, or another, combines, signed. [rad]"""
+        """List the parts of phases that the mission's rule, or the given rule, combines, signed. [rad]"""
         combined_parts = phase_parts(phases, rule or self.rule, self.groups)
         return [(row_id, float(phase[case])) for row_id, phase in combined_parts]
 
     def displacement_parts(self, case: int = 0) -> list[tuple[str, GroundVector]]:
-        """List the parts of displacements that the mission's rule combines: none where one has no image. [m]"""
+        """List the parts of displacements that the mission's rule combines; empty if an error has no image. [m]"""
         named_moves = displacement_parts([*self.moves(self.rule), *self.undirected_moves], self.rule, self.groups)
         combined_parts = [(row_id, (float(east[case]), float(north[case]))) for row_id, (east, north) in named_moves]
         return [] if any(math.isnan(east) for _, (east, _) in combined_parts) else combined_parts
 
 
 def quadratics(members: Iterable[DeclaredPhase]) -> Phases:
-    """Quadratic phase of each, signed. [rad]"""
+    """Quadratic phase of each member, signed. [rad]"""
     return [(phase.row_id, phase.qpe_rad) for phase in members]
 
 
 def cubics(members: Iterable[DeclaredPhase]) -> Phases:
-    """Cubic phase of each that has one, signed. [rad]"""
+    """Cubic phase of each member that has a cubic phase, signed. [rad]"""
     return [(phase.row_id, phase.cubic_rad) for phase in members if phase.cubic_rad is not None]

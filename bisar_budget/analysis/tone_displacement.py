@@ -1,13 +1,13 @@
 """Displacement of the image by tones: vibrations of platforms, and tones of their oscillators.
 
 Over an aperture a tone of amplitude A and x = πfT has the mean A·j₀(x) and, at the edge, the linear part 3A·j₁(x).
-They displace as those of any range error: by (25), or, as a line of sight turns, by orders 0 to 3 over exact ranges.
-Orders 0 and 2 are largest together, 1 and 3 a quarter of a cycle later, so that with the phase of the tone the image
-runs on an ellipse. East and north count in the worst phase of each: their root-sum-square is √2 times the rms
-displacement over all phases, which is the largest one or more, up to √2 times that. Derived here, of first order in
-the amplitude; held to exact ranges in all phases (`tests/analysis/test_tone_displacement.py`).
+They displace like the parts of any range error: by (25), or, as a line of sight turns, by orders 0 to 3 over exact
+ranges. Orders 0 and 2 are largest together, orders 1 and 3 a quarter of a cycle later, so that with the phase of the
+tone the image runs on an ellipse. East and north each count in their worst phase. Their root-sum-square is √2 times
+the rms displacement over all phases. It lies between the largest displacement and √2 times the largest. Derived here,
+to first order in the amplitude. Exact ranges in all phases check it (`tests/analysis/test_tone_displacement.py`).
 
-The axes of a vibration may be in any phase: what each displaces adds. What is faster displaces less, as 1/(fT).
+The axes of a vibration may be in any phase: their displacements add. A faster tone displaces less, as 1/(fT).
 """
 
 import math
@@ -31,7 +31,7 @@ from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 
 
 class TonePart(NamedTuple):
-    """A tone along one way: amplitudes of its orders 0 to 3 at the aperture edge, and what a metre of each displaces.
+    """A tone along one way: amplitudes of its orders 0 to 3 at the aperture edge, displacement by a metre of each.
 
     Signed, (4, n) [m] and (4, 2, n), east and north [m/m].
     """
@@ -41,7 +41,7 @@ class TonePart(NamedTuple):
 
     @property
     def displacement(self) -> Floats:
-        """East and north, each in its worst phase, (2, n). [m]"""
+        """Displacement east and north, each in its worst phase, (2, n). [m]"""
         constant, linear, quadratic, cubic = self.orders[:, None] * self.per_metre
         return np.asarray(np.hypot(constant - quadratic, linear - cubic))
 
@@ -54,7 +54,7 @@ class ToneDisplacement(NamedTuple):
     full: Sequence[TonePart]
 
     def parts(self, model: str) -> Sequence[TonePart]:
-        """Those of a model."""
+        """The parts of a model."""
         return self.full if model == "full" else self.published
 
     def by(self, model: str) -> Floats:
@@ -63,10 +63,10 @@ class ToneDisplacement(NamedTuple):
 
 
 def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: ExactRanges) -> list[ToneDisplacement]:
-    """Displacement by every vibration of a platform, and by every tone of an oscillator, whatever its echoes do.
+    """Displacement by every vibration of a platform, and by every tone of an oscillator, with or without echoes.
 
-    One that exchanges fold has a part at each frequency. What is below one cycle per aperture, of a vibration that an
-    oscillator feels or of a folded tone, counts in the row of the acceleration or of the oscillator.
+    A tone that exchanges fold has a part at each frequency. Below one cycle per aperture, a vibration that an
+    oscillator feels counts in the row of the acceleration, and a folded tone in the row of the oscillator.
     """
     T, plane, displacements = mission.collection.aperture_time, _by_plane(geometry, exact), list[ToneDisplacement]()
     for platform_index, name in enumerate(PLATFORMS):
@@ -101,7 +101,7 @@ def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: Exac
 
 
 def _tones_of_oscillators(mission: Mission, geometry: BistaticGeometry) -> Iterator[tuple[Subject, Any, LeftTone]]:
-    """Row, peak phase of a free oscillator [rad], and what the synchronization leaves of each tone."""
+    """Row, peak phase of a free oscillator [rad], and the tone that the synchronization leaves, for each tone."""
     for spur in spurs_of(mission, geometry):
         yield spur.subject, spur.free, spur.left
     for accelerated in accelerated_tones(mission, geometry):
@@ -112,13 +112,13 @@ def _tones_of_oscillators(mission: Mission, geometry: BistaticGeometry) -> Itera
 
 
 def _orders(cycles: Any, size: Any) -> Floats:
-    """Orders 0 to 3 of a tone of so many cycles per aperture and an amplitude [m], (4, n). [m]"""
+    """Orders 0 to 3 of a tone with `cycles` per aperture and an amplitude [m], (4, n). [m]"""
     quadratic, cubic, _, constant, linear = size * tone(math.pi * np.atleast_1d(cycles))
     return np.array([constant, linear, quadratic, cubic])
 
 
 def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
-    """Displacement by a metre of each order by (25), (4, 2, n); not a number where Q has no inverse. [m/m]"""
+    """Displacement by a metre of each order by (25), (4, 2, n); NaN where Q has no inverse. [m/m]"""
     plane, _ = published_planes(geometry)
     displacement = np.zeros((4, *np.shape(exact.place_weights)[::2]))
     scale = 1 / np.where(plane.is_singular, math.nan, plane.determinant)
@@ -128,6 +128,6 @@ def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
 
 
 def _by_ranges(exact: ExactRanges, along: Floats) -> Floats:
-    """The same over exact ranges, of an error of which the range has `along` at the nodes, (nodes, n). [m/m]"""
+    """Displacement by a metre of each order by exact ranges, if the range has `along` of it, (nodes, n). [m/m]"""
     seen = np.where(np.abs(along) > ROUNDING, along, 0.0)
     return np.asarray(np.einsum("wnc,nc,no->owc", exact.place_weights, seen, orders_at(exact.sampling.places)))

@@ -1,18 +1,18 @@
-"""Vibration: what a platform's motion along the line of sight does, by the paper's rule and from first principles.
+"""Vibration: effects of a platform's motion along the line of sight, by the paper's rule and from first principles.
 
-A motion of amplitude A along the line of sight is a phase of peak φ = 2πA/λ. A sinusoid makes paired echoes of
-J₁(φ)/J₀(φ) of the response, about φ/2; Gaussian noise of rms σ leaves exp(-σ²) of the power in the response and
-spreads the rest, so that an image shows an ISLR of (exp(σ²) - 1)/E, see `spread`. Derived here, checked against the
-transform of the phase.
+A motion of amplitude A along the line of sight is a phase of peak φ = 2πA/λ. A sinusoid makes paired echoes with
+J₁(φ)/J₀(φ) of the amplitude of the response, about φ/2. Gaussian noise of rms σ leaves exp(-σ²) of the power in the
+response and spreads the rest, so that an image shows an ISLR of (exp(σ²) - 1)/E, see `spread`. Derived here, checked
+against the transform of the phase.
 
-What a platform may have, so that both within their shares meet the requirement: where both vibrate at one frequency
-their echoes add in amplitude in the worst phase, so that amplitudes are divided, in the ratio that the shares of
-power set; where the motions are noise, which is independent from platform to platform, variances add and powers are
-divided. The paper's rule, φ² ≤ PSLR·share and σ² ≤ ISLR·share, stays 3 dB inside the first at equal shares; it is
-beyond the second by 1/E, 0.44 dB with a uniform window; the same noise on both platforms would add 3 dB.
+Both platforms within their shares must meet the requirement together. If both vibrate at one frequency, their echoes
+add in amplitude in the worst phase. So amplitudes are divided, in the ratio that the shares of power set. If the
+motions are noise, which is independent from platform to platform, variances add and powers are divided. The paper's
+rule, φ² ≤ PSLR·share and σ² ≤ ISLR·share, stays 3 dB inside the first limit at equal shares. It exceeds the second
+limit by 1/E, 0.44 dB with a uniform window; the same noise on both platforms would add 3 dB.
 
-Between one and three cycles per aperture a vibration is a quadratic phase as well, and counts as echoes; slower ones
-make none, see `effects.vibration`.
+Between one and three cycles per aperture a vibration is a quadratic phase as well, and counts as echoes. A slower
+vibration makes no echoes, see `effects.vibration`.
 """
 
 import math
@@ -30,7 +30,7 @@ from bisar_budget.effects.slow_tones import SlowTone
 from bisar_budget.effects.vibration import near_groups, worst_phases
 from bisar_budget.mission.model import Mission, Shares
 
-LARGEST_ECHO = 2.0  # rad; beyond, echoes are above the response
+LARGEST_ECHO = 2.0  # rad; with a larger phase, echoes are above the response
 
 
 class VibrationLimits(NamedTuple):
@@ -45,12 +45,12 @@ class VibrationLimits(NamedTuple):
 
     @property
     def margin_db(self) -> Any:
-        """How far the published rule stays inside first principles. [dB]"""
+        """Margin of the published rule below the limit from first principles. [dB]"""
         return 20 * np.log10(self.full / self.published)
 
 
 def echo_level(phase: Any) -> Any:
-    """Amplitude of a paired echo over that of the response, J₁(φ)/J₀(φ), of a sinusoid of peak φ up to 2 rad."""
+    """Amplitude of a paired echo over the response's, J₁(φ)/J₀(φ), for a sinusoid of peak φ up to 2 rad."""
     j0, j1 = bessel(phase)
     return j1 / j0
 
@@ -68,8 +68,9 @@ def bessel(phase: Any) -> tuple[Any, Any]:
 class Echo(NamedTuple):
     """Paired echo of a tone, or of tones near each other in the worst of their phases.
 
-    One tone of the peak phase `phase` [rad] has an echo as high; `cycles` is its place, in cells from the response,
-    `level` its amplitude over that of the response; `is_of` says which tones make it, (tones, ...).
+    One tone of the peak phase `phase` [rad] has an echo as high. `cycles` is the position of the echo, in cells from
+    the response, and `level` its amplitude over the amplitude of the response. `is_of` marks the tones that make the
+    echo, (tones, ...).
     """
 
     phase: Any
@@ -79,12 +80,12 @@ class Echo(NamedTuple):
 
 
 def level_of(phase: Any) -> Any:
-    """Amplitude of a paired echo over that of the response; half the phase beyond 2 rad."""
+    """Amplitude of a paired echo over the amplitude of the response; half the phase beyond 2 rad."""
     return np.where(phase <= LARGEST_ECHO, echo_level(np.minimum(phase, LARGEST_ECHO)), phase / 2)[()]
 
 
 def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:
-    """Places of the tones that are in quadrature to another, each with the place of that."""
+    """Index of each tone that is in quadrature to a second tone, with the index of the second tone."""
     index_by_id = {tone.subject.id: index for index, tone in enumerate(tones)}
     return [
         (here, index_by_id[tone.in_quadrature])
@@ -94,9 +95,9 @@ def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:
 
 
 def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | None:
-    """Highest echo of all tones, each alone and those near each other together; None without any.
+    """Highest echo of all tones: of each tone alone, and of tones near each other together; None without tones.
 
-    `shape` is that of numbers of many cases, (cases,); where a case has no tone the level is 0.
+    `shape` is the shape of numbers of many cases, (cases,). A case without a tone has level 0.
     """
     if not tones:
         return None
@@ -107,7 +108,7 @@ def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | N
     )
     phases = np.where(is_there, phases, 0.0)
     pairs = quadratures(tones)
-    for first, second in pairs:  # at one frequency: the tone that it is with the other
+    for first, second in pairs:  # at one frequency: both together are one tone
         phases[second], phases[first] = np.hypot(phases[first], phases[second]), 0.0
     number = near_groups(np.where(is_there, cycles, 0.0))
     here = np.arange(phases.shape[1])
@@ -162,9 +163,9 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
 
 
 def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str, VibrationLimits]]:
-    """Requirement that holds tones, and the limits of each platform by it; empty where none does.
+    """Requirement that limits tones, and the limits of each platform by it; empty without a requirement.
 
-    Without PSLR it is ISLR: a tone of peak phase φ spreads φ²/2.
+    Without a PSLR requirement it is ISLR: a tone of peak phase φ spreads φ²/2.
     """
     needs = mission.requirements
     if needs.pslr is not None or needs.islr is None:
@@ -177,7 +178,7 @@ def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str
 
 
 def amplitude_share(split: Shares, name: str) -> Any:
-    """Part of a platform in the amplitude of both: they sum to 1, in the ratio of the roots of power."""
+    """Share of a platform in the summed amplitude: both shares sum to 1, in the ratio of the roots of power."""
     share, share_of_other = split.of(name), split.of(next(platform for platform in PLATFORMS if platform != name))
     return evaluators.amplitude_share(share, share_of_other)
 
@@ -185,7 +186,8 @@ def amplitude_share(split: Shares, name: str) -> Any:
 class SlowLimits(NamedTuple):
     """Amplitudes along the line of sight that reach a platform's quadratic and the required cubic phase. [m]
 
-    `use` is the part of the smaller limit that the declared vibration uses, `quadratic_use` that of the quadratic.
+    `use` is the fraction of the smaller limit that the declared vibration uses, `quadratic_use` the fraction of the
+    quadratic limit.
     """
 
     quadratic: Any
@@ -195,20 +197,20 @@ class SlowLimits(NamedTuple):
 
     @property
     def smallest(self) -> Any:
-        """The one that gates."""
+        """The limit that gates."""
         return self.quadratic if self.cubic is None else np.minimum(self.quadratic, self.cubic)
 
     @property
     def is_cubic(self) -> Any:
-        """Whether the cubic phase sets it."""
+        """Whether the cubic phase sets the limit."""
         return self.use > self.quadratic_use
 
 
 def slow_limits(mission: Mission, allocation: Allocation, tone: SlowTone) -> SlowLimits:
     """Largest vibration below one cycle per aperture, in its worst phase; see `effects.slow_tones`.
 
-    The quadratic phase is held to the platform's share, autofocus gain included; the cubic phase, where it is
-    required, to the whole requirement without gain.
+    The limit of the quadratic phase is the platform's share, autofocus gain included. The limit of the cubic phase,
+    if one is required, is the whole requirement without gain.
     """
     gain, allowed = allocation.autofocus_gain, allocation.qpe_allowed(tone.subject.owner)
     required = mission.requirements.cubic_phase_error

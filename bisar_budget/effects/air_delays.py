@@ -1,15 +1,17 @@
-"""Delays in the air at random: what correction leaves makes each leg longer than the processor takes it for.
+"""Random delays in the air: after correction each leg is longer than the processor assumes.
 
-A leg has the delay of the zenith times what its elevation, seen from the scene, makes of it. The elevation changes
-over the aperture, and with it the delay: orders 0 and 1 displace the image, from order 2 on it defocuses.
+The delay of a leg is the zenith delay times a factor of the leg's elevation, seen from the scene. The elevation
+changes over the aperture, and the delay with it. Orders 0 and 1 of the delay displace the image; orders from 2 on
+defocus it.
 
 The troposphere delays every frequency alike. Free electrons delay the group of frequencies, g = 40.3·TEC/f², and
-advance the phase at the centre frequency by as much. An image finds its range by the band, the group, and everything
-else by the phase. So its range error is that of the phase, −g, with the constant part of the group, +ḡ: the
-displacement Q⁻¹[ḡ, −g₁] and the phases of −g, with what the displacement adds. Derived here.
+advance the phase at the centre frequency by the same amount. An image finds its range by the band, that is, by the
+group, and everything else by the phase. So its range error is the range error of the phase, −g, with the constant
+part of the group, +ḡ: the displacement is Q⁻¹[ḡ, −g₁], and the phases are the phases of −g together with the phases
+that the displacement adds. Derived here.
 
-With a correlation time the delay of the zenith changes within the aperture (`range_processes`): the published model
-takes the parts of such a process along the line of sight of mid-aperture, the full one follows the leg.
+With a correlation time the zenith delay changes within the aperture (`range_processes`). The published model takes
+the parts of such a process along the line of sight of mid-aperture. The full model follows the leg.
 """
 
 import math
@@ -35,22 +37,22 @@ from bisar_budget.mission.propagation import (
 )
 from bisar_budget.ranges.exact_ranges import Floats
 
-ELECTRON_DELAY_M3_PER_S2 = 40.308  # m³/s²: e²/(8π²ε₀mₑ), the group delay of 1/m² is so much over f² (CODATA 2018)
-TROPOSPHERE_HEIGHT_M = 7e3  # m, height at which a spherical troposphere is crossed as a whole
-IONOSPHERE_HEIGHT_M = 350e3  # m, the same of free electrons, where the platform is not lower
+ELECTRON_DELAY_M3_PER_S2 = 40.308  # m³/s²: e²/(8π²ε₀mₑ); the group delay of 1/m² is this over f² (CODATA 2018)
+TROPOSPHERE_HEIGHT_M = 7e3  # m, height of a thin shell in place of a spherical troposphere
+IONOSPHERE_HEIGHT_M = 350e3  # m, height of the shell of free electrons, unless the platform is lower
 DELAY, CONTENT = DELAYS
 UNITS = dict(zip(DELAYS, ("m", "1/m^2"), strict=True))
 
 
 def obliquity(position: Vectors, shell: Any) -> Any:
-    """Length of a leg through a thin shell of the air over that of the zenith, exact for a sphere.
+    """Length of a leg through a thin shell of the air over the length at the zenith, exact for a sphere.
 
     Parameters
     ----------
     position : Vectors
-        Of the platform, east, north and up of the scene, (…). [m]
+        Position of the platform, east, north and up of the scene, (…). [m]
     shell : float or (…)
-        Height of the shell; 0 for a flat Earth, 1/sin of the elevation. [m]
+        Height of the shell. Height 0 gives a flat Earth: 1/sin of the elevation. [m]
     """
     x, y, _ = position
     level = np.square(np.hypot(x, y) / norm(position))  # cos² of the elevation
@@ -58,10 +60,10 @@ def obliquity(position: Vectors, shell: Any) -> Any:
 
 
 def leg_factor(delay: str, position: Vectors, middle: Vectors) -> Any:
-    """Delay of a leg over that of the zenith, for positions (…) of a platform that is at `middle` at mid-aperture.
+    """Delay of a leg over the zenith delay, for positions (…) of a platform that is at `middle` at mid-aperture.
 
-    One within the air has a flat Earth below it, and no free electrons on its leg. A leg along the ground, of which
-    the file may not state a delay, has none.
+    A platform within the air has a flat Earth below it, and no free electrons on its leg. A leg along the ground, for
+    which the file may not state a delay, has factor 0.
     """
     height = np.asarray(height_of(middle))
     is_above = height >= ABOVE_THE_AIR
@@ -73,7 +75,7 @@ def leg_factor(delay: str, position: Vectors, middle: Vectors) -> Any:
 
 
 def metres_per_unit(mission: Mission, delay: str) -> Any:
-    """Group delay of the zenith by a unit of a figure, at the centre frequency. [m/unit]"""
+    """Group delay at the zenith by a unit of a figure, at the centre frequency. [m/unit]"""
     return 1.0 if delay == DELAY else ELECTRON_DELAY_M3_PER_S2 / np.square(mission.radar.center_frequency)
 
 
@@ -88,16 +90,16 @@ def seen_course(group: Any, mean: Any, delay: str) -> Any:
 
 
 def group_at_nodes(delay: str, track: Vectors, middle: Vectors, scale: Any) -> Floats:
-    """Group delay of the leg to a track by a delay of the zenith that stays, `scale` m/unit, (nodes, cases).
+    """Group delay of the leg to a track by a constant zenith delay of `scale` m/unit, (nodes, cases).
 
     Parameters
     ----------
     delay : str
-        Which of `DELAYS`.
+        One of `DELAYS`.
     track : Vectors
-        Positions of the platform at the nodes, (nodes, cases), as a place of the scene sees them. [m]
+        Positions of the platform at the nodes, (nodes, cases), seen from a point of the scene. [m]
     middle : Vectors
-        At mid-aperture, as the scene centre does. [m]
+        Position at mid-aperture, seen from the scene centre. [m]
     scale : (cases,)
         `metres_per_unit`.
     """
@@ -107,7 +109,7 @@ def group_at_nodes(delay: str, track: Vectors, middle: Vectors, scale: Any) -> F
 def dispersion_per_unit(mission: Mission, path: PlatformState) -> Any:
     """Quadratic phase at the edges of the band by a unit of electron content at the zenith. [rad/unit]
 
-    Of exp(2πi·K/(c·f)), K = g·f₀², the second order in f − f₀: (2π/λ)·g·(B/2f₀)².
+    The phase exp(2πi·K/(c·f)), K = g·f₀², has the second order (2π/λ)·g·(B/2f₀)² in f − f₀.
     """
     radar = mission.radar
     g = metres_per_unit(mission, CONTENT) * leg_factor(CONTENT, path.position, path.position)
@@ -117,7 +119,7 @@ def dispersion_per_unit(mission: Mission, path: PlatformState) -> Any:
 def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, Any]:
     """Quadratic phase at the edges of the band by the declared electron content of each leg. [rad]
 
-    The coverage factor is in it. Legs of which no content is declared are left out.
+    The phases include the coverage factor. Legs without a declared content are left out.
     """
     propagation, factor = mission.propagation, mission.allocation.coverage_factor
     phases: dict[str, Any] = {}
@@ -129,23 +131,23 @@ def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, An
 
 
 def dispersed(mission: Mission, geometry: BistaticGeometry) -> Any:
-    """Quadratic phase at the edges of the band by both legs: of one air they add, those of two combine. [rad]"""
+    """Quadratic phase at the edges of the band by both legs. One air adds the phases; two airs combine them. [rad]"""
     legs = list(dispersed_legs(mission, geometry).values())
     is_one_air = mission.propagation is not None and mission.propagation.is_one_air
     return combined(np.broadcast_arrays(*legs), "sum" if is_one_air else mission.allocation.combine)
 
 
 def legs_of(owner: str) -> tuple[str, ...]:
-    """Platforms on whose legs an error of the air is: one, or both where the air is one."""
+    """Platforms whose legs have an error of the air. The mission's error is on both legs."""
     return PLATFORMS if owner == "mission" else (owner,)
 
 
 def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
-    """Delays of the air, declared or not; none where nothing is stated of it.
+    """Delays of the air, declared or not; empty where the file states nothing about the air.
 
-    A figure that the file states once is one random number over the scene: both legs have it, each by its own
-    elevation, and what they do adds with its signs before it is squared. Then each leg has a row of its own, which
-    counts in that of the air.
+    A figure that the file states once is one random number over the scene. Both legs have it, each by its own
+    elevation, and the effects of both legs add with their signs before they are squared. Then each leg has a row of
+    its own, which counts in the row of the air.
     """
     propagation = seen.mission.propagation
     if propagation is None:
@@ -164,7 +166,7 @@ def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
 
 
 def _groups_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Floats]:
-    """Group delay at the nodes by a unit at the zenith on one leg, as it turns and held at mid-aperture. [m/unit]"""
+    """Group delay at the nodes by a unit at the zenith, for a leg as it turns and held at mid-aperture. [m/unit]"""
     exact, middle = seen.exact, getattr(seen.geometry, name).position
     scale = metres_per_unit(seen.mission, delay)
     moving = group_at_nodes(delay, exact.tracks[PLATFORMS.index(name)], middle, scale)
@@ -199,7 +201,7 @@ def _delay_error(
 
 
 def correlation_time_of(mission: Mission, owner: str) -> Any:
-    """Time in which the delays of a leg, or of one air over both, change; None where they stay. [s]"""
+    """Time in which the delays of a leg, or of one air over both, change; None if they are constant. [s]"""
     leg = None if mission.propagation is None else mission.propagation.leg(legs_of(owner)[0])
     return None if leg is None else leg.correlation_time
 
@@ -207,11 +209,11 @@ def correlation_time_of(mission: Mission, owner: str) -> Any:
 def _changing(
     seen: SensorCases, delay: str, group: Floats, at_mid_aperture: Floats, correlation_time: Any
 ) -> tuple[RandomEffect, RandomEffect]:
-    """Effects by both models of a unit that changes, along group delays of a leg as it turns, and held. [m/unit]"""
+    """Effects by both models of a unit that changes, for group delays of a leg that turns and held. [m/unit]"""
     k, half = seen.exact.k, seen.exact.half
     along = gauss_markov(2 * half, np.broadcast_to(correlation_time, half.shape)).times(np.square(at_mid_aperture))
     quadratic, cubic, spread = (k * np.sqrt(power) for power in along[:3])
-    # What spreads is a mean power, which has no coverage factor.
+    # The spread is a mean power, which has no coverage factor.
     published = RandomEffect(quadratic, cubic, spread / seen.factor, *seen.moved(along.constant, along.linear))
     full = seen.of_gauss_markov(group[None], correlation_time, is_phase_advanced=delay == CONTENT)
     return published, full
@@ -220,9 +222,9 @@ def _changing(
 def changing_air(
     mission: Mission, geometry: BistaticGeometry, cases: int, correlation_time: float
 ) -> list[RandomError]:
-    """Declared delays that stay within the aperture, as if they changed in a correlation time. [s]
+    """Declared delays that are constant within the aperture, as if they changed in a correlation time. [s]
 
-    Each counts once: of one air both legs together. `geometry` is that of the cases.
+    Each delay counts once: one air counts both legs together. `geometry` is the geometry of the cases.
     """
     propagation = mission.propagation
     staying = [name for name in PLATFORMS if correlation_time_of(mission, name) is None]
@@ -238,7 +240,7 @@ def changing_air(
 
 
 def zenith_courses(mission: Mission, owner: str, aperture_time: Floats, count: int) -> Floats:
-    """Independent courses of the zenith at so many nodes, (courses, nodes, cases), together of variance 1."""
+    """Independent courses of the zenith delay at `count` nodes, (courses, nodes, cases), together of variance 1."""
     correlation_time = correlation_time_of(mission, owner)
     if correlation_time is None:
         return np.ones((1, count, 1))

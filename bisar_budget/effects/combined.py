@@ -1,10 +1,10 @@
 """Several errors at once: worst case and root-sum-square, of phases and of displacements on the ground.
 
-Errors that a covariance ties together count as one under root-sum-square, √(gᵀCg). With gᵢ the effect of one unit of
-error i and φᵢ = gᵢσᵢ, gᵀCg is Σ ρᵢⱼφᵢφⱼ. It does not depend on the frame: the covariance stays in its own, and the
-effects are those along that frame's axes.
+The errors of one covariance count as one error under root-sum-square, √(gᵀCg). With gᵢ the effect of one unit of
+error i and φᵢ = gᵢσᵢ, gᵀCg is Σ ρᵢⱼφᵢφⱼ. The result does not depend on the frame: the covariance stays in its own
+frame, and the effects are taken along that frame's axes.
 
-Phases and displacements are arrays over cases, (cases,); of one case they may be numbers.
+Phases and displacements are arrays over cases, (cases,). For one case they may be numbers.
 """
 
 import math
@@ -35,16 +35,16 @@ class Correlated(NamedTuple):
 
     @property
     def id(self) -> str:
-        """Name of the six together."""
+        """Name of the six errors together."""
         return f"{self.platform}.covariance"
 
     def of(self, cases: NDArray[Any]) -> "Correlated":
-        """The same in some of the cases."""
+        """The same covariance in some of the cases."""
         rows = [[rho[cases] if np.ndim(rho) else rho for rho in row] for row in self.correlation]
         return self._replace(correlation=rows)
 
     def phase(self, phases: Sequence[Any] | Floats) -> Any:
-        """√(gᵀCg) of the six phases gᵢσᵢ; infinite where one of them is. [rad]"""
+        """√(gᵀCg) of the six phases gᵢσᵢ; infinite if any phase is infinite. [rad]"""
         with np.errstate(invalid="ignore"):
             size = np.sqrt(squared(self.correlation, phases))
         return np.where(np.isnan(size), math.inf, size)[()]
@@ -56,7 +56,7 @@ class Correlated(NamedTuple):
 
 
 def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
-    """List the covariances of a mission; nothing for nearly every one."""
+    """List the covariances of a mission. Nearly every mission has none."""
     groups = []
     for name in PLATFORMS:
         error: MotionError = getattr(mission.platforms, name).motion_error
@@ -71,29 +71,29 @@ def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
 
 
 def squared(correlation: Sequence[Sequence[Any]], parts: Sequence[Any] | Floats) -> Any:
-    """Square of the sum of correlated parts: Σ ρᵢⱼvᵢvⱼ; what rounding leaves below zero is zero."""
+    """Square of the sum of correlated parts, Σ ρᵢⱼvᵢvⱼ; a negative rounding error becomes zero."""
     values = np.array(np.broadcast_arrays(*parts))
-    if any(np.ndim(rho) for row in correlation for rho in row):  # of cases that differ
+    if any(np.ndim(rho) for row in correlation for rho in row):  # the correlations differ between cases
         correlation = [np.broadcast_arrays(*row, values[0])[:-1] for row in correlation]
         return np.maximum(0.0, np.einsum("ijc,ic,jc->c", correlation, values, values))
     return np.maximum(0.0, np.einsum("ij,i...,j...->...", correlation, values, values))
 
 
-# ---------------------------------------------------------------------- what combines
+# ---------------------------------------------------------------------- terms of a combination
 def phase_parts(phases: Phases, rule: str, groups: Sequence[Correlated]) -> list[tuple[str, Any]]:
-    """List what combines of phases: of a covariance the six errors are one part under `rss`, else six. [rad]"""
+    """List the phases to combine. Under `rss` the six errors of a covariance are one part, else six. [rad]"""
     return _parts(phases, rule, groups, Correlated.phase)
 
 
 def displacement_parts(moves: Moves, rule: str, groups: Sequence[Correlated]) -> list[tuple[str, Any]]:
-    """List what combines of displacements: id, and (east, north); of a covariance as `phase_parts`. [m]"""
+    """List the displacements to combine: id, and (east, north). A covariance counts as in `phase_parts`. [m]"""
     return _parts(moves, rule, groups, Correlated.displacement)
 
 
 def _parts(
     named_sizes: Sequence[tuple[str, Any]], rule: str, groups: Sequence[Correlated], combine: Callable[..., Any]
 ) -> list[tuple[str, Any]]:
-    if rule != "rss" or not groups:  # few missions have any
+    if rule != "rss" or not groups:  # few missions have a covariance
         return list(named_sizes)
     singles, combined_parts = dict(named_sizes), []
     for group in groups:
@@ -102,14 +102,14 @@ def _parts(
     return [*combined_parts, *singles.items()]
 
 
-# ---------------------------------------------------------------------- what they combine to
+# ---------------------------------------------------------------------- combined sizes
 def combined_phase(phases: Phases, rule: str, groups: Sequence[Correlated] = ()) -> Any:
-    """Combine the phases of errors by a rule, those of a covariance with their correlations. [rad]"""
+    """Combine the phases of errors by a rule, the phases of a covariance with their correlations. [rad]"""
     return combined([phase for _, phase in phase_parts(phases, rule, groups)], rule)
 
 
 def combined_displacement(moves: Moves, rule: str, groups: Sequence[Correlated] = ()) -> Any:
-    """Combine displacements by a rule: for `sum` the longest of all signs, those of a covariance as rms. [m]"""
+    """Combine displacements by a rule: the longest of all signs for `sum`, the rms of a covariance for `rss`. [m]"""
     vectors = np.array([move for _, move in displacement_parts(moves, rule, groups)])
     if not vectors.size:
         return 0.0
@@ -129,9 +129,9 @@ def combined(sizes: Any, rule: str) -> Any:
 def largest_signed_sum(vectors: Floats) -> Any:
     """Length of the longest of the sums ±v₁ ± v₂ … of plane vectors (n, 2, ...), exactly.
 
-    All sums lie in a polygon with two sides along each vector, and the longest is one of its corners. With
-    every vector turned into the upper half plane and sorted by angle, flipping them one by one walks along
-    half of the outline; the other half is its mirror image.
+    All sums lie in a polygon with two sides along each vector, and the longest sum is one of its corners. With every
+    vector turned into the upper half plane and sorted by angle, flipping the vectors in turn walks along half of the
+    outline. The second half is the mirror image of the first.
     """
     x, y = vectors[:, 0], vectors[:, 1]
     is_upper = (y > 0) | ((y == 0) & (x > 0))
@@ -142,9 +142,9 @@ def largest_signed_sum(vectors: Floats) -> Any:
     return np.hypot(corners_x, corners_y).max(axis=0, initial=0.0)
 
 
-# ---------------------------------------------------------------------- in words
+# ---------------------------------------------------------------------- notes
 def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[Note, ...]:
-    """Say what an aggregate makes of covariances."""
+    """Notes on how an aggregate treats covariances."""
     if rule == "rss":
         return tuple(phrases.counted_as_one(group.id) for group in groups)
     return tuple(phrases.correlations_unused(group.id) for group in groups)
@@ -153,7 +153,7 @@ def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[Note, ..
 def likely_error(group: Correlated, members: Sequence[ErrorSource]) -> tuple[float, ...]:
     """Most probable of the errors whose quadratic phase is √(gᵀCg) by the full model: Cg/√(gᵀCg), (6,).
 
-    Along the frame's axes, coverage factor included. Without a phase, each at its sigma.
+    The components run along the frame's axes and include the coverage factor. Without a phase, each is its sigma.
     """
     sizes = np.array([source.declared or 0.0 for source in members])
     phases = sizes * [source.full.qpe for source in members]

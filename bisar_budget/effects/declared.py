@@ -1,12 +1,12 @@
-"""Effects of the errors of cases by both models, and how large each may be; a check is one case.
+"""Effects of the errors of cases by both models, and the allowable sizes of the errors; a check is one case.
 
-The published model, Tables I and II and (25) of Rigling & Moses, is linear. The full model is true for errors of any
-size: where the second order provably does not matter, its effects are proportional to the error, and everywhere else
-they are those of exact ranges. An error has two signs and a bound covers both, so that phases and allowables are
-those of the worse one.
+The published model, Tables I and II and (25) of Rigling & Moses, is linear. The full model holds for errors of any
+size. Where the second order provably does not matter, its effects are proportional to the error; elsewhere they are
+the effects of exact ranges. An error has two signs and a bound covers both, so phases and allowables belong to the
+worse sign.
 
-Errors are kept in blocks, each an array (errors, cases): of one case all errors are one block, and of thousands of
-cases each error is one, so that what is worked on stays in a processor's cache.
+Errors are kept in blocks, each an array (errors, cases). With one case, all errors are one block. With thousands of
+cases, each error is a block, so that the arrays at work stay in a processor's cache.
 """
 
 import math
@@ -41,28 +41,30 @@ from bisar_budget.ranges.limit_search import LimitSearches, find_first_sizes
 from bisar_budget.ranges.point_paths import ROWS, PointPaths, tries_several_sizes
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
-HELD = (QUADRATIC, CUBIC, LOCATION)  # what an error is held to
+HELD = (QUADRATIC, CUBIC, LOCATION)  # requirements that limit an error
 END_OF_IMAGE = "end_of_image"  # no requirement: no ground point has the range history of a larger error
 MODELS = ("published", "full")
 OTHER_MODEL = {"published": "full", "full": "published"}
 
-# No navigation error: it takes the platform, within the aperture, farther than this part of its slant range.
+# A larger error is no navigation error: within the aperture it takes the platform farther than this part of its slant
+# range.
 FARTHEST_RANGE_FRACTION = 0.1
-SECOND_ORDER_FRACTION = 0.004  # what the second order may add, of a phase, a displacement or a limit; the aim is 1 %
-FLOOR_RAD, FLOOR_M = 1e-3, 2e-5  # and whatever the size
+SECOND_ORDER_FRACTION = 0.004  # of a phase, a displacement or a limit; the second order may add it; the aim is 1 %
+FLOOR_RAD, FLOOR_M = 1e-3, 2e-5  # amounts that the second order may always add
 
-_LANES_AT_ONCE_COUNT = 1 << 13  # lanes of a block
+_LANES_AT_ONCE_COUNT = 1 << 13  # lanes in a block
 _FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)
 
 
 class Declared(NamedTuple):
-    """Phases and displacements by errors of a given size, in each case; or plain numbers in one.
+    """Phases and displacements by errors of a given size, as arrays over cases, or as plain numbers of one case.
 
-    Quadratic and cubic phase at the aperture edge, of the worse sign, signed like the first order of the declared
-    one [rad]; displacement east and north by the declared sign, and by the opposite one [m]. Displacements are NaN
-    where there is none, in one case None: a plane without an inverse, or no ground point that has the range history,
-    which makes phases infinite. The `hidden` phase is that which band and turn do not resolve, as the judged one has
-    it; `rest` is the rms beyond the cubic, of the worse sign. [rad]
+    `qpe` and `cubic` are the phases at the aperture edge by the worse sign. Their sign is the sign of the first order
+    of the declared error. [rad] `displacement` is the displacement east and north by the declared sign, `opposite`
+    the displacement by the opposite sign. [m] Both are NaN, or None in one case, where there is no displacement: the
+    plane has no inverse, or no ground point has the range history, in which case the phases are infinite. `hidden` is
+    the phase that band and turn do not resolve, as it enters the judged phase. `rest` is the rms beyond the cubic by
+    the worse sign. [rad]
     """
 
     qpe: Any
@@ -73,21 +75,21 @@ class Declared(NamedTuple):
     rest: Any = 0.0
 
     def judged(self, gain: Any) -> Any:
-        """Magnitude of the phase that is held to a limit with the gain of autofocus in it. [rad]
+        """Magnitude of the phase that counts against a limit raised by the gain of autofocus. [rad]
 
-        Autofocus corrects the quadratic phase and none of what is hidden: √(φ² − φ₂² + (φ₂/gain)²)·gain, with φ the
-        phase of equal loss and φ₂ the quadratic one.
+        Autofocus corrects the quadratic phase and no hidden phase: √(φ² − φ₂² + (φ₂/gain)²)·gain, with φ the phase of
+        equal loss and φ₂ the quadratic phase.
         """
         return np.hypot(self.qpe, gain * self.hidden)
 
     @property
     def equal_loss(self) -> Any:
-        """Quadratic phase of as much loss of the peak as quadratic and hidden phase together. [rad]"""
+        """Quadratic phase with the same loss of the peak as quadratic and hidden phase together. [rad]"""
         return np.hypot(self.qpe, self.hidden)
 
     @property
     def farthest(self) -> Any:
-        """Displacement by the sign that moves farther, turned to the declared one's side. [m]"""
+        """Displacement by the sign that moves the image farther, turned to the side of the declared sign. [m]"""
         if self.displacement is None or self.opposite is None:
             return None
         (x, y), (u, v) = self.displacement, self.opposite
@@ -96,7 +98,7 @@ class Declared(NamedTuple):
         return np.where(is_gone, math.nan, east), np.where(is_gone, math.nan, north)
 
     def of(self, errors: Any) -> "Declared":
-        """The same of some of the errors."""
+        """The effects of some of the errors."""
         (x, y), (u, v) = self.displacement, self.opposite
         phases = self.qpe[errors], self.cubic[errors]
         return Declared(
@@ -104,7 +106,7 @@ class Declared(NamedTuple):
         )
 
     def in_one_case(self, case: int = 0) -> "Declared":
-        """The same with plain numbers in the place of arrays, those of a case."""
+        """The effects in one case, as plain numbers."""
         moved, opposite = point(self.displacement, case), point(self.opposite, case)
         qpe, cubic, hidden, beyond_cubic = (
             plain(phase, case) for phase in (self.qpe, self.cubic, self.hidden, self.rest)
@@ -113,16 +115,16 @@ class Declared(NamedTuple):
 
 
 def point(displacement: tuple[Any, Any], case: int = 0) -> GroundVector | None:
-    """A place of the ground in one case; None where there is none. [m]"""
+    """A ground point in one case; None where no point exists. [m]"""
     east, north = (plain(component, case) for component in displacement)
     return None if math.isnan(east) else (east, north)
 
 
 class Allowed(NamedTuple):
-    """How large errors may be by one model, by every requirement, and by the quadratic phase alone; NaN: no limit.
+    """Allowable sizes of errors by one model, for all requirements and for the quadratic phase alone; NaN: no limit.
 
-    `binding` is the place in `HELD` of the requirement that sets the smallest, `len(HELD)` where the image ends
-    there, -1 where nothing does.
+    `binding` is the index in `HELD` of the requirement that sets the smallest size, `len(HELD)` where the image ends
+    at that size, and -1 where no limit exists.
     """
 
     smallest: Floats
@@ -138,7 +140,7 @@ class ImagePlane(NamedTuple):
     is_singular: Any = False
 
     def displacement(self, effect: Effect, size: Any) -> tuple[Floats, Floats]:
-        """Displacement on the ground by (25), with the Q of a model; not a number where it has no inverse. [m]"""
+        """Displacement on the ground by (25), with the Q of a model; NaN where Q has no inverse. [m]"""
         (a, b), (c, d) = self.adjugate
         scale = size / np.where(self.is_singular, math.nan, self.determinant)
         # Adding 0.0 turns -0.0, which reads as a claim about a sign, into 0.0.
@@ -151,8 +153,9 @@ class ImagePlane(NamedTuple):
 def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, Any]:
     """Invert Q with the range held constant, (19) and (30); and the angle between its gradients. [deg]
 
-    That Q can be singular where the true gradients are not: its second row is v/R, theirs v⊥/R. Where the look
-    vectors all but cancel on the ground, of which it knows those of mid-aperture alone, it has none either.
+    This Q can be singular where the true gradients are not: its second row is v/R, the true second row is v⊥/R. It
+    also has no inverse where the look vectors all but cancel on the ground; it knows only the look vectors of
+    mid-aperture.
     """
     ground: list[Any] = []
     for path in geometry.both:
@@ -165,7 +168,7 @@ def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, Any]:
 
 
 class OwnPlane(NamedTuple):
-    """Displacement by effects that hold their own, as those of the full model do."""
+    """Displacement by effects that hold their own displacement, as the effects of the full model do."""
 
     is_singular: Any = False
 
@@ -180,11 +183,11 @@ class ErrorBlock:
     Attributes
     ----------
     sources : sequence of ErrorSource
-        What they are.
+        The errors.
     declared : (errors, cases)
-        Signed sizes, coverage factor included; NaN where the file is silent.
+        Signed sizes, coverage factor included; NaN where the file declares no size.
     effects : mapping of str to Effect
-        What a unit does by each model; of the full model, of an error too small for a second order.
+        Effect of a unit by each model. In the full model the unit belongs to an error too small for a second order.
     """
 
     def __init__(self, table: "DeclaredErrors", sources: Sequence[ErrorSource]) -> None:
@@ -193,7 +196,7 @@ class ErrorBlock:
         self.exact, self.sources, self.cases = table.exact, sources, table.cases
         shape = (len(sources), self.cases)
         self.declared = np.full(shape, math.nan)
-        self.edge = np.empty(shape)  # of a position error at the aperture's, of a unit [m]
+        self.edge = np.empty(shape)  # position error at the aperture's edge by a unit [m]
         published, full = np.empty((4, *shape)), np.empty((4, *shape))
         for index, source in enumerate(sources):
             if source.declared is not None:
@@ -209,10 +212,7 @@ class ErrorBlock:
 
     # ---------------------------------------------------------------- small errors
     def per_unit(self, model: str) -> Floats:
-        """Magnitudes of the judged phase and the cubic [rad], and of the displacement [m], by a small unit.
-
-        (3, errors, cases).
-        """
+        """Magnitudes of judged phase, cubic phase [rad] and displacement [m] by a small unit, (3, errors, cases)."""
         if model not in self._per_unit:
             effect = self.effects[model]
             moved = np.hypot(*self.table.planes[model].displacement(effect, 1.0))
@@ -248,8 +248,8 @@ class ErrorBlock:
     def _strays(self, size: Floats) -> Floats:
         """Bound of the displacement by the phase that is left, in metres.
 
-        A platform that is moved within the aperture sees the ground in another direction, by r̃/R. Where that turns
-        as the phase does, V is less beside the point: by H⁻¹⟨r̃/R, ρ⟩.
+        A platform that an error moves within the aperture sees the ground in another direction, by r̃/R. Where this
+        direction turns as the phase does, V is smaller beside the point: the point strays by H⁻¹⟨r̃/R, ρ⟩.
         """
         full, exact, bent = self.effects["full"], self.exact, self._bent(size)
         hidden, beyond_cubic = self.hidden_per_unit
@@ -259,9 +259,9 @@ class ErrorBlock:
         return np.asarray(turns * remaining_m * (1 + exact.band) / exact.matrix.least)
 
     def _bent(self, size: Floats) -> Any:
-        """How far errors take platforms from where small ones do, times what is known of them, (errors, cases). [m]
+        """Distance by which errors take platforms from where small errors take them, (errors, cases). [m]
 
-        Only a time tag is not proportional to its size. Where the direct path is the clock a metre is twice a metre.
+        Only a time tag is not proportional to its size. Where the direct path is the clock, each metre counts twice.
         """
         tags = [index for index, source in enumerate(self.sources) if source.is_time_tag]
         if not tags:
@@ -274,9 +274,10 @@ class ErrorBlock:
     def _grows(self, size: Floats, strays: Floats) -> Floats:
         """Bound of the range error that the second order of errors adds, in metres.
 
-        Of two platforms it is −Σ|P⊥(r̃ − x̂)|²/2R, at most |r̃ − x̂|²/R of the nearer one. With a direct path that of
-        the ranges is kept apart by platform: of a distant one much cancels to first order. That of the distance,
-        |P⊥r̃|²/2D, has the other sign: no more than the larger is added.
+        The second order of two platforms is −Σ|P⊥(r̃ − x̂)|²/2R, at most |r̃ − x̂|²/R of the nearer platform. With a
+        direct path the second order of the ranges is kept apart by platform: for a distant platform much of it
+        cancels to first order. The second order of the distance, |P⊥r̃|²/2D, has the opposite sign, so the sum is no
+        more than the larger term.
         """
         exact, bent = self.exact, self._bent(size)
         shift, moved = size * self.edge + bent, size * self.per_unit("full")[2] + strays
@@ -293,7 +294,7 @@ class ErrorBlock:
         return np.asarray(growth + bent)
 
     def is_large(self, size: Floats) -> Truths:
-        """Where effects of errors are not proportional to their size, as far as anybody can see."""
+        """Whether effects of errors may not be proportional to their size, by the bounds of the second order."""
         size = np.abs(size)
         large = np.zeros(size.shape, dtype=bool)
         for added, per_unit, floor in zip(self.adds(size), self.per_unit("full"), _FLOORS, strict=True):
@@ -302,7 +303,7 @@ class ErrorBlock:
 
     @cached_property
     def is_declared_large(self) -> Truths:
-        """The same of the declared sizes."""
+        """Whether effects of the declared errors may not be proportional to their size."""
         return self.is_large(self.declared)
 
     @cached_property
@@ -329,7 +330,7 @@ class ErrorBlock:
         return effects
 
     def _exactly(self, effects: Declared, size: Floats, is_large: Truths) -> None:
-        """Put what exact ranges say into the places that are too large for a first order."""
+        """Replace the effects of errors too large for a first order by the effects of exact ranges."""
         sizes = size[is_large]
         points = self.followed(is_large, np.abs(sizes))
         ahead, back = (np.where(sizes > 0, *pair) for pair in (points, points[::-1]))
@@ -340,7 +341,7 @@ class ErrorBlock:
         for kept, row in zip(phases, rows, strict=True):
             largest = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[is_large])
             kept[is_large] = np.where(is_gone, math.inf, largest)
-        # The larger of the judged phases, of which the larger quadratic phase may be of the other sign.
+        # The larger of the judged phases. The larger quadratic phase may have the opposite sign.
         gain = np.broadcast_to(self.table.gain, size.shape)[is_large]
         judged = np.maximum(
             *(np.hypot(each[point_paths.QUADRATIC], gain * each[point_paths.HIDDEN]) for each in (ahead, back))
@@ -352,7 +353,7 @@ class ErrorBlock:
             east[is_large], north[is_large] = each[point_paths.EAST], each[point_paths.NORTH]
 
     def followed(self, errors: Truths, sizes: Floats) -> Floats:
-        """Rows of known points of some errors by sizes, of the positive sign and of the other, (2, rows, some)."""
+        """Rows of known points of some errors at sizes, by the positive and the negative sign, (2, rows, some)."""
         lanes = np.concatenate(self._lanes_of(errors))
         both = np.tile(sizes, 2)
         self.paths.follow_to(lanes, both)
@@ -360,7 +361,7 @@ class ErrorBlock:
 
     @cached_property
     def _lane(self) -> Indices:
-        """Lane of each error with a positive sign, in each case; those with the other sign follow."""
+        """Lane of each error with a positive sign, in each case; the lanes with a negative sign follow."""
         first_lane = np.zeros((len(self.sources), 1), dtype=int)
         first_lane[self.moves, 0] = 2 * self.cases * np.arange(len(self.moves))
         return first_lane + np.arange(self.cases)
@@ -371,7 +372,7 @@ class ErrorBlock:
 
     @property
     def paths(self) -> PointPaths:
-        """The ways of the point by the errors that displace it: of each positive sign first."""
+        """Paths of the image point by the errors that displace it; the positive sign of each error comes first."""
         if self._follows is None:
             table, full = self.table, self.effects["full"]
             lanes = table.lanes(*(self.sources[index] for index in self.moves), signs=(1.0, -1.0))
@@ -382,14 +383,14 @@ class ErrorBlock:
         return self._follows
 
     def forget(self) -> None:
-        """Let go of the ways: they are large."""
+        """Free the memory of the paths, which are large."""
         self._follows = None
 
     @cached_property
     def quadratic_by_sign(self) -> Floats:
         """Quadratic phases of the declared errors of each sign, positive first, where they are large. [rad]
 
-        (2, errors, cases), not a number where they leave no image.
+        (2, errors, cases), NaN where they leave no image.
         """
         phases = np.full((2, *self.declared.shape), math.nan)
         is_large = self.is_declared_large
@@ -398,12 +399,12 @@ class ErrorBlock:
             phases[:, is_large] = points[:, point_paths.QUADRATIC]
         return phases
 
-    # ---------------------------------------------------------------- how large they may be
+    # ---------------------------------------------------------------- allowable sizes
     @cached_property
     def farthest(self) -> Floats:
-        """Size beyond which none is looked for; infinite: an error has no effect whatever its size.
+        """Largest size of the search for a limit; infinite for an error that has no effect at any size.
 
-        A larger error of a path is none of navigation.
+        A larger error of a path is no navigation error.
         """
         slant = [path.slant_range for path in self.table.geometries.both]
         size = np.full(self.declared.shape, math.inf)
@@ -415,20 +416,20 @@ class ErrorBlock:
                 size[index] = FARTHEST_RANGE_FRACTION * nearer / self.edge[index]
             else:
                 # A clock takes no platform anywhere. No range sum is shorter than the distance of the platforms, and
-                # that is at least the sum less twice the nearer range: by then an image has ended.
+                # this distance is at least the sum less twice the nearer range: by then an image has ended.
                 course = self.exact.clock_course(source.clock or ())
                 size[index] = 2 * np.minimum(*slant) / np.abs(course).max(axis=0)
         return size
 
     def allowed(self, model: str, limits: Sequence[Any], *, is_complete: bool) -> Allowed:
-        """How large errors may be by a model.
+        """Allowable sizes of errors by a model.
 
         Parameters
         ----------
         model : str
             `published` or `full`.
         limits : three of (errors, cases) or (cases,) or None
-            What quadratic, cubic phase [rad] and displacement [m] are held to; None: to nothing.
+            Limits of quadratic phase, cubic phase [rad] and displacement [m]; None: no limit.
         is_complete : bool
             Search for the size that the quadratic phase alone allows too.
         """
@@ -452,7 +453,7 @@ class ErrorBlock:
         return Allowed(smallest, quadratic if is_complete else smallest, binding)
 
     def ends_image(self, size: Floats) -> Truths:
-        """Whether allowables, as found, are where the image ends."""
+        """Whether the image ends at the allowables that were found."""
         ends_there = np.zeros(size.shape, dtype=bool)
         if self._follows is not None:
             sizes = size[self.moves]
@@ -461,22 +462,23 @@ class ErrorBlock:
         return ends_there
 
     def _limit(self, requirement: int, limit: Any) -> Floats:
-        """A limit of each error, not a number: none; what only is a phase is held to that of the quadratic."""
+        """A limit of each error; NaN: no limit. A pure phase error has the limit of the quadratic phase alone."""
         limit = math.nan if limit is None else limit
         limits = np.broadcast_to(limit, self.declared.shape)
         return limits if requirement == 0 else np.where(self.is_motion, limits, math.nan)
 
     def _searched(self, limit: Floats, small: Floats, required: Sequence[int], *, is_complete: bool) -> Floats:
-        """Smallest sizes, of either sign, at which errors reach limits, (3, errors, cases); infinite: none does.
+        """Smallest sizes, of either sign, at which errors reach limits, (3, errors, cases); infinite: never.
 
-        `small` are the sizes were effects those of small errors. None is looked for that takes its platform farther
-        than a tenth of the slant range, or than the declared one does; nor, but for what the quadratic phase allows
-        where `is_complete`, beyond what another limit allows: the one that binds is likely to be found first.
+        `small` are the sizes if all effects were the effects of small errors. The search ends at the size that takes
+        the platform farther than a tenth of the slant range, or farther than the declared error takes it. It also
+        ends at the size that another limit allows, except for the quadratic phase where `is_complete`. The limit that
+        is likely to bind is searched first.
         """
         most = np.fmax(self.farthest, np.abs(self.declared))
         smallest = np.full(small.shape, math.inf)
         searches = list[LimitSearches]()
-        # Few are all searched for together.
+        # A few searches run together.
         is_together = tries_several_sizes(2 * len(required) * self.declared.size, self.table.is_complete)
         for turn in np.array(required)[np.argsort(small[required], axis=0, kind="stable")]:
             of, first = (np.take_along_axis(sizes, turn[None], axis=0)[0] for sizes in (limit, small))
@@ -515,22 +517,22 @@ class DeclaredErrors:
     mission : Mission
         Some of its numbers may be arrays (cases,).
     cases : int
-        How many.
+        Number of cases.
     geometries : BistaticGeometry
-        Of the cases.
+        Geometry of the cases.
     exact : ExactRanges
-        Of the cases.
+        Exact ranges of the cases.
     shown : container of str, optional
-        Ids of rows: of what is not declared, nothing else is listed; omitted: everything is.
+        Ids of the rows to list in addition to the declared errors; omitted: every row is listed.
     gain : float or (cases,)
-        Factor by which autofocus lets quadratic phases be larger; none of the hidden ones.
+        Factor by which autofocus lets quadratic phases be larger. Hidden phases get no such factor.
     is_complete : bool
-        All of each row is asked for, and alike whatever the number of cases.
+        Compute all numbers of each row, in the same way for any number of cases.
 
     Attributes
     ----------
     listed, stated : list of ErrorSource
-        All of them, and the declared ones along the axes that the file states them in.
+        All errors, and the declared errors along the axes in which the file states them.
     """
 
     def __init__(
@@ -566,11 +568,11 @@ class DeclaredErrors:
         self._does: dict[tuple[str, int], Declared] = {}
 
     def array(self, value: Any) -> Floats:
-        """One number for each case."""
+        """One number for each case, (cases,)."""
         return np.full(self.cases, value, dtype=float)
 
     def lanes(self, *errors: ErrorSource, signs: Sequence[float] = (1.0,)) -> Lanes:
-        """A unit of errors, of each sign, in each case; by error, sign and case."""
+        """Lanes of unit errors, ordered by error, then sign, then case."""
         moved = [error.platforms for error in errors]
         orders = [self._order(error) for error in errors]
         courses = np.array([self._course(error, order) for error, order in zip(errors, orders, strict=True)])
@@ -589,13 +591,13 @@ class DeclaredErrors:
         return Lanes(case, at_nodes.reshape(len(at_nodes), -1), (u, v), (x, y, z), order, of_receiver, tags)
 
     def edge_of(self, error: ErrorSource) -> Any:
-        """Position error at the aperture's edge by a unit of an error, the larger of both platforms; 0 of a clock."""
+        """Position error at the aperture's edge by a unit of an error, the larger of both platforms; 0 by a clock."""
         if not error.is_time_tag:
             return self.edge.get(error.unit, 0.0)
         return np.max([norm(error.direction_of(platform)).max(axis=0) for platform in error.platforms], axis=0)
 
     def bent(self, error: ErrorSource, size: Floats) -> Floats:
-        """How far a time tag, of either sign, takes its platforms from where their velocities lead, added. [m]"""
+        """Distance of a time tag's shift, of either sign, from a shift along the velocity, platforms added. [m]"""
         times, bend = self.exact.times, np.zeros(self.cases)
         for platform in error.platforms:
             path, straight = self.geometries.both[platform], error.direction_of(platform)
@@ -614,23 +616,23 @@ class DeclaredErrors:
         return bend
 
     def _order(self, error: ErrorSource) -> int:
-        """Power of slow time with which a position error grows: -1 of a clock, 0 of a time tag, whose way turns."""
+        """Power of slow time with which a position error grows: -1 for a clock, 0 for a time tag, which may turn."""
         if not error.platforms:
             return -1
         return 0 if error.is_time_tag else list(self.edge).index(error.unit)
 
     def _course(self, error: ErrorSource, order: int) -> Floats:
-        """Position error at the nodes of a unit of an error, or the range error of what moves no platform."""
+        """Position error at the nodes by a unit of an error, or its range error where it moves no platform."""
         exact = self.exact
         if order >= 0:
             return exact.powers[list(self.edge)[order]]
         if error.clock is not None:
             return exact.clock_course(error.clock)
-        # A phase as such: a quadratic that displaces nothing.
+        # A pure phase error: a quadratic that displaces nothing.
         return np.asarray(((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
 
     def _of_each(self, values: Sequence[Any], signs: int) -> Any:
-        """One value of each error for its lanes, or the one that all have; of ways that turn at each node."""
+        """One value of each error for its lanes, or the value that all share; turning directions at each node."""
         if any(np.ndim(value) > 1 for value in values):
             count = self.exact.fit.shape[1]
             turning = np.stack([np.broadcast_to(value, (count, self.cases)) for value in values], axis=1)
@@ -640,7 +642,7 @@ class DeclaredErrors:
         return values[0] if len(set(values)) == 1 else np.repeat(values, signs * self.cases)
 
     def block_of(self, error: ErrorSource) -> tuple[ErrorBlock, int]:
-        """The block that has an error, and its place there."""
+        """The block that contains an error, and the error's index in the block."""
         block, index = self._place[error.id]
         return self.blocks[block], index
 
@@ -657,24 +659,24 @@ class DeclaredErrors:
         return self._does[key]
 
     def is_large(self, error: ErrorSource) -> Truths:
-        """In which cases effects of a declared error are not proportional to its size."""
+        """Cases in which effects of a declared error are not proportional to its size."""
         block, index = self.block_of(error)
         return np.asarray(block.is_declared_large[index])
 
     def quadratic_by_sign(self, error: ErrorSource) -> Floats:
         """Quadratic phases of a declared error of each sign, positive first, where it is large, (2, cases). [rad]
 
-        Not a number where it leaves no image.
+        NaN where the error leaves no image.
         """
         block, index = self.block_of(error)
         return block.quadratic_by_sign[:, index]
 
     def doubts(self, model: str, is_over: Any) -> Any:
-        """Where a model that does not gate casts a doubt; the published one does not know a direct path."""
+        """Cases in which a model that does not gate raises a doubt. The published model knows no direct path."""
         return False if model == "published" and self.has_direct_path else is_over
 
     def degeneracy(self, model: str, case: int = 0) -> Note:
-        """Why a model has no displacement in a case; nothing where it has one."""
+        """Why a model has no displacement in a case; empty where it has a displacement."""
         if model == "full" or not plain(self.planes[model].is_singular, case):
             return NOTHING
         degrees = plain(self.published_angle_deg, case)
@@ -684,28 +686,28 @@ class DeclaredErrors:
 
 
 class Model:
-    """One of both models of one collection, for whoever asks for a single error: plain numbers, None for nothing."""
+    """One model of one collection, for questions about a single error: plain numbers, None for a missing value."""
 
     def __init__(self, errors: DeclaredErrors, name: str) -> None:
         self.errors, self.exact, self.name = errors, errors.exact, name
         self.is_published = name == "published"
-        self.is_blind = self.is_published and errors.has_direct_path  # to what the collection has
+        self.is_blind = self.is_published and errors.has_direct_path  # to the direct path
         self.plane, self.degeneracy = errors.planes[name], errors.degeneracy(name)
 
     def effect(self, source: ErrorSource) -> Effect | FullEffect:
-        """Effect of a unit of an error; by the full model of one too small for a second order."""
+        """Effect of a unit of an error; in the full model, of an error too small for a second order."""
         return source.effect if self.is_published else source.full
 
     def displacement(self, effect: Effect | FullEffect, size: float) -> GroundVector | None:
-        """Displacement on the ground by (25) with the Q of the model; None where that has no inverse. [m]"""
+        """Displacement on the ground by (25) with the Q of the model; None where Q has no inverse. [m]"""
         return point(self.plane.displacement(effect, size))
 
     def equation(self, source: ErrorSource) -> str:
-        """Where it comes from."""
+        """Source of the effect: an equation or a table."""
         return source.equation if self.is_published or not source.is_motion else "full model"
 
     def no_limit(self, source: ErrorSource) -> Note:
-        """Say why an error has no limit from its quadratic phase."""
+        """Reason why the quadratic phase of an error sets no limit."""
         if self.is_published or not source.is_heard:
             return source.no_limit
         return phrases.no_size_reaches_the_limit() if source.is_motion else phrases.no_quadratic_phase()
@@ -718,9 +720,9 @@ class Model:
         return block.does(self.name, sizes).of(index).in_one_case()
 
     def allowed(self, source: ErrorSource, limits: Sequence[float | None]) -> tuple[float | None, str | None]:
-        """Smallest size, of either sign, at which an error reaches a limit, and which of `HELD` that is; or None.
+        """Smallest size, of either sign, at which an error reaches a limit, and which of `HELD` it reaches; or None.
 
-        `limits` are those of quadratic and cubic phase [rad], and of the displacement. [m]
+        `limits` are the limits of quadratic and cubic phase [rad], and of the displacement. [m]
         """
         block, index = self.errors.block_of(source)
         limits_of_block: list[Any] = []
@@ -737,18 +739,18 @@ class Model:
         return self.allowed(source, [limit if name == requirement else None for name in HELD])[0]
 
     def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
-        """Size at which an error would reach a limit, were its effects those of a small one; infinite: never."""
+        """Size at which an error would reach a limit if its effects were proportional to it; infinite: never."""
         block, index = self.errors.block_of(source)
         per_unit = float(block.per_unit(self.name)[HELD.index(requirement), index, 0])
         return limit / per_unit if per_unit else math.inf
 
     def hidden_per_unit(self, source: ErrorSource) -> float:
-        """Hidden phase of a small unit of an error; to the published model there is none. [rad/unit]"""
+        """Hidden phase of a small unit of an error; 0 in the published model. [rad/unit]"""
         block, index = self.errors.block_of(source)
         return 0.0 if self.is_published else float(block.hidden_per_unit[0, index, 0])
 
     def ends_image(self, source: ErrorSource, size: float) -> bool:
-        """Whether an allowable, as found, is where the image ends; to a linear model none does."""
+        """Whether the image ends at an allowable that was found; never by a linear model."""
         block, index = self.errors.block_of(source)
         return not self.is_published and bool(block.ends_image(np.full(block.declared.shape, size))[index, 0])
 
@@ -764,12 +766,12 @@ class Model:
 
     # ---------------------------------------------------------------- by exact ranges
     def is_small(self, source: ErrorSource, size: float) -> bool:
-        """Whether effects of an error are proportional to its size, as far as anybody can see."""
+        """Whether effects of an error are proportional to its size, by the bounds of the second order."""
         block, index = self.errors.block_of(source)
         return not block.is_large(np.full(block.declared.shape, size))[index, 0]
 
     def at(self, source: ErrorSource, size: float) -> ExactEffect | None:
-        """Phases and displacement of an error of a size, with its sign, by exact ranges; None: no ground point."""
+        """Phases and displacement of an error of a signed size, by exact ranges; None without a ground point."""
         block, index = self.errors.block_of(source)
         is_asked = np.zeros(block.declared.shape, dtype=bool)
         is_asked[index] = True
@@ -788,7 +790,7 @@ class Model:
         return range_error
 
     def left_over_small(self, source: ErrorSource, size: float) -> Sequence[float]:
-        """The same at the displaced point, of an error so small that its effects are proportional to it. [m]"""
+        """Range error left at the displaced point by an error so small that its effects are proportional. [m]"""
         east, north = self.displacement(source.full, size) or (0.0, 0.0)
         by_east, by_north = self.exact.slopes
         remaining = size * self.exact.range_error(self.errors.lanes(source)) + east * by_east + north * by_north

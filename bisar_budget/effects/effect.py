@@ -1,7 +1,7 @@
 """Effect of one unit of an error on the range history and the image, by both models; its subject and its name.
 
-Effects are those of Rigling & Moses (Tables I and II), and of the full model, which lets the line of sight turn and
-counts what the displacement of the image adds (`ranges.exact_ranges`).
+The published effects follow Rigling & Moses (Tables I and II). The full model lets the line of sight turn and counts
+the phase that the displacement of the image adds (`ranges.exact_ranges`).
 """
 
 import math
@@ -24,13 +24,13 @@ MOTION = ("position", "velocity", "acceleration")  # kinds of error that a platf
 
 
 class Subject(NamedTuple):
-    """The thing that a row or an error is about. `subject` makes it, with its id; nobody reads an id to find out.
+    """The subject of a row or an error. `subject` makes it together with its id, so that no code has to parse an id.
 
-    `owner` is the one whose share it counts against: transmitter, receiver, clock, or mission for what is nobody's.
-    `kind` is position, velocity, acceleration, time_tag, vibration, timing, propagation, dispersion, terrain, other,
-    specification, or the name of a sum. `axis` is the axis of `frame`, the term of the clock, the figure of a sensor
-    or the air, the name of another error, the key that is specified, the sort of a vibration, and `entry` the place
-    of one in the file.
+    `owner` owns the share of the budget that the error uses: transmitter, receiver, clock, or mission where no part
+    of the system owns the error. `kind` is position, velocity, acceleration, time_tag, vibration, timing,
+    propagation, dispersion, terrain, other, specification, or the name of a sum. `axis` is the axis of `frame`, the
+    term of the clock, the figure of a sensor or of the air, the name of an error from elsewhere, the specified key,
+    or the sort of a vibration. `entry` is the index of the error in a list of the file.
     """
 
     id: str
@@ -44,9 +44,9 @@ class Subject(NamedTuple):
 @cache
 def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: int | None = None) -> Subject:
     """Name an error or a sum as the contract does."""
-    if kind in ("timing", "other", "specification"):  # of one owner each
+    if kind in ("timing", "other", "specification"):  # kinds with one possible owner
         parts = [kind, axis]
-    elif kind == "propagation":  # of one air over both legs, or of one leg
+    elif kind == "propagation":  # one air over both legs, or one leg
         parts = [kind, "" if owner == "mission" else owner, axis]
     elif kind == "dispersion":
         parts = ["propagation", kind]
@@ -62,11 +62,11 @@ def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: 
 PLATFORMS = ("transmitter", "receiver")
 MOTION_UNITS = dict(zip(MOTION, ("m", "m/s", "m/s^2"), strict=True))
 CLOCK_UNITS = {"constant": "s", "linear": "s/s", "quadratic": "1/s", "cubic": "1/s^2"}  # t̃₀ … t̃₃ of (1)
-NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of what is no motion
+NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of an error that is no motion
 
 
 def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: str) -> tuple[Note, ...]:
-    """Say which figures of parts the file replaces, of these or of all."""
+    """Notes on the figures of parts that the file replaces: the named `figures`, or all figures."""
     return tuple(
         phrases.overrides_a_part(f"platforms.{platform}.{figure.key}", figure.text, figure.part)
         for figure in overridden
@@ -75,28 +75,31 @@ def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: 
 
 
 def plain(column: Any, case: int = 0) -> float:
-    """The number of a case, by its place; one that all cases have is that of each."""
+    """The number of a case, by its index. A single number counts for every case."""
     if not isinstance(column, np.ndarray):
         return float(column)
     return float(column.item(case if column.size > 1 else 0))
 
 
 def _plain_way(component: Any) -> Any:
-    """A component of a direction in one case; of one that turns all nodes."""
+    """A component of a direction in one case. A component that turns keeps all its nodes."""
     return component if np.ndim(component) > 1 else plain(component)
 
 
 class ErrorSource(NamedTuple):
-    """One error: what it is, how large it is declared, what one unit of it does; in one case, or in many as arrays.
+    """One error: subject, declared size and the effect of one unit. Numbers are plain, or arrays over cases.
 
-    `declared` is signed and includes the
-    coverage factor; None where the file is silent. `is_independent` marks the errors as the file states
-    them: sums and root-sum-squares run over these alone, so that an error stated along the track is not
-    counted again by its components along the scene's axes. `direction` is a unit vector of the scene, zero for
-    what is no motion; of the mission's own it is that of both platforms, unless the receiver has another one. That of
-    a time tag is the velocity at the nodes of the aperture, (nodes, cases), along which a small one moves. [m/s]
-    `clock` are t̃₀ … t̃₃ of a unit of an error of the clock, zeros where nothing of it is heard; None for any other
-    error.
+    `declared` is signed and includes the coverage factor. It is None where the file declares no size.
+    `is_independent` marks the errors as the file states them. Sums and root-sum-squares run over these errors alone,
+    so that an error stated along the track is not counted again by its components along the scene's axes.
+
+    `direction` is a unit vector of the scene, or zero for an error that is no motion. For an error of the mission,
+    `direction` holds for both platforms, unless `of_receiver` gives the receiver a direction of its own. The
+    direction of a time tag is the velocity at the nodes of the aperture, (nodes, cases), along which a small time tag
+    moves the platform. [m/s]
+
+    `clock` holds t̃₀ … t̃₃ of a unit of a clock error, zeros where synchronisation removes the error. It is None for
+    any other error.
     """
 
     subject: Subject
@@ -116,11 +119,11 @@ class ErrorSource(NamedTuple):
 
     @property
     def id(self) -> str:
-        """That of its row."""
+        """Id of the error's row."""
         return self.subject.id
 
     def in_one_case(self) -> "ErrorSource":
-        """The same with plain numbers in the place of arrays of one case."""
+        """The same error with plain numbers instead of arrays of one case."""
         effect, full = Effect._make(map(plain, self.effect)), FullEffect._make(map(plain, self.full))
         declared = None if self.declared is None else plain(self.declared)
         clock = self.clock and tuple(map(plain, self.clock))
@@ -130,53 +133,53 @@ class ErrorSource(NamedTuple):
         )
 
     def direction_of(self, platform_index: int) -> Any:
-        """Direction in which it moves a platform."""
+        """Direction in which the error moves a platform."""
         return self.of_receiver if platform_index == 1 and self.of_receiver is not None else self.direction
 
     @property
     def owner(self) -> str:
-        """Whose share it counts against: transmitter, receiver, clock or mission."""
+        """Owner of the share that the error counts against: transmitter, receiver, clock or mission."""
         return self.subject.owner
 
     @property
     def is_motion(self) -> bool:
-        """Whether it moves platforms, or the clock: what only is a phase displaces nothing."""
+        """Whether the error moves platforms or the clock. A pure phase error displaces nothing."""
         return self.unit != "rad"
 
     @property
     def is_time_tag(self) -> bool:
-        """Whether it takes a path for what it is later: not proportional to its size where the path turns."""
+        """Whether the error shifts a path in time. On a turning path its effect is not proportional to its size."""
         return self.subject.kind == "time_tag"
 
     @property
     def is_covered(self) -> bool:
-        """Whether the coverage factor is in what is declared: not of the terrain, and not of what only is a phase."""
+        """Whether the declared size includes the coverage factor: not for terrain or a pure phase error."""
         return self.subject.kind in (*MOTION, "time_tag") or self.clock is not None
 
     @property
     def is_heard(self) -> bool:
-        """Whether data have it: of a clock, whether what synchronises it leaves any."""
+        """Whether the data contain the error. For a clock error: whether synchronisation leaves any of it."""
         return self.clock is None or any(map(np.any, self.clock))
 
     @property
     def displaces(self) -> bool:
-        """Whether it moves platforms, or a clock that is listened to."""
+        """Whether the error moves platforms, or a clock whose errors the data contain."""
         return self.is_motion and self.is_heard
 
     @property
     def is_position(self) -> bool:
-        """Whether it is an error of a platform's measured path, or of both."""
+        """Whether the error is in the measured path of a platform, or of both platforms."""
         return self.is_motion and self.clock is None
 
     @property
     def platforms(self) -> tuple[int, ...]:
-        """Places of the platforms whose position it is an error of; one of the mission's own is of both."""
+        """Indices of the platforms whose position has the error. An error of the mission is in both positions."""
         owners = (self.owner,) if self.owner in PLATFORMS else PLATFORMS
         return tuple(map(PLATFORMS.index, owners)) if self.is_position else ()
 
     @property
     def is_common(self) -> bool:
-        """Whether it is one error of the paths of both platforms."""
+        """Whether the paths of both platforms share the error."""
         return self.owner == "mission" and self.subject.kind in (*MOTION, "time_tag")
 
 
@@ -193,7 +196,7 @@ class LinePiece(NamedTuple):
 
 
 def gradients_of(model: str) -> str:
-    """Say by which gradients of range and Doppler a model has Q_i: what is printed, or what is true."""
+    """Name the gradients of range and Doppler from which a model forms Q_i: as printed, or true."""
     return PRINTED if model == "published" else TRUE
 
 
@@ -205,14 +208,14 @@ def indicated_point(
     Parameters
     ----------
     geometry : BistaticGeometry
-        Of the whole aperture.
+        Geometry of the whole aperture.
     piece : LinePiece
-        Of the range error; what the scatterer itself has is no part of it.
+        Piece of the range error, without the range history of the scatterer itself.
     model : str
-        `published`: Q_i of (30) as printed, platforms where they are at τ_i, speeds over ranges held constant. Any
-        other: the gradients that the lines of sight have at τ_i.
+        `published`: Q_i of (30) as printed, with the platforms at their positions at τ_i and speeds over ranges held
+        constant. Any other name: the true gradients of the lines of sight at τ_i.
     seen_from : (2,)
-        Where the scatterer lies. [m]
+        Position of the scatterer, east and north. [m]
 
     Returns
     -------

@@ -1,18 +1,18 @@
-"""Errors of navigation at random: figures of inertial sensors, lever arms, and noise of a position.
+"""Random navigation errors: figures of inertial sensors, lever arms, and noise of a position.
 
-Biases of an inertial sensor are one error over the aperture, noise is another at every moment; both count from
-mid-aperture on: position and velocity there are what aiding leaves, and the mission declares them. What tilts also
-swings a lever arm, where the file states one, and an error of the attitude at mid-aperture does so there already.
+A bias of an inertial sensor is one error over the aperture; noise is another error at every moment. Both count from
+mid-aperture on: the mission declares the position and velocity errors that aiding leaves there. A tilt also swings a
+lever arm, if the file states one. An error of the attitude at mid-aperture swings the arm there already.
 
 A lever arm leads from the navigation's reference to the antenna's phase centre, in axes that turn with the body.
-These are along, cross and up of the velocity, at every moment of the aperture; those of a platform that stands still
-are the scene's. The antenna's position is the navigation's plus R(τ)·l. An error δl of the arm is carried along,
-R(τ)·δl: a displacement, and as the body turns a defocus. An attitude error ψ swings the arm, ψ × R(τ)·l. It keeps its
-direction in space, as that of a strapdown navigation with perfect gyros does, and as it does where it turns the
-specific force. A gyro's bias ε lets it grow, ψ = ε·τ, its noise lets it walk.
+These axes are along, cross and up of the velocity, at every moment of the aperture; for a platform at rest they are
+the scene's axes. The antenna's position is the navigation's position plus R(τ)·l. An error δl of the arm is carried
+along, R(τ)·δl: it displaces, and as the body turns it defocuses. An attitude error ψ swings the arm, ψ × R(τ)·l. It
+keeps its direction in space, like the error of a strapdown navigation with perfect gyros, and also where it turns the
+specific force. A gyro's bias ε makes it grow, ψ = ε·τ; a gyro's noise makes it walk.
 
-The same ψ acts through the specific force and through the arm. So a figure of an inertial sensor has both in its own
-row, and what attitude does through the arm alone is a row that counts nowhere again. Derived here.
+The same ψ acts through the specific force and through the arm. So a figure of an inertial sensor has both effects in
+its own row. The effect of attitude through the arm alone has a row that counts nowhere else. Derived here.
 """
 
 import math
@@ -58,12 +58,12 @@ _GROWS = {
 
 # ---------------------------------------------------------------------- inertial sensors
 CORRELATED = ("random", "trajectory")  # kinds of error that are correlated noise of a position
-_CONSTANT_S = 1e9  # correlation time of what is constant over any aperture
+_CONSTANT_S = 1e9  # correlation time of an error that is constant over any aperture
 _UNIFORM_SIGMA_RATIO = 12**-0.5  # sigma of an error that is uniform over a step
 
 
 def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
-    """Process of an error that is correlated noise of a position; along the axes that `process_axes` gives."""
+    """Process of an error that is correlated noise of a position, along the axes of `process_axes`."""
     if error.subject.kind == "trajectory":
         return _log_process(mission, error.owner, error.subject.axis)[0]
     motion: MotionError | CommonMotionError | None = mission.common_motion_error
@@ -74,7 +74,7 @@ def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
 
 
 def process_axes(mission: Mission, error: RandomError) -> dict[str, Floats]:
-    """Axes (3, 3) along which a process moves each platform that has it, by the platform's name."""
+    """Axes (3, 3) along which a process moves each platform, by the name of the platform."""
     if error.subject.kind == "trajectory":
         return {error.owner: _log_process(mission, error.owner, error.subject.axis)[1]}
     common, names = mission.common_motion_error, [error.owner]
@@ -86,7 +86,7 @@ def process_axes(mission: Mission, error: RandomError) -> dict[str, Floats]:
 
 
 def _log_process(mission: Mission, name: str, figure: str) -> tuple[GaussMarkov, Floats]:
-    """Noise of a log that is flown as it is, and its axes, in one case."""
+    """Noise of a log whose fixes are flown unsmoothed, and its axes, in one case."""
     path: FlownPath | None = getattr(mission.platforms, name).path
     assert path is not None
     assert path.log_noise is not None
@@ -98,9 +98,10 @@ def _log_process(mission: Mission, name: str, figure: str) -> tuple[GaussMarkov,
 def specific_force(mission: Mission, state: PlatformState) -> Vector:
     """Specific force of a platform, f = a − g, which accelerometers measure, in the axes of the scene. [m/s²]
 
-    Where it falls freely that is nothing. On the Earth g has what its rotation adds (`earth.free_fall`).
+    It is zero where the platform falls freely. On the Earth g includes the terms of the Earth's rotation
+    (`earth.free_fall`).
     """
-    from bisar_budget.paths.earth import free_fall  # 8 ms, and most missions name no sensor
+    from bisar_budget.paths.earth import free_fall  # the import takes 8 ms, and most missions name no sensor
 
     x, y, z = state.acceleration
     u, v, w = free_fall(state.position, state.velocity, mission.scene.axes)
@@ -108,10 +109,10 @@ def specific_force(mission: Mission, state: PlatformState) -> Vector:
 
 
 def acceleration_errors(kind: str, axes: Floats, force: Floats) -> Floats:
-    """Acceleration error by a unit of a figure about, or along, each axis, (axes, 3, ...), of those axes.
+    """Acceleration error by a unit of a figure about, or along, each axis, (axes, 3, ...), from axes of that shape.
 
-    A tilt turns what accelerometers measure, the specific force (3, ...); a scale factor is a part of it. What is an
-    acceleration is one. [m/s²/unit]
+    A tilt turns the specific force (3, ...), which accelerometers measure. A scale factor adds a part of it. A figure
+    that is an acceleration acts along its axis. [m/s²/unit]
     """
     if kind in TILTS:
         return np.asarray(np.cross(axes, force, axisa=1, axisb=0, axisc=1))
@@ -121,7 +122,7 @@ def acceleration_errors(kind: str, axes: Floats, force: Floats) -> Floats:
 
 
 def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Figures of a platform's inertial sensor, declared or not; none where it has no sensor."""
+    """Figures of a platform's inertial sensor, declared or not; empty without a sensor."""
     error = seen.error(name)
     if error.imu is None:
         return
@@ -158,7 +159,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
 def _moves_by_imu(
     seen: SensorCases, platform_index: int, kind: str, directions: Floats, about: Floats, arm: Floats | None
 ) -> tuple[Moves, ...]:
-    """How a unit moves a platform: by the acceleration it makes, (axes, 3, cases) [m/s²/unit], and with an arm."""
+    """Motion of a platform by a unit: through its acceleration, (axes, 3, cases) [m/s²/unit], and through an arm."""
     ways, half = directions[:, :, None], seen.exact.half
     if arm is None or kind not in TILTS:
         courses = _courses(kind, len(seen.exact.times))
@@ -175,13 +176,13 @@ def _moves_by_imu(
 
 
 def _at_mid_aperture(mission: Mission, index: int, along: Any) -> tuple[Any, ...]:
-    """Quadratic and cubic phase of a unit, and what is left, along so much of the line of sight. [rad]"""
+    """Quadratic phase, cubic phase and rest by a unit with the component `along` the line of sight. [rad]"""
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
     return evaluators.inertial_phases(along, along, along, wavelength, T)[index]
 
 
 def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> list[Any]:
-    """Sigmas of the displacement by a unit along so much of the line of sight of mid-aperture. [m]"""
+    """Sigmas of the displacement by a unit with the component `along` the line of sight of mid-aperture. [m]"""
     fit = seen.exact.fit[:2]
     if kind in NOISE:
         orders = fit @ _walk_of(kind, len(seen.exact.times)).at_nodes @ fit.T
@@ -195,7 +196,7 @@ def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> list[Any]:
 def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions: Floats) -> RandomEffect:
     """Effect of a unit by the full model over the exact paths; `directions` (axes, 3, cases) are its acceleration.
 
-    What a unit moves over an aperture grows as a power of half the aperture time from that over an aperture of 2 s.
+    The motion by a unit grows from the motion over an aperture of 2 s as a power of half the aperture time.
     """
     count, along = len(seen.exact.times), seen.range_errors(platform_index, directions[:, :, None])
     scale = seen.exact.half ** _GROWS[kind]
@@ -209,7 +210,7 @@ def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions
 
 
 def _walk_of(kind: str, count: int) -> "_Walks":
-    """Position by the noise of a figure: a white acceleration, or the rate of a tilt that turns specific force."""
+    """Position error by the noise of a figure: a white acceleration, or a white tilt rate turning specific force."""
     order = 1 if kind == "velocity_random_walk" else 2
     return _walks(order, order, count)
 
@@ -244,7 +245,7 @@ def arm_at(state: PlatformState, arm: Any, times: Floats) -> Floats:
 
 
 def swung(axes: Floats, arm: Floats) -> Floats:
-    """Displacement of an arm by a unit of tilt about each of some axes, (axes, 3, times, cases). [m/rad]
+    """Displacement of an arm by a unit of tilt about each of several axes, (axes, 3, times, cases). [m/rad]
 
     The arm is (3, times, cases) [m], the axes are (axes, 3, cases).
     """
@@ -253,7 +254,7 @@ def swung(axes: Floats, arm: Floats) -> Floats:
 
 
 def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Errors that attitude makes through a platform's arm, declared or not, and errors of the arm itself."""
+    """Errors of the attitude through a platform's arm, declared or not, and errors of the arm itself."""
     error = seen.error(name)
     lever: LeverArm | None = error.lever_arm
     if lever is None:
@@ -287,7 +288,8 @@ def _with_arm(
 ) -> tuple[RandomEffect, RandomEffect]:
     """Effects by both models of a unit of tilt about axes (axes, 3, cases), or of its rate or noise, with an arm.
 
-    `directions` (axes, 3, cases) is what it makes of the specific force [m/s²/unit], `arm` the arm at the nodes. [m]
+    `directions` (axes, 3, cases) is the acceleration by the tilt of the specific force [m/s²/unit]. `arm` is the arm
+    at the nodes. [m]
     """
     state, times = seen.geometry.both[platform_index], seen.exact.times
     swings = swung(about, arm)
@@ -295,7 +297,7 @@ def _with_arm(
         order = 2 if kind == "attitude" else 3
         grows = times**order / math.factorial(order)
         return seen.of_motion(platform_index, directions[:, :, None] * grows + swings * times ** (order - 2))
-    # The tilt walks, and twice integrated it is a position: two walks, of which each axis has its own.
+    # The tilt walks, and its double integral is a position: two walks, independent for each axis.
     along = [seen.range_errors(platform_index, way) for way in (directions[:, :, None], swings)]
     stated = seen.error(PLATFORMS[platform_index]).lever_arm
     assert stated is not None
@@ -303,7 +305,7 @@ def _with_arm(
     at_mid_aperture = [np.einsum("ac,eac->ec", seen.vector(state.look), way) for way in (directions, at_middle)]
     fit, half, k, count = seen.exact.fit, seen.exact.half, seen.exact.k, len(times)
     covariance, beyond, orders, beyond_cubic = (np.zeros(()) for _ in range(4))
-    for (i, a), (j, b) in product(enumerate((2, 0)), repeat=2):  # how often each is integrated
+    for (i, a), (j, b) in product(enumerate((2, 0)), repeat=2):  # number of integrations of each walk
         walk, scale = _walks(a, b, count), half ** (a + b + 1)
         moved = np.einsum("anc,amc->nmc", along[i], along[j])
         covariance = covariance + scale * walk.at_nodes[..., None] * moved
@@ -312,7 +314,7 @@ def _with_arm(
         orders = orders + np.diagonal(fit @ walk.at_nodes @ fit.T)[:, None] * power
         beyond_cubic = beyond_cubic + walk.left * power
     constant, linear, quadratic_power, cubic_power = np.maximum(orders, 0.0)
-    # What spreads is a mean power, which has no coverage factor.
+    # The spread is a mean power, which has no coverage factor.
     spread = k * np.sqrt(np.maximum(beyond_cubic, 0.0)) / seen.factor
     published = RandomEffect(
         k * np.sqrt(quadratic_power), k * np.sqrt(cubic_power), spread, *seen.moved(constant, linear)
@@ -323,8 +325,9 @@ def _with_arm(
 class _Walks(NamedTuple):
     """Two integrals of one white noise of density 1, from the middle of an aperture of 2 s on, each way.
 
-    Covariance of the first at the nodes with the second, (nodes, nodes), of their Legendre orders up to the last that
-    nodes tell apart; and the mean over the aperture of what they have in common beyond order 3, and beyond the last.
+    `at_nodes` is the covariance of the first integral with the second at the nodes, (nodes, nodes), by their Legendre
+    orders up to the last order that the nodes tell apart. `left` is the mean over the aperture of their product
+    beyond order 3, and `beyond` its mean beyond the last order.
     """
 
     at_nodes: Floats
@@ -334,9 +337,9 @@ class _Walks(NamedTuple):
 
 @cache
 def _walks(first: int, second: int, count: int) -> _Walks:
-    """The noise integrated once more than so many times, 0 is a walk, at so many nodes."""
+    """The noise integrated `first` + 1 and `second` + 1 times, at `count` nodes; 0 is a walk."""
     places, weights = np.polynomial.legendre.leggauss(2 * count)
-    start, weight = (1 + places) / 2, weights / 2  # on one side
+    start, weight = (1 + places) / 2, weights / 2  # on one side of the middle
     number = np.arange(count)
 
     def order_of(times: int) -> Floats:
@@ -346,7 +349,7 @@ def _walks(first: int, second: int, count: int) -> _Walks:
         return np.asarray((2 * number[:, None] + 1) / 2 * np.einsum("snp,sn->ps", _legendre(ahead, count), grown))
 
     both = np.einsum("is,js,s->ij", order_of(first), order_of(second), weight)
-    both = both * (1 + (-1.0) ** np.add.outer(number, number))  # that of the other side is as large
+    both = both * (1 + (-1.0) ** np.add.outer(number, number))  # the second side adds as much
     mean = 1 / ((first + second + 2) * (first + second + 1) * math.factorial(first) * math.factorial(second))
     at_nodes = _legendre(nodes(count).places, count)
     powers = np.diagonal(both) / (2 * number + 1)
@@ -356,9 +359,9 @@ def _walks(first: int, second: int, count: int) -> _Walks:
 
 @cache
 def _courses_of_both_walks(count: int) -> tuple[Floats, Floats]:
-    """Independent courses of a walk of a tilt over an aperture of 2 s, integrated twice, and as it is.
+    """Independent courses of a walk of a tilt over an aperture of 2 s: its double integral, and the walk itself.
 
-    Both are (courses, nodes): course by course they are of one noise.
+    Both are (courses, nodes). The same course of both has the same noise.
     """
     both = np.block([[_walks(a, b, count).at_nodes for b in (2, 0)] for a in (2, 0)])
     twice, once = np.split(factor(both).T, 2, axis=1)
@@ -380,22 +383,22 @@ def position_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def residual_subject(name: str) -> Subject:
-    """The subject of what a smooth path leaves of the log of a platform."""
+    """Subject of the residual that a smooth path leaves of a platform's log."""
     return subject(name, "trajectory", "residual")
 
 
 def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Noise of the log of a platform whose processor flies the fixes as they are; nothing of any other path.
+    """Noise of the log of a platform whose processor flies the fixes as they are; empty for any other path.
 
-    The residual of the smooth path is a process with the covariance of that residual and with its correlation; what
-    joins white fixes by straight lines is correlated over half an interval. It spreads, and has the part of the lower
+    The residual of the smooth path is a process with the covariance and the correlation of that residual. White fixes
+    joined by straight lines are correlated over half an interval. The process spreads, and has the part in the lower
     orders that noise has.
 
-    The grid of the fixes is an error that is uniform over a step, of the variance q²/12 along each coordinate. Where
-    the platform crosses many steps, the rounding of each fix is another one, is in the residual, and moves the image
-    by next to nothing. Where it crosses none, rounding is one error for all of the aperture, of which the residual
-    knows nothing. The log does not say which, and between both any part of the variance may be constant: it is taken
-    as constant, in addition to the residual.
+    The grid of the fixes is an error that is uniform over a step, with the variance q²/12 along each coordinate.
+    Where the platform crosses many steps, the rounding differs from fix to fix, is in the residual, and hardly moves
+    the image. Where the platform crosses no step, rounding is one error for all of the aperture, which the residual
+    does not contain. The log does not tell which case applies, and between both any part of the variance may be
+    constant. So the variance is taken as constant, in addition to the residual.
     """
     path: FlownPath | None = getattr(seen.mission.platforms, name).path
     log = None if path is None else path.log_noise
@@ -415,7 +418,7 @@ def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, Any
         )
         for matrix in (log.residual, log.grid)
     )
-    variances, ways = np.linalg.eigh(residual)  # (cases, 3), (cases, 3, 3): columns are the ways
+    variances, ways = np.linalg.eigh(residual)  # (cases, 3), (cases, 3, 3): columns are the directions
     steps = np.linalg.norm(grid, axis=2)
     along = grid / np.where(steps > 0, steps, 1.0)[..., None]
     return {
@@ -429,7 +432,7 @@ def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, Any
 
 
 def common_noise(seen: SensorCases) -> Iterator[RandomError]:
-    """Correlated noise that both platforms have in common: along each axis of its frame what both legs do adds."""
+    """Correlated noise that both platforms share: along each axis of its frame the effects on both legs add."""
     error = seen.mission.common_motion_error
     for index, process in enumerate(() if error is None else error.random):
         axes = {name: seen.axes(name, error.frame) for name in PLATFORMS} if error is not None else {}

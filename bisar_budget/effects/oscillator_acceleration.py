@@ -1,15 +1,15 @@
-"""Oscillators under acceleration: what vibration and turns of their platform do to their phase.
+"""Oscillators under acceleration: phase by vibration and by turns of their platform.
 
-The fractional frequency of an oscillator changes by y = Γ·a, with its acceleration sensitivity Γ. Γ is a vector that
-points anywhere: of what it may do the most counts, that is, its length, and the length of an acceleration.
+The fractional frequency of an oscillator changes by y = Γ·a, with its acceleration sensitivity Γ. Γ is a vector whose
+direction is unknown. The worst direction counts, that is, the length of Γ times the length of an acceleration.
 
-- A tone of a at f has the peak phase f₀·Γ·a/f. Of the motion itself it is a quarter of a turn away, so that powers of
-  the two add.
+- A tone of a at f has the peak phase f₀·Γ·a/f. It is a quarter of a turn away from the motion itself, so the powers
+  of the two add.
 - Random vibration has the phase S_φ = (Γ·f₀/f)²·S_a (Filler 1988).
 - A turn: specific force changes by the acceleration of the path against level flight, in which a clock is set. The
-  range error is c·∫Γ·a dτ = c·Γ·(v(τ) − v(0)): a constant acceleration is a frequency, which displaces, and what it
-  changes by within the aperture defocuses. Along three axes the root-sum-square of what each does is the most that a
-  Γ of that length does, in any direction. What falls freely feels nothing.
+  range error is c·∫Γ·a dτ = c·Γ·(v(τ) − v(0)). A constant acceleration is a frequency, which displaces; a change of
+  the acceleration within the aperture defocuses. The root-sum-square of the effects along three axes is the largest
+  effect of a Γ of that length in any direction. A platform that falls freely feels nothing.
 """
 
 import math
@@ -32,12 +32,12 @@ from bisar_budget.mission.vibrations import FeltVibration, Vibration
 from bisar_budget.ranges.exact_ranges import Floats
 
 PHASE = (1.0, 2.0)  # S_φ = (Γ·f₀)²·S_a/f²
-_FELT_ACCELERATION_MPS2 = 1e-6  # m/s², below which an acceleration of a path is none
-_EXCHANGE_START_COUNT = 8  # of exchanges within an interval, over which what they leave of a turn is a mean
+_FELT_ACCELERATION_MPS2 = 1e-6  # m/s²; a smaller acceleration of a path counts as none
+_EXCHANGE_START_COUNT = 8  # beginnings of the exchanges within an interval, over which the rest of a turn is averaged
 
 
 class Felt(NamedTuple):
-    """The vibration an oscillator feels, its own or that of its platform, and its sensitivity. [s²/m]"""
+    """The vibration that an oscillator feels, stated for it or for its platform, and its sensitivity. [s²/m]"""
 
     vibration: Vibration | FeltVibration
     sensitivity: Any
@@ -45,7 +45,7 @@ class Felt(NamedTuple):
 
 
 def felt(mission: Mission, name: str) -> Felt | None:
-    """Vibration that the oscillator of a platform feels; None where the file says nothing of its sensitivity."""
+    """Vibration that the oscillator of a platform feels; None where the file states no sensitivity."""
     platform = getattr(mission.platforms, name)
     oscillator: Oscillator | None = platform.oscillator
     if oscillator is None or oscillator.acceleration_sensitivity is None:
@@ -56,7 +56,7 @@ def felt(mission: Mission, name: str) -> Felt | None:
 
 
 def lacks_a_spectrum(mission: Mission, name: str) -> Any:
-    """Whether an oscillator feels a wideband vibration, in which cases: its phase f₀Γ·4π²·f·σ/g needs a frequency."""
+    """Cases in which an oscillator feels a wideband vibration: its phase f₀Γ·4π²·f·σ/g needs a frequency."""
     felt_vibration = felt(mission, name)
     if (
         felt_vibration is None
@@ -69,7 +69,7 @@ def lacks_a_spectrum(mission: Mission, name: str) -> Any:
 
 
 def is_unshaken(mission: Mission, name: str) -> bool:
-    """Whether an oscillator is sensitive to acceleration, and the file has neither vibration nor turn for it."""
+    """Whether an oscillator is sensitive to acceleration, but the file has neither vibration nor turn for it."""
     felt_vibration = felt(mission, name)
     is_heard = name == "receiver" or not mission.has_direct_path
     if (
@@ -85,10 +85,10 @@ def is_unshaken(mission: Mission, name: str) -> bool:
 class AcceleratedTone(NamedTuple):
     """A vibration as an oscillator's tone: platform, entry, frequency [Hz], amplitude of the acceleration [m/s²].
 
-    `free` is the peak phase by a unit of Γ of a free oscillator [rad/(s²/m)], `left` what the synchronization leaves
-    of it, `echo` the share of that which makes echoes. `in_quadrature` is the row of the vibration of the platform
-    that makes it, from which it is a quarter of a turn away; None of one along several axes, and of one that the
-    oscillator alone is said to feel.
+    `free` is the peak phase of a free oscillator by a unit of Γ [rad/(s²/m)]. `left` is the tone that the
+    synchronization leaves, and `echo` is the share of `left` that makes echoes. `in_quadrature` is the row of the
+    platform's vibration that makes the tone, from which the tone is a quarter of a turn away. It is None for a
+    vibration along several axes, and for a vibration that the file states for the oscillator alone.
     """
 
     name: str
@@ -103,24 +103,24 @@ class AcceleratedTone(NamedTuple):
 
     @property
     def subject(self) -> Subject:
-        """That of its row."""
+        """Subject of the tone's row."""
         return subject(self.name, "oscillator", "acceleration", entry=self.entry)
 
     @property
     def per_unit(self) -> Any:
-        """Peak phase of its echo at the centre frequency by a unit of Γ. [rad/(s²/m)]"""
+        """Peak phase of the tone's echo at the centre frequency by a unit of Γ. [rad/(s²/m)]"""
         return self.free * self.echo
 
     @property
     def phase(self) -> Any:
-        """Peak phase of its echo at the centre frequency. [rad]"""
+        """Peak phase of the tone's echo at the centre frequency. [rad]"""
         return self.per_unit * self.sensitivity
 
 
 def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[AcceleratedTone]:
-    """Tones of oscillators that vibrate; with a direct path as clock those of the receiver alone, heard twice.
+    """Tones of vibrating oscillators. With a direct path as clock, only the receiver's tones count, heard twice.
 
-    `geometry` is that of many cases, where numbers of the mission are arrays.
+    `geometry` holds many cases where numbers of the mission are arrays.
     """
     tones = []
     for name in PLATFORMS[mission.has_direct_path :]:
@@ -146,7 +146,7 @@ def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None
 def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomError]:
     """Random vibration of an oscillator, its tones below one cycle per aperture, and the turns of its platform.
 
-    Its unit is that of the sensitivity. Faster tones have rows of their own.
+    The unit of the error is the unit of the sensitivity. Faster tones have rows of their own.
     """
     felt_vibration = felt(seen.mission, name)
     if felt_vibration is None:
@@ -167,7 +167,7 @@ def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomErro
 def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
     """Parts of the range error by a unit of Γ: of a spectrum, and of slow tones in their worst phases. [m²/unit²]"""
     mission, total = seen.mission, np.zeros((len(Parts._fields), seen.cases))
-    if mission.has_direct_path and name == "transmitter":  # it drops out
+    if mission.has_direct_path and name == "transmitter":  # the transmitter's oscillator drops out
         return Parts(*total)
     sync, vibration = mission.synchronization, felt_vibration.vibration
     if vibration.spectrum is not None:
@@ -182,7 +182,7 @@ def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
 
 
 def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] | None:
-    """Effects of a unit of Γ by the acceleration of a path; None where it has none."""
+    """Effects of a unit of Γ by the acceleration of a path; None for a path without acceleration."""
     state: PlatformState = getattr(seen.geometry, name)
     if state.is_quadratic and not np.any(norm(state.acceleration) > _FELT_ACCELERATION_MPS2):
         return None
@@ -196,9 +196,10 @@ def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] 
 
 
 def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) -> Floats:
-    """Time error by a unit of Γ along each axis of the scene, v(τ) − v(0), or what exchanges leave, (n, moments, …).
+    """Time error by a unit of Γ along each axis, v(τ) − v(0), or its rest after exchanges, (n, moments, …).
 
-    Those begin anywhere in their interval: of several beginnings each has its part of the mean square.
+    The axes are the axes of the scene. The exchanges begin anywhere in their interval. Each of several beginnings has
+    an equal part of the mean square.
     """
 
     def gained(tau: Any) -> Floats:
@@ -213,7 +214,7 @@ def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) ->
         before = np.floor((moments - offset) / interval) * interval + offset
         fraction = (moments - before) / interval
         exact_gain, joined = gained(moments), gained(before) * (1 - fraction) + gained(before + interval) * fraction
-        remaining = exact_gain - joined  # of a constant acceleration rounding alone
+        remaining = exact_gain - joined  # for a constant acceleration only rounding
         courses.append(
             np.where(np.abs(remaining) > ROUNDING * np.abs(exact_gain).max(), remaining, 0.0)
             / math.sqrt(_EXCHANGE_START_COUNT)
@@ -222,19 +223,19 @@ def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) ->
 
 
 def _falls(mission: Mission, state: PlatformState) -> Any:
-    """Whether a platform falls freely: what accelerometers measure is less than how its path bends."""
+    """Whether a platform falls freely: accelerometers measure less than the acceleration of its path."""
     return norm(specific_force(mission, state)) < norm(state.acceleration)
 
 
 def flies_a_turn(mission: Mission, name: str) -> bool:
-    """Whether an oscillator feels the path of its platform, in any case."""
+    """Whether an oscillator feels a turn of its platform's path, in any case."""
     state: PlatformState = getattr(mission.geometry, name)
     bends = not state.is_quadratic or norm(state.acceleration) > _FELT_ACCELERATION_MPS2
     return bool(np.any(bends & ~np.asarray(_falls(mission, state))))
 
 
 def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
-    """Effect of two independent errors that grow alike."""
+    """Effect of two independent errors that grow with the same unit."""
     quadratic, cubic, spread, east, north = (np.hypot(*both) for both in zip(first[:5], second[:5], strict=True))
     has_covariance = first.covariance is not None and second.covariance is not None
     covariance = first.covariance + second.covariance if has_covariance else None
@@ -243,7 +244,7 @@ def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
 
 
 def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
-    """Spectrum of an oscillator's phase by random vibration, of a unit of Γ; empty without one. [rad²/Hz/unit²]"""
+    """Spectrum of an oscillator's phase by random vibration, per unit of Γ; may be empty. [rad²/Hz/unit²]"""
     felt_vibration = felt(mission, name)
     is_heard = not mission.has_direct_path or name == "receiver"
     if felt_vibration is None or felt_vibration.vibration.spectrum is None or not is_heard:

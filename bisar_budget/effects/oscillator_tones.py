@@ -1,8 +1,9 @@
-"""Tones of oscillators: spurs, and what the synchronization leaves of any tone, at which frequencies.
+"""Tones of oscillators: spurs, and the part of any tone that the synchronization leaves, by frequency.
 
-Straight lines between samples every T_s of a tone at f are tones at f + m/T_s of sinc²((f + m/T_s)·T_s) of its
-amplitude. Less these lines 1 − sinc²(fT_s) of it stay where it is, and the others, m ≠ 0, are tones that it is folded
-to. Their phases follow from where in its interval an exchange falls, which nobody knows. Derived here.
+Exchanges every T_s sample a tone at f, and straight lines join the samples. These lines contain tones at f + m/T_s
+with sinc²((f + m/T_s)·T_s) of the amplitude. Less these lines, 1 − sinc²(fT_s) of the tone stays at f (m = 0); the
+lines with m ≠ 0 are the frequencies that the tone is folded to. The phases of the folded tones follow from the
+unknown instant of the exchange within its interval. Derived here.
 """
 
 import math
@@ -16,16 +17,16 @@ from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 
-_SEEN_AMPLITUDE_FRACTION = 0.01  # of the amplitude of a tone, below which an echo beside the mainlobe is nothing
+_SEEN_AMPLITUDE_FRACTION = 0.01  # of a tone's amplitude; a smaller echo counts as none
 _NEIGHBOUR_RATE_COUNT = (
     3  # rates around 0 Hz beyond which a tone is folded with less than a hundredth of its amplitude
 )
 
 
 class LeftTone(NamedTuple):
-    """The rest of a tone of amplitude 1: its own frequency first, then those that it is folded to. [Hz]
+    """The rest of a tone of amplitude 1: its own frequency first, then the frequencies that it is folded to. [Hz]
 
-    `shares` are amplitudes, 0 of one that is not there.
+    `shares` are amplitudes, 0 for a frequency that does not occur.
     """
 
     frequencies: tuple[Any, ...]
@@ -33,11 +34,11 @@ class LeftTone(NamedTuple):
 
     @property
     def is_folded(self) -> bool:
-        """Whether pulses are exchanged."""
+        """Whether exchanged pulses fold the tone."""
         return len(self.shares) > 1
 
     def echoes(self, aperture_time: Any) -> list[Any]:
-        """Amplitudes of what makes echoes, from one cycle per aperture on; its own of one not folded."""
+        """Amplitudes of the tones that make echoes, from one cycle per aperture on; the tone's own if not folded."""
         if not self.is_folded:
             return [self.shares[0]]
         return [
@@ -46,14 +47,14 @@ class LeftTone(NamedTuple):
         ]
 
     def echo(self, mission: Mission) -> Any:
-        """Amplitude of the largest echo; of all together by their powers where PSLR does not hold tones."""
+        """Amplitude of the largest echo; without a PSLR requirement for tones, the root of the summed powers."""
         echoes = self.echoes(mission.collection.aperture_time)
         if mission.requirements.pslr is None:
             return np.sqrt(sum(np.square(amplitude) for amplitude in echoes))
         return np.max(np.broadcast_arrays(*echoes), axis=0)[()]
 
     def slowest_echo(self, aperture_time: Any) -> Any:
-        """Lowest frequency of an echo of a hundredth of the amplitude at least; its own of one not folded. [Hz]"""
+        """Lowest frequency of an echo of at least 1 % of the amplitude; the tone's own if not folded. [Hz]"""
         if not self.is_folded:
             return self.frequencies[0]
         seen = zip(self.frequencies, self.echoes(aperture_time), strict=True)
@@ -68,9 +69,9 @@ class LeftTone(NamedTuple):
         return np.take_along_axis(frequencies, echoes.argmax(axis=0)[None], axis=0)[0]
 
     def slow_parts(self, aperture_time: Any) -> Parts:
-        """Parts over the aperture of those below one cycle per aperture, each of them in its worst phase. [rad²]
+        """Parts over the aperture of the tones below one cycle per aperture, each in its worst phase. [rad²]
 
-        Those of one tone know of each other, so that their amplitudes add.
+        The folded tones of one tone depend on each other, so their amplitudes add.
         """
         total: Any = np.zeros((5, *np.broadcast_shapes(*map(np.shape, (aperture_time, *self.frequencies)))))
         for frequency, share in zip(self.frequencies, self.shares, strict=True):
@@ -86,7 +87,7 @@ class LeftTone(NamedTuple):
 
 
 def left_of_tone(frequency: Any, mission: Mission, geometry: BistaticGeometry) -> LeftTone:
-    """All of a tone, or what exchanged pulses leave; a receiver that hears the transmitter has 2|sin(πfΔt)| of it."""
+    """Tone that the synchronization leaves. A direct path leaves 2|sin(πfΔt)| of the receiver's tone."""
     sync = mission.synchronization
     if mission.has_direct_path:
         return LeftTone((frequency,), (2 * np.abs(np.sin(math.pi * frequency * geometry.echo_delay)),))
@@ -106,8 +107,8 @@ def left_of_tone(frequency: Any, mission: Mission, geometry: BistaticGeometry) -
 class Spur(NamedTuple):
     """A tone of an oscillator: platform, entry by frequency, frequency [Hz], peak phase at centre frequency [rad].
 
-    `free` is the phase of a free oscillator, `left` what the synchronization leaves of it, `echo` the share of that
-    which makes echoes.
+    `free` is the phase of a free oscillator, `left` is the tone that the synchronization leaves, and `echo` is the
+    share of `left` that makes echoes.
     """
 
     name: str
@@ -119,25 +120,25 @@ class Spur(NamedTuple):
 
     @property
     def subject(self) -> Subject:
-        """That of its row."""
+        """Subject of the spur's row."""
         return subject(self.name, "oscillator", "spur", entry=self.entry)
 
     @property
     def phase(self) -> Any:
-        """Peak phase of its echo. [rad]"""
+        """Peak phase of the spur's echo. [rad]"""
         return self.free * self.echo
 
     def slow_parts(self, aperture_time: Any) -> Parts | None:
-        """Parts over the aperture of what is below one cycle per aperture; None of one not folded. [rad²]"""
+        """Parts over the aperture of the folded tones below one cycle per aperture; None without folding. [rad²]"""
         if not self.left.is_folded:
             return None
         return self.left.slow_parts(aperture_time).times(np.square(self.free))
 
 
 def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Spur]:
-    """Tones that reach the image: with a direct path as clock those of the receiver alone, heard twice.
+    """Tones that reach the image. With a direct path as clock, only the receiver's tones do: they are heard twice.
 
-    `geometry` is that of many cases, where numbers of the mission are arrays.
+    `geometry` holds many cases where numbers of the mission are arrays.
     """
     spurs = []
     for name in PLATFORMS[mission.has_direct_path :]:

@@ -1,6 +1,7 @@
-"""Oscillators: phase noise by a mask, an Allan deviation or a power law, and errors of clocks at random.
+"""Oscillators: phase noise by a mask, an Allan deviation or a power law, and random errors of clocks.
 
-Spectra are one-sided. What a link leaves of the noise, and adds to it, depends on how the clocks are kept together.
+Spectra are one-sided. A link removes a part of the noise and adds noise of its own, depending on how the clocks are
+kept together.
 """
 
 import math
@@ -22,28 +23,28 @@ from bisar_budget.mission.readers import Points, SortedPoints
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 
-DEFAULT_BANDWIDTH_HZ = 1e3  # Hz, to which noise counts that is stated without an end
-POOR_FIT_FRACTION = 0.2  # of an Allan deviation, from where a power law does not describe it
+DEFAULT_BANDWIDTH_HZ = 1e3  # Hz, upper end of noise for which the file states no end
+POOR_FIT_FRACTION = 0.2  # of an Allan deviation; a power law with a larger misfit does not describe it
 _EXACT_FIT_FRACTION, _GOOD_FIT_OF_TERMS_FRACTION = (
     1e-6,
     0.01,
-)  # misfits of an Allan deviation: nothing, and so little that no term is added
-_BELOW_MASK_EXPONENT = 3.0  # flicker of frequency; by the first points' own, a higher point could lower a phase
-COVERED_CYCLES = 0.1  # per aperture, down to which a mask should reach: what is slower is hardly in any order
+)  # misfits of an Allan deviation: rounding, and a fit so good that no term is added
+_BELOW_MASK_EXPONENT = 3.0  # flicker of frequency; by the first points' slope, a higher point could lower a phase
+COVERED_CYCLES = 0.1  # per aperture, down to which a mask should reach: slower noise is hardly in any order
 
 
 class Noise(NamedTuple):
-    """Phase noise of an oscillator at the radar's centre frequency, and what was assumed to get it."""
+    """Phase noise of an oscillator at the radar's centre frequency, and the assumptions behind it."""
 
     pieces: tuple[PowerLawPiece, ...]
     notes: tuple[Note, ...] = ()
-    extrapolated: Note = NOTHING  # how it goes on beyond what is stated
-    misfit: float = 0.0  # of a power law to an Allan deviation, the worst point's
+    extrapolated: Note = NOTHING  # how the noise continues beyond the stated points
+    misfit: float = 0.0  # misfit of a power law to an Allan deviation at the worst point
 
 
 def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
-    """Spectrum of an oscillator's phase, one-sided, shifted by its level. [rad²/Hz]"""
-    center_frequency *= 10 ** (oscillator.level / 20)  # noise goes up as its square
+    """Spectrum of an oscillator's phase, one-sided, shifted by the oscillator's level. [rad²/Hz]"""
+    center_frequency *= 10 ** (oscillator.level / 20)  # the noise grows as its square
     if oscillator.phase_noise is not None:
         return _of_mask(oscillator, center_frequency, aperture_time)
     bandwidth = DEFAULT_BANDWIDTH_HZ if oscillator.bandwidth is None else oscillator.bandwidth
@@ -75,7 +76,7 @@ def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     first, density = densities[0]
     slope = _BELOW_MASK_EXPONENT
     pieces.insert(0, PowerLawPiece(0.0, first, density * first**slope, slope))
-    # The quadratic phase is made of tones of about a cycle per aperture.
+    # Tones of about a cycle per aperture make the quadratic phase.
     below = NOTHING
     if first * aperture_time > 0.5:
         below = phrases.mask_begins(first, slope)
@@ -100,7 +101,7 @@ def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> t
 
 
 def allan_variances(tau: float, bandwidth: float) -> tuple[float, ...]:
-    """Allan variance at an averaging time of h₋₂, h₋₁, h₀, h₁ and h₂ of 1; `bandwidth` is that of the measurement."""
+    """Allan variance at an averaging time for h₋₂, h₋₁, h₀, h₁ and h₂ of 1, measured within `bandwidth`."""
     return (
         2 * math.pi**2 / 3 * tau,
         2 * math.log(2),
@@ -111,7 +112,7 @@ def allan_variances(tau: float, bandwidth: float) -> tuple[float, ...]:
 
 
 class Fit(NamedTuple):
-    """A power law that is fitted to an Allan deviation, and its largest misfit, of a deviation."""
+    """A power law fitted to an Allan deviation, and its largest misfit, as a fraction of a deviation."""
 
     misfit: float
     law: PowerLaw
@@ -120,8 +121,8 @@ class Fit(NamedTuple):
 def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
     """Fit h₋₂ … h₁, none negative, to an Allan deviation.
 
-    Least squares of relative variances, of as few terms as describe the points. Of terms that do it equally well
-    those with the largest quadratic phase over the aperture.
+    The fit takes least squares of relative variances, with as few terms as describe the points. Among sets of terms
+    that describe the points equally well, it takes the set with the largest quadratic phase over the aperture.
     """
     per_term = evaluators.power_law_parts(aperture_time)[0]
 
@@ -139,7 +140,7 @@ def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
 
 @lru_cache(maxsize=64)
 def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
-    """Fit every choice of one term, of two and so on, none of them negative."""
+    """Fit every choice of one term, of two terms and so on, none of them negative."""
     terms = 4  # white and flicker phase noise have nearly the same Allan variance
     basis = [allan_variances(tau, bandwidth) for tau, _ in points]
     scaled = [
@@ -150,7 +151,7 @@ def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
     for count in range(1, min(terms, len(points)) + 1):
         fits_of_count = []
         for chosen in combinations(range(terms), count):
-            if any(row[index] <= 0 for row in scaled for index in chosen):  # of a narrow band
+            if any(row[index] <= 0 for row in scaled for index in chosen):  # a narrow band makes it negative
                 continue
             solved = _least_squares([[row[index] for index in chosen] for row in scaled])
             if solved is None or min(solved) <= 0:
@@ -168,7 +169,7 @@ def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
 
 
 def _least_squares(rows: Sequence[Sequence[float]]) -> list[float] | None:
-    """Solve rows·x = 1 in the least squares; None where it has no one solution. A few unknowns, scaled first."""
+    """Solve rows·x = 1 for a few unknowns by scaled least squares; None without a unique solution."""
     count = len(rows[0])
     sizes = [max(abs(row[index]) for row in rows) for index in range(count)]
     if not all(sizes):
@@ -194,7 +195,7 @@ def _least_squares(rows: Sequence[Sequence[float]]) -> list[float] | None:
 def clocks_without_oscillator(mission: Mission) -> tuple[str, ...]:
     """Platforms whose clocks were set and run free, and whose oscillators the file does not state.
 
-    Nobody knows how such a clock drifts: the location has half of its causes, or none.
+    The drift of such a clock is unknown, so the location lacks half of its causes, or all.
     """
     sync = mission.synchronization
     if sync is None or not sync.is_holdover:
@@ -203,7 +204,7 @@ def clocks_without_oscillator(mission: Mission) -> tuple[str, ...]:
 
 
 def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Phase noise of a platform's oscillator, or what exchanged pulses leave of it, and spurs that they make slow."""
+    """Phase noise of a platform's oscillator, or the part left by exchanged pulses, and spurs that they make slow."""
     mission = seen.mission
     oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
     if oscillator is None:
@@ -227,7 +228,7 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: Any) -> RandomEffect | None:
-    """Effect of the noise below the first point of a mask, which no point states; None where it hardly counts."""
+    """Effect of the assumed noise below the first point of a mask; None where that noise hardly counts."""
     mask = oscillator.phase_noise
     if mask is None or np.all(mask[0][0] * seen.aperture_time <= COVERED_CYCLES):
         return None
@@ -237,7 +238,7 @@ def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: Any)
 
 
 def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Truths:
-    """Cases in which the spectrum is another one than the file states: another frequency's, or a poor fit's."""
+    """Cases in which the spectrum differs from the stated one: by another frequency of the mask, or by a poor fit."""
     in_doubt = np.full(seen.cases, bool(oscillator.mask_at_frequency_of_part))
     if oscillator.allan_deviation is None:
         return in_doubt
@@ -248,16 +249,17 @@ def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Truths:
 
 
 def states_both_terms(mission: Mission) -> bool:
-    """Whether the file states both terms of the clock, which then stand for those of free oscillators."""
+    """Whether the file states both terms of the clock, which then replace the terms of free oscillators."""
     timing = mission.timing_error
     return not mission.has_direct_path and timing.constant is not None and timing.linear is not None
 
 
 def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:
-    """Effects by both models of a phase with these parts [rad²]; those of orders 0 and 1 where they are known.
+    """Effects by both models of a phase with these parts [rad²], with orders 0 and 1 where they are known.
 
-    Where the file states both terms of the clock, these stand for orders 0 and 1 of a free oscillator, but not for
-    those of its slow `tones`. Orders 2 and 3 displace the image as the line of sight turns, and defocus less by that.
+    Where the file states both terms of the clock, these terms replace orders 0 and 1 of a free oscillator, but not
+    orders 0 and 1 of its slow `tones`. As the line of sight turns, orders 2 and 3 displace the image, and defocus
+    less by that.
     """
     k, is_stated = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), states_both_terms(seen.mission)
     quadratic, cubic, spread = np.sqrt(noise.rows[:3] + tones.rows[:3])
@@ -280,10 +282,12 @@ def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffe
 def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_below_mask: bool = False) -> Floats:
     """Parts of the phase at 1 Hz that an oscillator leaves over the aperture, (parts, cases); they grow as f₀².
 
-    Of a mask all of it, or what lies below its first point.
+    They are the parts of the whole spectrum or, with `is_below_mask`, of the spectrum below the first point of a
+    mask.
 
-    It depends on how the clocks are kept together: all of its noise, what exchanged pulses leave, what has come since
-    the clocks were set, or what a receiver that hears the transmitter has between direct path and echo.
+    The parts depend on how the clocks are kept together: all of the noise, the noise that exchanged pulses leave, the
+    noise since the clocks were set, or, for a receiver that hears the transmitter, the noise between direct path and
+    echo.
     """
     sync, times = seen.mission.synchronization, seen.aperture_time
     remaining = np.zeros((len(Parts._fields), seen.cases))
@@ -292,7 +296,7 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_be
     interval = None if sync is None else sync.interval
     for (alike, exchanged), cases in seen.alike((oscillator, interval)):
         spectra: dict[Any, list[int]] = {}
-        for case in cases.tolist():  # an Allan deviation may be fitted otherwise over another aperture
+        for case in cases.tolist():  # the fit to an Allan deviation depends on the aperture
             pieces = noise_of(alike, 1.0, float(times[case])).pieces
             spectra.setdefault(pieces[:1] if is_below_mask else pieces, []).append(case)
         for pieces, cases_of_spectrum in spectra.items():
@@ -303,7 +307,7 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_be
 def _left_of(
     pieces: Sequence[PowerLawPiece], interval: float | None, seen: SensorCases, cases_of_spectrum: Sequence[int]
 ) -> Parts:
-    """Parts of what is left of a spectrum in some cases, (some,)."""
+    """Parts that the synchronization leaves of a spectrum in some of the cases, (some,)."""
     sync, aperture_time = seen.mission.synchronization, seen.aperture_time[cases_of_spectrum]
     if sync is None or interval is not None:
         return left_parts(pieces, aperture_time, interval)
@@ -318,12 +322,12 @@ def _left_of(
 
 
 def link_noise(seen: SensorCases) -> Iterator[RandomError]:
-    """Each exchange is wrong by an error of its own, and straight lines join them."""
+    """Errors of the exchanges: each exchange has an independent error, and straight lines join the exchanges."""
     sync = seen.mission.synchronization
     if sync is None or sync.error is None:
         return
     parts = np.zeros((len(Parts._fields), seen.cases))
-    if sync.interval is None:  # from pulse to pulse: all of it spreads
+    if sync.interval is None:  # independent from pulse to pulse: all of the error spreads
         parts[Parts._fields.index("left")] = 1.0
     else:
         for interval, cases in seen.alike(sync.interval):

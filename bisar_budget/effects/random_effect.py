@@ -1,10 +1,10 @@
-"""Effects of random errors on the image: what a unit of each does, 1 sigma, and the cases in which it does so.
+"""Effects of random errors on the image: the effect of a unit, 1 sigma, of each error in each case.
 
-An error at random has a sigma and no sign. Orders 0 and 1 of its range error displace the image by Q⁻¹, from order 2
-on it defocuses. To the published model the line of sight is that of mid-aperture (`theory.random_errors`), and Q that
-of (25). The full model lets it turn, knows a direct path, and counts what the displacement of the image adds.
+A random error has a sigma and no sign. Orders 0 and 1 of its range error displace the image by Q⁻¹; orders from 2 on
+defocus it. The published model takes the line of sight of mid-aperture (`theory.random_errors`) and the Q of (25).
+The full model lets the line of sight turn, knows a direct path, and counts the phase that the displacement adds.
 
-Numbers of a mission may be arrays (cases,); its geometry then is that of these cases.
+Numbers of a mission may be arrays (cases,). The geometry then holds the same cases.
 """
 
 import math
@@ -38,21 +38,22 @@ from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges,
 if TYPE_CHECKING:
     from bisar_budget.effects.oscillators import Noise
 
-# Nodes at which errors at random are sampled: fewer tell too few orders of a process apart. More cost seconds, and
+# Nodes at which random errors are sampled: fewer tell too few orders of a process apart. More cost seconds, and
 # these follow nine circles; on a race track of 70 pieces 16 give every effect to 1e-3.
 FEWEST_NODES, MOST_NODES = 16, 64
-_CANCELLED_SQUARE_FRACTION = ROUNDING * 1e-2  # of a square: below it, its root is rounding
+_CANCELLED_SQUARE_FRACTION = ROUNDING * 1e-2  # of a square of magnitudes; the root of a smaller square is rounding
 
 
 class RandomEffect(NamedTuple):
-    """Effect of a unit of an error: quadratic and cubic phase at the aperture edge, rms of what spreads. [rad/unit]
+    """Effect of a unit of an error: quadratic and cubic phase at the aperture edge, and spread phase. [rad/unit]
 
-    `spread` is what is left of the phase after the cubic; it is a mean power, and no coverage factor is in it. `east`
-    and `north` are the sigmas of the displacement [m/unit], not a number where it is not known, as of a free
-    oscillator. `covariance` (4, 4, ...) is that of quadratic and cubic phase and displacement east and north, in the
-    units of their products; no matrix where the published model has only their sizes. `hidden` is the quadratic phase
-    of as much loss as band and turn do not resolve, `ranges.exact_ranges`. [rad/unit] `rest` is what an error without
-    noise, such as a bias, leaves beyond the cubic at one sigma: it spreads as that of any error of motion. [rad/unit]
+    `spread` is the rms of the phase left after the cubic. It is a mean power and includes no coverage factor. `east`
+    and `north` are the sigmas of the displacement [m/unit], NaN where the displacement is unknown, as for a free
+    oscillator. `covariance` (4, 4, ...) is the covariance of quadratic phase, cubic phase, and displacement east and
+    north, in the units of their products. It is None for the published model, which has only the sizes. `hidden` is
+    the quadratic phase of the loss that band and turn do not resolve, `ranges.exact_ranges`. [rad/unit] `rest` is the
+    phase that an error without noise, such as a bias, leaves beyond the cubic at one sigma. It spreads like the rest
+    of any error of motion. [rad/unit]
     """
 
     quadratic: Any
@@ -65,7 +66,7 @@ class RandomEffect(NamedTuple):
     rest: Any = 0.0
 
     def judged(self, gain: Any) -> Any:
-        """Phase that is held to a limit with the gain of autofocus in it: `Declared.judged`. [rad/unit]"""
+        """Phase that counts against a limit raised by the gain of autofocus: `Declared.judged`. [rad/unit]"""
         return np.hypot(self.quadratic, gain * self.hidden)
 
     @property
@@ -74,7 +75,7 @@ class RandomEffect(NamedTuple):
         return np.hypot(self.east, self.north)
 
     def of(self, case: int) -> "RandomEffect":
-        """That of a case in plain numbers; the covariance as (4, 4)."""
+        """The effect of one case in plain numbers; the covariance as (4, 4)."""
         covariance = self.covariance
         if covariance is not None:
             covariance = covariance[..., case if covariance.shape[-1] > 1 else 0]
@@ -83,7 +84,7 @@ class RandomEffect(NamedTuple):
         return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, beyond_cubic)
 
     def times(self, factor: Any) -> "RandomEffect":
-        """The same with phases and displacement of a coverage factor."""
+        """The same effect with phases and displacement multiplied by a coverage factor."""
         return RandomEffect(
             self.quadratic * factor,
             self.cubic * factor,
@@ -97,10 +98,10 @@ class RandomEffect(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """Motion of a platform by an error at random: along each way, each course by 1 sigma of its own.
+    """Motion of a platform by a random error: along each way and for each course, an independent size of 1 sigma.
 
-    `ways` are (ways, 3, nodes or 1, cases) [m/unit], `courses` (courses, nodes, cases or 1), at the nodes of
-    `SensorCases.exact`. Where an error has several, a way and a course of one are those of each.
+    `ways` are (ways, 3, nodes or 1, cases) [m/unit]. `courses` are (courses, nodes, cases or 1), at the nodes of
+    `SensorCases.exact`. If an error has several `Moves`, the same way and course of each have the same random size.
     """
 
     place: int
@@ -109,15 +110,16 @@ class Moves(NamedTuple):
 
 
 class RandomError(NamedTuple):
-    """One error of a sensor, a clock or the air: what it is, how large it is declared, what one unit of it does.
+    """One error of a sensor, a clock or the air: its subject, its declared size and the effect of one unit.
 
-    `declared` is the largest of the axes, coverage factor included, and all axes grow with it; None where the file is
-    silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `noise` is the spectrum
-    of an oscillator; not of many cases. `spreads` tells noise from what changes within the aperture by a few orders.
-    `counted_in` is the id of a row whose error does this too, so that this one counts nowhere. `moves` says how a
-    unit moves platforms, where the edge of a scene is looked at; of clocks and the air nothing. `continued` is the
-    effect of what lies below the first point of an oscillator's mask, where the mask does not reach far enough down.
-    `is_in_doubt` says in which cases the spectrum of an oscillator is not what the file states of it.
+    `declared` is the largest of the axes, coverage factor included, and all axes grow with it. It is None where the
+    file declares no size. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `noise`
+    is the spectrum of an oscillator, for one case only. `spreads` tells noise from an error that changes within the
+    aperture by a few orders. `counted_in` is the id of a row whose error has this effect too, so that this error
+    counts nowhere else. `moves` is the motion of platforms by a unit, for the edge of a scene; it is empty for clocks
+    and the air. `continued` is the effect of the spectrum below the first point of an oscillator's mask, if the mask
+    does not reach far enough down. `is_in_doubt` marks the cases in which the spectrum of an oscillator differs from
+    the spectrum that the file states.
     """
 
     subject: Subject
@@ -135,31 +137,31 @@ class RandomError(NamedTuple):
 
     @property
     def id(self) -> str:
-        """That of its row."""
+        """Id of the error's row."""
         return self.subject.id
 
     @property
     def owner(self) -> str:
-        """Whose share it counts against: transmitter, receiver or clock."""
+        """Owner of the share that the error counts against: transmitter, receiver or clock."""
         return self.subject.owner
 
     @property
     def is_covered(self) -> bool:
-        """Whether the coverage factor is in what is declared, or does: not of an effect from elsewhere."""
+        """Whether the declared size or its effect includes the coverage factor: not for an effect from elsewhere."""
         return self.subject.kind != "other"
 
     def coverage(self, mission: Mission) -> Any:
-        """Coverage factor that is in what its declared size does."""
+        """Coverage factor in the effect of the declared size."""
         return mission.allocation.coverage_factor if self.is_covered else 1.0
 
     @property
     def extrapolated(self) -> Note:
-        """How the noise of an oscillator goes on beyond what the file states."""
+        """Note on how the noise of an oscillator continues beyond the stated points."""
         return NOTHING if self.noise is None else self.noise.extrapolated
 
     @property
     def displaces_unknown(self) -> Any:
-        """Whether it displaces the image by an amount that the file leaves open, in which cases."""
+        """Cases in which the error displaces the image by an amount that the file leaves open."""
         return False if self.declared is None else (self.declared > 0) & np.isnan(self.full.displacement)
 
     def effect(self, model: str) -> RandomEffect:
@@ -168,7 +170,7 @@ class RandomError(NamedTuple):
 
 
 class SensorCases:
-    """Cases as their sensors and clocks see them: numbers are arrays (…, cases)."""
+    """Geometry and exact ranges of cases for sensors and clocks. Numbers are arrays (…, cases)."""
 
     def __init__(self, mission: Mission, geometry: BistaticGeometry, cases: int) -> None:
         self.mission, self.geometry, self.cases = mission, geometry, cases
@@ -178,7 +180,7 @@ class SensorCases:
 
     @property
     def has_edge(self) -> bool:
-        """Whether it is asked what errors do at the edge of a scene."""
+        """Whether effects at the edge of a scene are needed."""
         return self.mission.scene.radius is not None
 
     def vector(self, values: Sequence[Any]) -> Floats:
@@ -199,20 +201,20 @@ class SensorCases:
         return np.array([self.vector(axis) for axis in path.frame(frame or self.error(name).frame)])
 
     def along(self, name: str, directions: Floats) -> Floats:
-        """Root-sum-square of what directions (axes, 3, cases) have of the line of sight of mid-aperture."""
+        """Root-sum-square of directions (axes, 3, cases) projected on the line of sight of mid-aperture."""
         look = self.vector(getattr(self.geometry, name).look)
         return np.asarray(np.sqrt(np.square((directions * look).sum(axis=1)).sum(axis=0)))
 
     @cached_property
     def exact(self) -> ExactRanges:
-        """Exact ranges at as many nodes as the paths and errors at random need."""
+        """Exact ranges at as many nodes as the paths and random errors need."""
         count = nodes_for(self.geometry, self.aperture_time, has_direct_path=self.mission.has_direct_path)
         count = min(MOST_NODES, max(FEWEST_NODES, int(np.max(count))))
         return exact_ranges(self.mission, self.geometry, count, self.cases)
 
     @cached_property
     def weights(self) -> Floats:
-        """Those of `effect_weights`."""
+        """The weights of `effect_weights`."""
         return effect_weights(self.exact)
 
     @cached_property
@@ -221,19 +223,19 @@ class SensorCases:
         return published_planes(self.geometry)[0]
 
     def of_courses(self, courses: Floats, at_mid_aperture: Floats) -> tuple["RandomEffect", "RandomEffect"]:
-        """Effects by both models of independent range errors of one course each, of 1 sigma of a unit. [m/unit]
+        """Effects by both models of independent range errors with one course each, for 1 sigma of a unit. [m/unit]
 
         Parameters
         ----------
         courses : (errors, nodes, cases)
-            With the line of sight as it turns, and as data hear it.
-        held : (errors, nodes, cases)
-            The same with the line of sight held at mid-aperture, for the published model.
+            Range errors with the line of sight as it turns, as the data contain them.
+        at_mid_aperture : (errors, nodes, cases)
+            Range errors with the line of sight held at mid-aperture, for the published model.
         """
         k, orders = self.exact.k, np.einsum("fn,enc->fec", self.exact.fit, at_mid_aperture)
         orders = np.where(np.abs(orders) > ROUNDING * np.abs(at_mid_aperture).max(axis=1), orders, 0.0)
         quadratic, cubic = np.sqrt(np.square(orders[2:]).sum(axis=1))
-        # Both orders of a course are one error: unlike those of noise they add with their signs.
+        # Both orders of a course are one error: unlike the orders of noise they add with their signs.
         (a, b), (c, d) = self.plane.adjugate
         scale = 1 / np.where(self.plane.is_singular, math.nan, self.plane.determinant)
         constant, linear = orders[0], orders[1] / self.exact.half
@@ -242,7 +244,7 @@ class SensorCases:
         effects = effects_of_courses(self.exact, self.weights, courses)
         (qpe, edge, east, north, hidden), covariance = sigmas(effects.covariance, effects.sizes)
         beyond_cubic, is_turned = k * np.sqrt(effects.left), self.exact.is_turned
-        # Where a line of sight turns far, the phase of equal loss holds all that an error of motion leaves.
+        # Where a line of sight turns far, the phase of equal loss holds the whole rest of an error of motion.
         hidden = np.hypot(hidden, np.where(is_turned, QUADRATIC_OF_VARIANCE * beyond_cubic, 0.0))
         beyond_cubic = np.where(is_turned, 0.0, beyond_cubic) / self.factor
         return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance, hidden, beyond_cubic)
@@ -255,7 +257,8 @@ class SensorCases:
         Parameters
         ----------
         courses : (errors, nodes, cases)
-            Range error of a unit of each, with the line of sight as it turns, and as data hear it. [m/unit]
+            Range error by a unit of each process, with the line of sight as it turns, as the data contain it.
+            [m/unit]
         correlation_time : float or (cases,)
             [s]
         is_phase_advanced : bool
@@ -272,12 +275,12 @@ class SensorCases:
 
     def _of_noise(self, effects: RangeEffects) -> RandomEffect:
         (quadratic, cubic, east, north, hidden), covariance = sigmas(effects.covariance, effects.sizes)
-        # What spreads is a mean power, which has no coverage factor.
+        # The spread is a mean power, which has no coverage factor.
         spread = self.exact.k * np.sqrt(np.maximum(effects.left, 0.0)) / self.factor
         return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
     def of_motion(self, platform_index: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
-        """The same of independent position errors of a platform, (errors, 3, nodes, cases). [m/unit]"""
+        """Effects by both models of independent position errors of a platform, (errors, 3, nodes, cases). [m/unit]"""
         look = self.vector(self.geometry.both[platform_index].look)
         return self.of_courses(self.range_errors(platform_index, moved), -np.einsum("ac,eanc->enc", look, moved))
 
@@ -289,7 +292,8 @@ class SensorCases:
     def moved(self, constant: Any, linear: Any, both: Any = 0.0) -> list[Any]:
         """Sigmas of the displacement by (25). [m]
 
-        Of the mean squares of constant and linear part at the edge, and of their mean product. [m²]
+        `constant` and `linear` are mean squares of the two parts at the aperture edge; `both` is their mean product.
+        [m²]
         """
         half = self.aperture_time / 2
         slope, product = linear / half**2, 2 * both / half
@@ -301,14 +305,15 @@ class SensorCases:
 
     @cached_property
     def orders(self) -> Floats:
-        """Orders 0 to 3 at the nodes, by their values at the aperture edge as `LEADING` has them, (nodes, 4)."""
+        """Orders 0 to 3 at the nodes, scaled by their values at the aperture edge as in `LEADING`, (nodes, 4)."""
         return orders_at(self.exact.sampling.places)
 
     def of_orders(self, covariance: Floats, along: Any = 1.0) -> tuple[Sequence[Floats], Floats]:
         """`sigmas` of phases and displacement by orders 0 to 3 of independent range errors.
 
-        `covariance` (4, 4, ...) is that of each at the aperture edge [m²], `along` (errors, nodes, cases) what a
-        metre of it does to the range; higher orders defocus and displace in second order of a turning line of sight.
+        `covariance` (4, 4, ...) is the covariance of each error at the aperture edge [m²]. `along` (errors, nodes,
+        cases) is the range change by a metre of the error. Higher orders defocus and displace only in second order of
+        a turning line of sight.
         """
         covariance_of_cases = covariance if covariance.ndim == 3 else covariance[..., None]
         covariance_of_cases = np.broadcast_to(covariance_of_cases, (*covariance_of_cases.shape[:2], self.cases))
@@ -324,11 +329,12 @@ class SensorCases:
         return np.asarray(np.einsum("no,cof->fnc", self.orders, of_orders))
 
     def of_parts(self, noise: Parts, along: Any = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
-        """The same of a range error with these parts [m²]; `along` is what data have of a metre of it at the nodes.
+        """Effects by both models of a range error with these parts [m²], per metre of which the data have `along`.
 
-        By orders 0 to 3, and what lies beyond spreads. Up to a turn of 1 rad of a line of sight that is right to 5 %
-        and 0.5 dB; over a full circle too, but for noise as steep as f⁻⁴, of which 1 dB more or less spreads, and for
-        the location by free clocks, 8 % (`tests/effects/test_long_noise.py`).
+        `along` is (nodes, cases). Orders 0 to 3 defocus and displace, and the part beyond them spreads. Up to a turn
+        of 1 rad of a line of sight the result is right to 5 % and 0.5 dB. Over a full circle it is right too, with
+        two exceptions: for noise as steep as f⁻⁴ the spread is 1 dB off, and the location by free clocks is 8 % off
+        (`tests/effects/test_long_noise.py`).
         """
         k = 2 * math.pi / np.asarray(self.mission.radar.wavelength)
         quadratic, cubic, spread = (k * np.sqrt(mean_square) for mean_square in noise[:3])
@@ -339,7 +345,7 @@ class SensorCases:
         return published, RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
     def alike(self, value: Any) -> Iterator[tuple[Any, NDArray[np.intp]]]:
-        """Tell apart cases in which a value, or what is in it, differs: the value of each group, and its cases."""
+        """Group the cases by the numbers in a value: the value of each group, and the indices of its cases."""
         arrays = list(_arrays_in(value))
         if not arrays:
             yield value, np.arange(self.cases)
@@ -350,7 +356,7 @@ class SensorCases:
 
 
 def orders_at(slow_times: Floats) -> Floats:
-    """Orders 0 to 3 at places of the aperture, (places, 4), of a size of 1 at its edge as `Parts` has them."""
+    """Orders 0 to 3 at slow times in half apertures, (times, 4), of size 1 at the aperture edge as in `Parts`."""
     return np.asarray(np.polynomial.legendre.legvander(slow_times, LEADING.size - 1) / LEADING)
 
 
@@ -363,7 +369,7 @@ def _arrays_in(value: Any) -> Iterator[Floats]:
 
 
 def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
-    """The same with numbers in the places of its arrays."""
+    """The same value with numbers in place of its arrays."""
     if isinstance(value, tuple):
         values = [_with_numbers(value_part, numbers) for value_part in value]
         return value._make(values) if hasattr(value, "_make") else tuple(values)
@@ -371,17 +377,17 @@ def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
 
 
 def parts_of_largest(values: Floats) -> tuple[Floats, Floats]:
-    """The largest of values (axes, cases), and each over it; 1 where there is none."""
+    """The largest of values (axes, cases), and each value over the largest; 1 where the largest is 0."""
     largest = values.max(axis=0)
     return largest, np.divide(values, largest, out=np.ones_like(values), where=largest > 0)
 
 
 def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]:
-    """Roots of the diagonal of a covariance (8, 8, cases) of what `SensorCases.weights` weigh, and its first (4, 4).
+    """Roots of the diagonal of a covariance (8, 8, cases) ordered like `SensorCases.weights`, and its first (4, 4).
 
-    Those of quadratic and cubic phase, of east and north, and of the hidden phase, whose four parts add as squares.
-    What is left of terms that cancel exactly, of squares of so large `sizes` (8, cases), is rounding, and would make
-    a limit out of nothing.
+    The roots belong to quadratic and cubic phase, to east and north, and to the hidden phase, whose four parts add as
+    squares. Where terms cancel exactly, the remainder is rounding beside the squared magnitudes `sizes` (8, cases),
+    and would give a limit where none exists; it is set to 0.
     """
     squares = np.einsum("ffc->fc", covariance)
     is_real = squares > _CANCELLED_SQUARE_FRACTION * sizes
@@ -391,7 +397,7 @@ def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]
 
 
 def factor(covariance: Floats) -> Floats:
-    """A matrix F with FFᵀ = C, (..., n, n), of a covariance that may be singular, and whose units may differ."""
+    """A matrix F with FFᵀ = C, (..., n, n), for a covariance that may be singular, and whose units may differ."""
     sizes = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))[..., None]
     units = np.where(sizes > 0, sizes, 1.0)
     squares, ways = np.linalg.eigh(covariance / (units * np.swapaxes(units, -1, -2)))

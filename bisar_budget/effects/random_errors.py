@@ -1,8 +1,8 @@
 """Every random error of sensors, clocks and the air that a mission names, in one case or in many.
 
-With them go errors from elsewhere that the file states by what they do to the image: a cubic phase, a displacement.
-Neither has a sign, and a displacement no direction: each way it has half of its square. A quadratic phase, which has
-a sign, is listed in `sources`, and power that is spread in `analysis.spread`.
+The list also has the errors from elsewhere that the file states by their effect on the image: a cubic phase or a
+displacement. Neither has a sign, and a displacement has no direction: east and north each have half of its square. A
+quadratic phase, which has a sign, is listed in `sources`, and spread power in `analysis.spread`.
 """
 
 import math
@@ -27,18 +27,17 @@ from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 
-# Effect of a unit, whichever model: of 1 rad, and of 1 m.
+# Effect of a unit by either model: of 1 rad, and of 1 m.
 _CUBIC = RandomEffect(0.0, 1.0, 0.0, 0.0, 0.0, np.diag([0.0, 1.0, 0.0, 0.0])[..., None])
 _DISPLACEMENT = RandomEffect(0.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5), np.diag([0.0, 0.0, 0.5, 0.5])[..., None])
 _EFFECTS = {"cubic_phase_error": ("rad", _CUBIC), "location_error": ("m", _DISPLACEMENT)}
 
 
 def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, cases: int = 1) -> list[RandomError]:
-    """List the errors of sensors, clocks and the air that a mission names, in a fixed order; nothing for most.
+    """List the errors of sensors, clocks and the air that a mission names, in a fixed order; empty for most missions.
 
-    Of a platform with an inertial sensor every figure is listed, declared or not, and of one with a lever arm its
-    attitude. `geometry` is that of many cases;
-    without it all numbers are floats.
+    For a platform with an inertial sensor every figure is listed, declared or not; for a platform with a lever arm
+    the attitude is listed. `geometry` is the geometry of many cases. Without it all numbers are floats.
     """
     seen = SensorCases(mission, geometry or mission.geometry, cases)
     errors = [error for name in PLATFORMS for error in vibration_spectrum(seen, name)]
@@ -56,7 +55,7 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
 
 
 def _stated_effects(mission: Mission) -> Iterator[RandomError]:
-    """Cubic phases and displacements from elsewhere, those that the file states."""
+    """Cubic phases and displacements from elsewhere that the file states."""
     for index, stated in enumerate(mission.other_errors):
         for key, (unit, effect) in _EFFECTS.items():
             size = getattr(stated, key)
@@ -68,7 +67,7 @@ def _stated_effects(mission: Mission) -> Iterator[RandomError]:
 
 
 def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomError:
-    """An error in plain numbers, those of a case with its mission, and with the noise of an oscillator."""
+    """An error in plain numbers: the numbers of one case with its mission, and with the noise of an oscillator."""
     published, full = error.published.of(case), error.full.of(case)
     noise = None
     if error.subject.kind == "oscillator" and not error.subject.axis:

@@ -1,17 +1,17 @@
-"""Errors of a range at random, along lines of sight that turn: what they do to the image.
+"""Random range errors along lines of sight that turn, and their effects on the image.
 
-The error of a range is a course over the aperture times a random size, as of a bias, or a process that changes within
-the aperture: noise of a position, a walk, a delay of the air. Each effect on the image, a phase or a displacement, is
-an integral of weight times range error. So its variance is a double integral of the covariance of the range error.
+The range error is a course over the aperture times a random size, as for a bias, or a process that changes within the
+aperture: noise of a position, a walk, a delay of the air. Each effect on the image, a phase or a displacement, is an
+integral of weight times range error. So its variance is a double integral of the covariance of the range error.
 
-A process is resolved into Legendre orders, as many as the nodes tell apart. The weights are smooth and see no higher
-ones: these spread. Of the orders below, what lies beyond the cubic spreads too, with what the displacement of the
-image adds along a line of sight that turns.
+A process is resolved into as many Legendre orders as the nodes tell apart. The weights are smooth and see no higher
+orders: the higher orders spread. Within the resolved orders, the part beyond the cubic spreads too, together with the
+part that the displacement of the image adds along a line of sight that turns.
 
-A Gauss–Markov process has variance 1 and correlation exp(−|t|/τ_c) = 1 + (exp(−|t|/τ_c) − 1): the first is an error
-that stays, the second departs from it, and vanishes for a long correlation time without rounding.
+A Gauss–Markov process has variance 1 and correlation exp(−|t|/τ_c) = 1 + (exp(−|t|/τ_c) − 1). The first term is a
+constant error. The second term departs from it, and vanishes for a long correlation time without rounding.
 
-Derived here; against time series in `tests/effects/test_changing_air.py`, against draws and direct sums in
+Derived here. Time series check it in `tests/effects/test_changing_air.py`; draws and direct sums check it in
 `tests/effects/test_long_noise.py`.
 """
 
@@ -24,16 +24,15 @@ from bisar_budget.image_plane import LEADING
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 
 _ORDER_COUNT = 4  # Legendre orders 0 to 3, which displace and defocus
-_LAG_OCTAVE_COUNT = (
-    44  # of lags below an aperture: half of it over the shortest correlation time that a file can state
-)
-_NODES_PER_OCTAVE = 20  # follow the correlation within an octave of lags to 1e-10
+_LAG_OCTAVE_COUNT = 44  # octaves of lag: half an aperture over the shortest correlation time that a file can state
+_NODES_PER_OCTAVE = 20  # resolve the correlation within an octave of lags to 1e-10
 
 
 class RangeEffects(NamedTuple):
-    """Effects of range errors: covariance (8, 8, cases) of what `effect_weights` weigh, and mean square left. [m²]
+    """Effects of range errors: covariance (8, 8, cases) in the order of `effect_weights`, and mean square left. [m²]
 
-    `sizes` (8, cases) are squares of sums of magnitudes, against which a rest of cancelling terms is rounding.
+    `sizes` (8, cases) are squares of sums of magnitudes. A rest of cancelling terms that is small beside them is
+    rounding.
     """
 
     covariance: Floats
@@ -50,7 +49,7 @@ def effect_weights(exact: ExactRanges) -> Floats:
 
 
 def effects_of_courses(exact: ExactRanges, weights: Floats, courses: Floats) -> RangeEffects:
-    """Effects of independent errors of variance 1, of one course each, (errors, nodes, cases). [m]"""
+    """Effects of independent errors of variance 1, with one course each, (errors, nodes, cases). [m]"""
     weighted = weights[:, None] * courses
     effects = weighted.sum(axis=2)
     sizes = np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
@@ -65,16 +64,16 @@ def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, 
     Parameters
     ----------
     exact : ExactRanges
-        At nodes of Gauss and Legendre.
+        Exact ranges at Gauss–Legendre nodes.
     weights : (8, nodes, cases)
-        Those of `effect_weights`.
+        The weights of `effect_weights`.
     covariance : (nodes, nodes, cases)
-        Of the range error between the nodes, of the Legendre orders that these tell apart. [m²]
+        Covariance of the range error between the nodes, in the Legendre orders that the nodes tell apart. [m²]
     beyond : (cases,)
         Mean square of the range error in higher orders, which spread. [m²]
     """
     orders = np.polynomial.legendre.legvander(exact.sampling.places, _ORDER_COUNT - 1) / LEADING
-    higher = np.eye(len(orders)) - orders @ exact.fit  # leaves what lies beyond the cubic
+    higher = np.eye(len(orders)) - orders @ exact.fit  # leaves the part beyond the cubic
     bends = np.einsum("nm,amc->anc", higher, exact.slopes)
     weighted_bends = exact.mean * bends
     integrals = np.concatenate((weights, weighted_bends))
@@ -97,18 +96,18 @@ def effects_of_gauss_markov(
     exact, weights
         As for `effects_of_process`.
     courses : (errors, nodes, cases)
-        Range error by a unit of each; of a delay that of the group. [m]
+        Range error by a unit of each process; for a delay, the range error of the group. [m]
     ratio : (cases,)
         Half the aperture time over the correlation time.
     is_phase_advanced : bool
-        Whether the phase has the other sign than the group, as free electrons make it: then the mean of the group
-        counts, and everything else with the other sign.
+        Whether the phase has the opposite sign of the group, as free electrons make it. Then the mean counts as in
+        the group, and everything else with the opposite sign.
     """
     ratios, ratio_index = np.unique(np.broadcast_to(ratio, exact.half.shape), return_inverse=True)
     departure = departure_at_nodes(len(exact.times), ratios)[..., ratio_index.ravel()]
     courses = courses + np.zeros_like(exact.times)
     covariance = np.einsum("enc,emc->nmc", courses, courses) * departure
-    # The correlation departs by nothing at no lag: what the orders have of it lacks in those beyond.
+    # At lag 0 the departure is 0, so the power in the resolved orders is missing from the higher orders.
     power, mean = exact.fit[0] @ np.square(courses).sum(axis=0), exact.fit[0]
     beyond = -power * np.einsum("n,nnc->c", mean, departure)
     if is_phase_advanced:
@@ -122,14 +121,14 @@ def effects_of_gauss_markov(
 
 
 def departure_at_nodes(count: int, ratios: Floats) -> Floats:
-    """The correlation exp(−|t|/τ_c) − 1 between nodes, by as many Legendre orders as they tell apart.
+    """The correlation exp(−|t|/τ_c) − 1 between nodes, by as many Legendre orders as the nodes tell apart.
 
-    It has a bend at lag 0, which nodes would miss. Smooth weights see no higher orders than these.
+    The correlation has a bend at lag 0, which nodes would miss. Smooth weights see no higher orders than these.
 
     Parameters
     ----------
     count : int
-        Nodes of Gauss and Legendre.
+        Number of Gauss–Legendre nodes.
     ratios : (cases,)
         Half the aperture time over the correlation time.
 
@@ -147,9 +146,9 @@ def departure_at_nodes(count: int, ratios: Floats) -> Floats:
 
 @cache
 def _lagged(count: int) -> tuple[Floats, Floats]:
-    """Lags u over 0 … 2, in half apertures, and ∫P_m(s)·P_n(s + u) ds of both signs of the lag, weighted for a sum.
+    """Lags u over 0 … 2, in half apertures, and ∫P_m(s)·P_n(s + u) ds for both signs of the lag, weighted for a sum.
 
-    Lags are denser towards 0, octave by octave: correlation times of any length are followed.
+    Lags are denser towards 0, octave by octave, and so resolve correlation times of any length.
     """
     x, w = np.polynomial.legendre.leggauss(_NODES_PER_OCTAVE)
     edges = np.concatenate(([0.0], 2.0 ** np.arange(1 - _LAG_OCTAVE_COUNT, 2)))

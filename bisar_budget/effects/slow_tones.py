@@ -1,14 +1,14 @@
-"""Vibrations below three cycles per aperture, by exact ranges: as the phases that they are, in the worst phase.
+"""Vibrations below three cycles per aperture: their phases by exact ranges, in the worst phase of the motion.
 
-A vibration moves its platform by A·cos(2πfτ + ψ) along an axis, and its phase ψ is not known. What it does is looked
-at in phases all around, and the worst counts: of a small vibration as a cosine and a sine do it, and where the second
-order matters by the image point of exact ranges. The line of sight turns under it, so that motion along the track
-counts too, and the image is displaced, which defocuses as well. The squares of phases run over ψ as harmonics, of a
-small vibration as the second alone, so that few phases give the largest. The axes may be in any phase: what each does
-adds.
+A vibration moves its platform by A·cos(2πfτ + ψ) along an axis, and its phase ψ is unknown. Its effects are computed
+for phases all around the circle, and the worst phase counts. The effects of a small vibration follow from a cosine
+and a sine; where the second order matters, the image point of exact ranges gives them. The line of sight turns
+meanwhile. So motion along the track counts too, and the image is displaced, which also defocuses. The squares of the
+resulting phases run over ψ as harmonics, for a small vibration as the second harmonic alone, so a few phases give the
+largest square. The axes may vibrate in any phase: their effects add.
 
-A vibration that is stated along the line of sight moves along it as it turns, and is all range error. Derived here;
-held to exact ranges in 36 phases (`tests/effects/test_slow_tones.py`).
+A vibration that the file states along the line of sight moves along the line of sight as it turns, and is all range
+error. Derived here; exact ranges in 36 phases check it (`tests/effects/test_slow_tones.py`).
 """
 
 import math
@@ -29,19 +29,19 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, STILL, ExactRanges, Floats, Indices, Truths, followed
 
-TONE_PHASE_COUNT = 16  # in which a large vibration is followed
+TONE_PHASE_COUNT = 16  # phases in which exact ranges follow a large vibration
 ANGLES = 2 * math.pi * np.arange(TONE_PHASE_COUNT) / TONE_PHASE_COUNT
-TURNED = np.stack((np.cos(ANGLES), np.sin(ANGLES)), axis=1)  # what a cosine and a sine have in each
-VALUES_PER_PHASE = 16  # values between two of them, of the harmonics that they give
-MAX_LANE_COUNT = 1 << 12  # lanes that are followed at once
+TURNED = np.stack((np.cos(ANGLES), np.sin(ANGLES)), axis=1)  # weights of a cosine and a sine in each phase
+VALUES_PER_PHASE = 16  # values of the harmonics from each phase to the next
+MAX_LANE_COUNT = 1 << 12  # lanes in one search
 
 
 @dataclass(frozen=True, eq=False)
 class TonePhases:
     """Effects of a vibration, one axis at a time, in phases all around the circle.
 
-    Each is an array (axes, TONE_PHASE_COUNT, cases): quadratic and cubic phase at the aperture edge, hidden phase,
-    and rms beyond the cubic. [rad]
+    Each field is an array (axes, TONE_PHASE_COUNT, cases): quadratic and cubic phase at the aperture edge, hidden
+    phase, and rms beyond the cubic. [rad]
     """
 
     quadratics: Floats
@@ -50,7 +50,7 @@ class TonePhases:
     rests: Floats
 
     def axes(self) -> list["TonePhases"]:
-        """Those of each axis alone."""
+        """The phases of each axis alone."""
         phases = (self.quadratics, self.cubics, self.hiddens, self.rests)
         return [TonePhases(*(phase[[axis]] for phase in phases)) for axis in range(len(self.quadratics))]
 
@@ -70,19 +70,19 @@ class TonePhases:
         return _worst(np.square(self.rests))
 
     def judged(self, gain: Any) -> Floats:
-        """Phase that is held to a limit with the gain of autofocus in it: `Declared.judged`, (cases,). [rad]"""
+        """Phase that counts against a limit raised by the gain of autofocus: `Declared.judged`, (cases,). [rad]"""
         return _worst(np.square(self.quadratics) + np.square(gain * self.hiddens))
 
     def hidden(self, gain: Any) -> Floats:
-        """Hidden phase of as large a judged phase beside the worst quadratic phase, (cases,). [rad]"""
+        """Hidden phase that, with the worst quadratic phase, gives the judged phase, (cases,). [rad]"""
         return np.asarray(np.sqrt(np.maximum(self.judged(gain) ** 2 - self.quadratic**2, 0.0)) / gain)
 
 
 class SlowTone(NamedTuple):
-    """A vibration of a row: what a metre of the range that data hear does, and what the declared one does.
+    """A vibration of a row: the effect of a metre of range that the data hear, and of the declared vibration.
 
-    `is_there` says in which cases it has fewer than three cycles per aperture. Of a vibration along three axes, or
-    beside a direct path, the range `hears_part`.
+    `is_there` marks the cases in which it has fewer than three cycles per aperture. `hears_part` marks a vibration
+    along three axes or beside a direct path: the range has only a part of it.
     """
 
     subject: Subject
@@ -93,7 +93,7 @@ class SlowTone(NamedTuple):
 
 
 def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict[str, SlowTone]:
-    """Every declared vibration that has fewer than three cycles per aperture in any case, by the id of its row."""
+    """Every declared vibration with fewer than three cycles per aperture in any case, by the id of its row."""
     T, is_heard, slow = mission.collection.aperture_time, mission.has_direct_path, dict[str, SlowTone]()
     exact: ExactRanges | None = None
     for platform_index, name in enumerate(PLATFORMS):
@@ -107,7 +107,7 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
                 exact = exact_ranges(mission, geometry, max(FINE_NODE_COUNT, int(np.max(count))), cases)
             tone = _Tone(exact, platform_index, line.frequency)
             value, hears_all = line.displacement, not (is_heard or isinstance(line.displacement, tuple))
-            if hears_all:  # and what its displacement adds in second order is a rounding of it
+            if hears_all:  # the second order of its displacement is rounding
                 of_axes = tone.of_range(value)[None]
             else:
                 x, y, z = (track / exact.ranges[platform_index] for track in exact.tracks[platform_index])
@@ -122,7 +122,7 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
 
 
 def slow_phases(mission: Mission, slow: Mapping[str, SlowTone], gain: Any) -> list[DeclaredPhase]:
-    """Phases of the vibrations below one cycle per aperture, which count with those of other errors."""
+    """Phases of the vibrations below one cycle per aperture, which count with the phases of other errors."""
     T, phases = mission.collection.aperture_time, []
     for row_id, tone in slow.items():
         line = getattr(mission.platforms, tone.subject.owner).motion_error.vibration.sinusoidal[
@@ -147,9 +147,9 @@ class _Tone:
         self.angle = 2 * math.pi * frequency * exact.times
 
     def of_range(self, size: Any) -> Floats:
-        """Effects of a range error of an amplitude, a number or (nodes, cases), of the first order in it. [m]
+        """Effects of a range error of an amplitude, a number or (nodes, cases), to first order. [m]
 
-        Those of `TonePhases` in all phases, (4, TONE_PHASE_COUNT, cases). [rad]
+        The fields of `TonePhases` in all phases, (4, TONE_PHASE_COUNT, cases). [rad]
         """
         exact = self.exact
         range_error = np.array((np.cos(self.angle), -np.sin(self.angle))) * size
@@ -160,7 +160,7 @@ class _Tone:
         return np.array((quadratic, cubic, hidden, beyond_cubic))
 
     def of(self, way: Vectors, size: Any) -> Floats:
-        """Effects of a motion along a way, floats, (cases,) or (nodes, cases), of any size [m], as `of_range`."""
+        """Effects, as `of_range`, of a motion of any size [m] along a way of floats, (cases,) or (nodes, cases)."""
         exact, cases = self.exact, self.exact.half.size
         small, size = (
             self.of_range(exact.along(self.platform_index, way) * size),
@@ -180,9 +180,9 @@ class _Tone:
         return small
 
     def _of_large(self, way: Vectors, size: Floats, cases: Indices) -> Floats:
-        """The same in some cases by exact ranges.
+        """The effects in some cases by exact ranges.
 
-        Where no ground point has the range history of a phase, that of the whole motion stands for each.
+        Where no ground point has the range history of a phase, the phase of the whole motion replaces each effect.
         """
         case, turned = np.repeat(cases, TONE_PHASE_COUNT), np.tile(ANGLES, cases.size)
         angle = self.angle[:, case] if self.angle.shape[1] > 1 else self.angle
@@ -200,7 +200,7 @@ def _of_case(component: Any, case: Indices) -> Any:
 
 
 def _worst(squares: Floats) -> Floats:
-    """Roots of the largest squares of axes, by values around a circle, (axes, TONE_PHASE_COUNT, cases), added."""
+    """Sum over axes of the roots of the largest squares around a circle, from (axes, TONE_PHASE_COUNT, cases)."""
     steps = TONE_PHASE_COUNT * VALUES_PER_PHASE
     around = np.fft.irfft(np.fft.rfft(squares, axis=1), steps, axis=1) * VALUES_PER_PHASE
     return np.asarray(np.sqrt(np.maximum(around.max(axis=1), 0.0)).sum(axis=0))

@@ -1,7 +1,7 @@
 """Every error a mission can have, in one case or in many.
 
-A check lists all of them: an error that the file does not declare is there too, because a designer comes for its
-allowable. A sweep lists those that are declared, and those of which something is asked.
+A check lists all of them, with the errors that the file does not declare, because a designer wants their allowable
+sizes. A sweep lists the declared errors, and the errors whose rows are asked for.
 """
 
 from collections.abc import Container, Iterator, Sequence
@@ -36,23 +36,23 @@ if TYPE_CHECKING:
 
 AnyEffect = TypeVar("AnyEffect", Effect, FullEffect)
 _AXES: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-_PUBLISHED_UNIT = Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0)  # of what only is a phase
+_PUBLISHED_UNIT = Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0)  # effect of a pure phase error
 _FULL_UNIT = FullEffect(east=0.0, north=0.0, qpe=1.0, cubic=0.0)
 
 
 def exact_ranges(
     mission: Mission, geometry: BistaticGeometry, count: int | None = None, cases: int = 1
 ) -> ExactRanges:
-    """Exact ranges of cases of a mission at their scene centres, at as many nodes as it needs, or a given number."""
+    """Exact ranges of a mission's cases at their scene centres, at `count` nodes or as many as the cases need."""
     T, is_heard = mission.collection.aperture_time, mission.has_direct_path
     count = count or nodes_for(geometry, T, has_direct_path=is_heard)
     return ExactRanges.of(geometry.both, mission.radar, T, count, cases, has_direct_path=is_heard)
 
 
 def distribution_of(mission: Mission, source: ErrorSource) -> str:
-    """Distribution of a declared error; what the file states as a size alone is a `bound`."""
+    """Distribution of a declared error; a size that the file states without a distribution is a `bound`."""
     if source.clock is not None:
-        # A clock's values are one sigma, as the coverage factor on them says.
+        # A clock's values are one sigma: the coverage factor multiplies them.
         return "normal"
     if source.owner in PLATFORMS:
         return str(getattr(mission.platforms, source.owner).motion_error.distribution)
@@ -62,7 +62,7 @@ def distribution_of(mission: Mission, source: ErrorSource) -> str:
 
 
 class ErrorListing:
-    """The errors of cases of one mission, as their file states them. Parameters are those of `DeclaredErrors`."""
+    """The errors of cases of one mission, as their file states them. `DeclaredErrors` documents the parameters."""
 
     def __init__(
         self, mission: Mission, geometry: BistaticGeometry, exact: ExactRanges, shown: Container[str] | None = None
@@ -118,7 +118,7 @@ class ErrorListing:
         path: KeyPath = ("platforms", name, "motion_error", key)
         notes, evidence = override_notes(name, error.overridden, kind), error.evidence(kind)
         for axis, (row_subject, row_path, equation, no_limit) in enumerate(scene_rows):
-            # Of errors that the file states along other axes those of the scene are listed where all are.
+            # Where the file states an error along other axes, its scene axes are listed only if all rows are.
             if self.shown is not None and row_subject.id not in self.shown and not (in_scene and values is not None):
                 continue
             on_axis = None
@@ -165,12 +165,12 @@ class ErrorListing:
             )
 
     def _of_clock(self) -> Iterator[ErrorSource]:
-        """Terms of the clock error, which a direct path takes away; what setting the clocks left; and their aging."""
+        """Terms of the clock error, which a direct path removes; errors left by setting the clocks; aging."""
         sync, is_heard = self.mission.synchronization, not self.mission.has_direct_path
         is_set = sync is not None and sync.is_holdover
         for power, (term, unit) in enumerate(CLOCK_UNITS.items()):
             value, row_subject = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
-            if self._is_listed(row_subject, value) and not (is_set and power < 2):  # which setting states
+            if self._is_listed(row_subject, value) and not (is_set and power < 2):  # setting states these
                 terms = tuple(float(power == order) for order in range(4))
                 no_limit = phrases.no_quadratic_term_of_clock(term) if is_heard else phrases.clock_is_heard()
                 equation = "Table I row 1, step of Table II" if term == "quadratic" else "Table I row 1"
@@ -192,7 +192,7 @@ class ErrorListing:
         evidence: str | None = None,
         is_heard: bool = True,
     ) -> ErrorSource:
-        """An error of the clock, a unit of which has these terms t̃₀ … t̃₃; the published model always hears it."""
+        """An error of the clock whose unit has these terms t̃₀ … t̃₃. The published model always hears it."""
         clock = terms if is_heard else (0.0,) * 4
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
         rows = evaluators.published_clock(SPEED_OF_LIGHT, wavelength, T)
@@ -214,7 +214,7 @@ class ErrorListing:
         )
 
     def _of_setting(self) -> Iterator[ErrorSource]:
-        """Time and frequency that setting the clocks left between them; in holdover also what is not declared."""
+        """Time and frequency errors that setting the clocks left; in holdover also where the file declares none."""
         sync = self.mission.synchronization
         if sync is None:
             return
@@ -232,7 +232,7 @@ class ErrorListing:
 
     @property
     def _delay_of_the_echo(self) -> tuple[Any, ...]:
-        """Terms of the time by which the echo comes after the direct path: a wrong clock measures it wrong. [s]"""
+        """Terms of the delay of the echo after the direct path, which a wrong clock measures wrong. [s]"""
         exact = self.exact
         seconds = (sum(exact.ranges) - exact.baselines) / SPEED_OF_LIGHT
         powers = np.vander(exact.sampling.places, 4, increasing=True)
@@ -242,9 +242,10 @@ class ErrorListing:
         )
 
     def _of_aging(self, name: str) -> Iterator[ErrorSource]:
-        """Drift of an oscillator's frequency since the clocks were set, D: a time of D·(H + τ)²/2.
+        """Drift D of an oscillator's frequency since the clocks were set: a time error of D·(H + τ)²/2.
 
-        Without an age only the quadratic term is known, and the location is not judged; a link takes all of it away.
+        Without an age only the quadratic term is known, and the location is not judged. A link removes all of the
+        drift.
         """
         oscillator, sync = getattr(self.mission.platforms, name).oscillator, self.mission.synchronization
         if oscillator is None:
@@ -271,11 +272,12 @@ class ErrorListing:
         )
 
     def _of_both_platforms(self) -> Iterator[ErrorSource]:
-        """Errors that both platforms have in common: the effects of both legs add with their signs.
+        """Errors that both platforms share: the effects of both legs add with their signs.
 
-        A bias of one GNSS service moves both measured paths by the same vector, along the axes of the scene; along
-        those of another frame each path is moved by the same components in its own axes. The range error, and with
-        it Table I and the full model, is linear in the errors: the common effect is the sum of the platforms' own.
+        A bias of one GNSS service moves both measured paths by the same vector, along the axes of the scene. Along
+        the axes of another frame it moves each path by the same components in the path's own axes. The range error,
+        and with it Table I and the full model, is linear in the errors: the common effect is the sum of the effects
+        of both platforms.
         """
         error = self.mission.common_motion_error
         if error is None:
@@ -294,7 +296,7 @@ class ErrorListing:
                 full = self._of_both([legs for _, legs in both], axis, None if in_scene else ways)
                 if kind == "position" and name in ("x", "y"):
                     # A horizontal shift of both platforms is a shift of the scene: x̂ is the error itself, and β̃ₙ and
-                    # ½s̈·x̂ cancel. What a sum of rounded numbers leaves would be a limit out of nothing.
+                    # ½s̈·x̂ cancel. The rest of a sum of rounded numbers would give a limit where none exists.
                     full = full._replace(qpe=0.0 * full.qpe, cubic=0.0 * full.cubic)
                 no_limit = phrases.no_quadratic_term_of_position()
                 if kind != "position":
@@ -317,16 +319,16 @@ class ErrorListing:
 
     @staticmethod
     def _of_both(legs: Sequence[Sequence[AnyEffect]], axis: int, ways: Sequence[Vectors] | None) -> AnyEffect:
-        """Effect of one error of both platforms along an axis of the scene, or along the way of each."""
+        """Effect of one error of both platforms along an axis of the scene, or along a way for each platform."""
         if ways is None:
             return _sum([effects[axis] for effects in legs])
         return _sum([_along(effects, way) for effects, way in zip(legs, ways, strict=True)])
 
     def _of_time_tags(self) -> Iterator[ErrorSource]:
-        """Time of the navigation against that of the radar: each platform's, and that of one clock for both.
+        """Time of the navigation against the radar's: of each platform, and of one clock for both.
 
-        A path is measured where the platform is a little later, p(τ + δt) − p(τ). Of a small tag that is v(τ)·δt, and
-        of any other exact ranges take the path itself.
+        The path is measured where the platform is a little later: the error is p(τ + δt) − p(τ). For a small tag it
+        is v(τ)·δt; for any other tag exact ranges take the path itself.
         """
         for platform_index, name in enumerate(PLATFORMS):
             error: MotionError = getattr(self.mission.platforms, name).motion_error
@@ -373,7 +375,7 @@ class ErrorListing:
         return (u, v, w)
 
     def _of_terrain(self) -> Iterator[ErrorSource]:
-        """A scene that is higher than the processor takes it for: both platforms measured too high by as much."""
+        """A scene higher than the processor assumes: both platforms are measured too high by as much."""
         height = self.mission.scene.height_error
         if height is None:
             return
@@ -430,8 +432,8 @@ def _along_scene_axis(
 ) -> Any:
     """Size along one axis of the scene of errors stated along the axes of another frame.
 
-    The three are independent, so one-sigma values add as squares and bounds add as magnitudes: a signed
-    rotation would let them cancel. The sign is that of the signed rotation.
+    The three errors are independent, so one-sigma values add as squares and bounds add as magnitudes: a signed
+    rotation would let them cancel. The sign is the sign of the signed rotation.
     """
     a, b, c = (value * direction[axis] for value, direction in zip(declared, axes, strict=True))
     size = np.sqrt(a * a + b * b + c * c) if distribution == "normal" else np.abs(a) + np.abs(b) + np.abs(c)
@@ -439,7 +441,7 @@ def _along_scene_axis(
 
 
 def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[Any]) -> Any:
-    """Sigma of position or velocity error along a direction given in the frame's axes: √(dᵀCd)."""
+    """Sigma of position or velocity error along a direction in the frame's axes: √(dᵀCd)."""
     parts = [sigma * along for sigma, along in zip(covariance.of(kind), direction, strict=True)]
     return np.sqrt(squared(covariance.block(kind), parts))
 
@@ -455,7 +457,7 @@ def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:
 
 
 def _total(terms: Sequence[Any]) -> Any:
-    """Sum of terms; what is left of those that cancel exactly is rounding, and would make a limit out of nothing."""
+    """Sum of terms. Where terms cancel exactly, the rest is rounding and would give a false limit: it becomes 0."""
     total = sum(terms)
     return np.where(np.abs(total) > ROUNDING * sum(np.abs(term) for term in terms), total, 0.0)
 
@@ -472,7 +474,7 @@ def _axis_of(frame: str, axis: str) -> str:
 
 
 def _no_limit(kind: str, axis: str) -> Note:
-    """Say why an error has no QPE limit, for the case that it has none."""
+    """Reason for the case that an error has no QPE limit."""
     if kind == "position":
         return phrases.no_quadratic_term_of_position()
     cause = "velocity" if kind == "velocity" else "line of sight"

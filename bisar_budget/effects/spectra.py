@@ -1,9 +1,10 @@
-"""Phase noise over an aperture: spectra as pieces of power laws, and what their integrals with a tone's parts give.
+"""Phase noise over an aperture: spectra as pieces of power laws, and their integrals with a tone's parts.
 
-Spectra are one-sided, of phase at the radar's centre frequency. [rad²/Hz] A data sheet's L(f) is half of one.
+Spectra are one-sided, for phase at the radar's centre frequency. [rad²/Hz] A data sheet's L(f) is half of such a
+spectrum.
 
-In the angle x = πfT the edges of panels are the same for every aperture time T, and so is what a power law gives
-between two of them: only the ends of a piece are integrated one by one.
+In the angle x = πfT the edges of panels are the same for every aperture time T, and so is the integral of a power law
+between two edges. Only the ends of a piece are integrated separately.
 """
 
 import math
@@ -19,16 +20,16 @@ from bisar_budget import evaluators
 from bisar_budget.image_plane import nodes
 from bisar_budget.ranges.exact_ranges import Floats
 
-SERIES_ANGLE_RAD = 0.5  # angle, or ratio, below which terms cancel and a series is exact to 1e-8
+SERIES_ANGLE_RAD = 0.5  # angle, or ratio; below it terms cancel and a series is exact to 1e-8
 
 
 class Parts(NamedTuple):
-    """Mean squares of a phase over the aperture [rad²]: quadratic, cubic, and what is left after the cubic.
+    """Mean squares of a phase over the aperture [rad²]: quadratic, cubic, and the rest after the cubic.
 
-    Then those of the constant and the linear part at the aperture edge, which displace, and the mean products of the
-    constant with the quadratic and of the linear with the cubic part; infinite where slow noise has no bound. A phase
-    that was set before the aperture has other mean products too; in any other even and odd orders know nothing of
-    each other.
+    `constant` and `linear` are the mean squares of the constant and the linear part at the aperture edge, which
+    displace. `constant_quadratic` and `linear_cubic` are mean products of two parts. These four are infinite where
+    slow noise has no bound. A phase that was set before the aperture has the last three mean products too. In any
+    other phase, even and odd orders are uncorrelated.
     """
 
     quadratic: Any
@@ -58,21 +59,21 @@ class Parts(NamedTuple):
 
     @property
     def rows(self) -> Floats:
-        """All of them, (parts, ...)."""
+        """All parts, (parts, ...)."""
         return np.array(np.broadcast_arrays(*self))
 
     def times(self, power: Any) -> "Parts":
-        """Those of a phase of so many times the power."""
+        """Parts of a phase with `power` times the power."""
         return Parts(*(mean_square * power for mean_square in self))
 
     @property
     def of_high_orders(self) -> "Parts":
-        """Those of a phase without its constant and linear part."""
+        """Parts of the phase without its constant and linear part."""
         nothing = 0.0 * self.quadratic
         return Parts(self.quadratic, self.cubic, self.left, *(nothing,) * (len(self) - 3))
 
     def without_constant(self) -> "Parts":
-        """Those of a phase whose constant part moves nothing."""
+        """Parts of a phase whose constant part moves nothing."""
         nothing = 0.0 * self.quadratic
         return self._replace(constant=nothing, constant_quadratic=nothing)
 
@@ -87,10 +88,10 @@ def gauss_markov(aperture_time: Any, correlation_time: Any) -> Parts:
 
 
 def tone(angle: Any) -> Floats:
-    """Amplitudes of the quadratic and the cubic phase of a tone of amplitude 1, in its worst phase, and what is left.
+    """Amplitudes of the parts of a tone of amplitude 1, each in its worst phase, and the power share of the rest.
 
-    `angle` is πfT; the third is the share of its power beyond the cubic. Then the amplitudes of the constant and the
-    linear part.
+    `angle` is πfT. The rows are quadratic phase, cubic phase, the share of the tone's power beyond the cubic,
+    constant part and linear part.
     """
     angle = np.asarray(angle)
     slow = np.array(*evaluators.tone_parts_slow(np.minimum(angle, SERIES_ANGLE_RAD)))  # type: ignore[arg-type]
@@ -100,23 +101,23 @@ def tone(angle: Any) -> Floats:
 
 
 def held(step: Any) -> Any:
-    """Spectrum of samples joined by straight lines, over that of white noise of their variance: sinc⁴."""
+    """Spectrum of samples joined by straight lines, over the spectrum of white noise of their variance: sinc⁴."""
     return np.sinc(step / (2 * math.pi)) ** 4
 
 
-_INTEGRAL_COUNT = 7  # parts of any spectrum, in their order
-_FOLLOWED_TURN_COUNT = 24  # half turns of a tone within the aperture that are followed one by one
-_FAST = _FOLLOWED_TURN_COUNT * math.pi  # angle from which what turns with a tone is averaged
-_RESOLVED_TURN_COUNT = 1.5  # half turns within a panel, up to which its nodes follow a tone however fast
+_INTEGRAL_COUNT = 7  # leading fields of `Parts` that any spectrum has
+_FOLLOWED_TURN_COUNT = 24  # half turns of a tone within the aperture up to which panels resolve them
+_FAST = _FOLLOWED_TURN_COUNT * math.pi  # angle from which terms that turn with a tone are averaged
+_RESOLVED_TURN_COUNT = 1.5  # half turns within a panel up to which its nodes resolve any tone
 _FIRST_POWER_ANGLE_RAD = (
     0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
 )
 _OCTAVE_RATIO = 2.0
-_SAME_EDGE_RATIO = 1.000001  # of two edges, computed in two ways
-_MIN_EDGE_RATIO = 1 + 1e-10  # ratio of two edges of panels, at least
-_FOLLOWED_IMAGE_COUNT = 10  # intervals of sampling up to which images are followed one by one
-_PASSED_IMAGE_COUNT = 50  # intervals beyond which they pass less than 1e-4 of its amplitude
-_NEAR_ALIAS_COUNT = 3  # rates, and one for each two powers of a slope, within which aliases are counted one by one
+_SAME_EDGE_RATIO = 1.000001  # largest ratio of two computations of the same edge
+_MIN_EDGE_RATIO = 1 + 1e-10  # least ratio of two edges of panels
+_FOLLOWED_IMAGE_COUNT = 10  # sampling rates up to which each image is followed
+_PASSED_IMAGE_COUNT = 50  # sampling rates beyond which straight lines pass less than 1e-4 of a tone's amplitude
+_NEAR_ALIAS_COUNT = 3  # rates, plus one for each two powers of a slope, within which each alias is counted
 _STEEP_EXPONENT = 4.0  # slope beyond which straight lines do not flatten an image of a piece
 _FALL_EXPONENT = 6.0  # powers of e by which a steep piece falls from edge to edge
 
@@ -125,7 +126,7 @@ _NODES, _WEIGHTS = (
     (0.5 + 0.5 * nodes(6).places)[:, None],
     nodes(6).fit[0][:, None],
 )
-_MAX_PANEL_COUNT = 4096  # panels that are integrated at once
+_MAX_PANEL_COUNT = 4096  # panels in one integration
 
 
 def _tone_edges(aperture_time: float) -> list[float]:
@@ -147,7 +148,7 @@ class PowerLawPiece(NamedTuple):
     slope: float
 
     def at(self, f: Any) -> Any:
-        """Density of its power law at frequencies. [rad²/Hz]"""
+        """Density of the power law at frequencies. [rad²/Hz]"""
         return self.density * f**-self.slope
 
     def integral(self, low: float, high: float) -> float:
@@ -159,7 +160,7 @@ class PowerLawPiece(NamedTuple):
 
 
 def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
-    """Density of a spectrum at frequencies [Hz]; 0 where no piece is. [rad²/Hz]"""
+    """Density of a spectrum at frequencies [Hz]; 0 outside its pieces. [rad²/Hz]"""
     total = np.zeros_like(frequency)
     for piece in pieces:
         is_in = (piece.low <= frequency) & (frequency < piece.high)
@@ -173,7 +174,7 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, above: Any = 0.0)
     Parameters
     ----------
     pieces : sequence of PowerLawPiece
-        Of a one-sided spectrum. [rad²/Hz]
+        Pieces of a one-sided spectrum. [rad²/Hz]
     aperture_time : float or (cases,)
         [s]
     above : float or (cases,)
@@ -189,14 +190,14 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, above: Any = 0.0)
 
 
 def left_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval: float | None) -> Parts:
-    """Parts over apertures (cases,): of a spectrum, or of what pulses leave of it that are exchanged so often."""
+    """Parts over apertures (cases,) of a spectrum, or of its rest after pulses are exchanged every `interval`."""
     times, time_index = np.unique(aperture_time, return_inverse=True)
     parts_of_times = parts(pieces, times) if interval is None else synchronized_parts(pieces, times, interval)
     return Parts(*parts_of_times.rows[:, time_index])
 
 
 def _like(total: Floats, aperture_time: Any) -> Parts:
-    """Parts as numbers or as arrays, as the aperture times are."""
+    """Parts as numbers or as arrays, like the aperture times."""
     return Parts(*total) if np.ndim(aperture_time) else Parts(*total[:, 0].tolist())
 
 
@@ -220,7 +221,7 @@ def _between_edges(slope: float) -> Floats:
 
 
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of a panel at the end of a piece, which may be slow or fast; nothing of one without length."""
+    """Parts of a panel at the end of a piece, which may be slow or fast; 0 for a panel without length."""
     total = np.zeros((_INTEGRAL_COUNT, low.size))
     is_slow = high <= _FIRST_POWER_ANGLE_RAD * _SAME_EDGE_RATIO
     is_fast = (low >= _FAST / _SAME_EDGE_RATIO) & (high > low + _RESOLVED_TURN_COUNT * math.pi)
@@ -236,7 +237,7 @@ def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def _integral(exponent: float, low: Floats, high: Floats) -> Floats:
-    """Integral of x^exponent; infinite from zero on where it does not converge."""
+    """Integral of x^exponent; infinite from zero on where the integral does not converge."""
     power = exponent + 1
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(high / low) if abs(power) < 1e-9 else (high**power - low**power) / power)
@@ -249,7 +250,7 @@ def _slow(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def _fast(slope: float, low: Floats, high: Floats) -> Floats:
-    """Tones so fast that what turns with them is averaged."""
+    """Tones so fast that terms turning with them are averaged."""
     (means,) = evaluators.tone_parts_fast(*(_integral(-power - slope, low, high) for power in (0, 2, 4, 6, 8)))  # type: ignore[arg-type]
     return np.array(means)
 
@@ -263,10 +264,10 @@ def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def squares(angle: Floats) -> Floats:
-    """Squares of a tone's parts, the share of its power that is left, and products of parts, as `Parts` has them.
+    """Squares of a tone's parts, the power share of its rest, and products of parts, in the order of `Parts`.
 
-    They are means of a tone of power 1; of one of amplitude 1, each part in the phase where it is largest. Order n of
-    a tone turns by n quarters: those that are two apart have opposite signs.
+    They are means of a tone of power 1, or the values of a tone of amplitude 1 with each part in the phase where the
+    part is largest. Order n of a tone turns by n quarters: orders that are two apart have opposite signs.
     """
     quadratic, cubic, spread, constant, linear = tone(angle)
     both = -constant * quadratic, -linear * cubic
@@ -283,17 +284,17 @@ _AGES = np.concatenate(
 
 
 def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Floats, averaging: Floats) -> Parts:
-    """Integrate what a clock that was set before the aperture has of a spectrum, (cases,).
+    """Integrate the part of a spectrum that a clock set before the aperture has, (cases,).
 
-    A line fitted to its phase over the averaging, `age` before mid-aperture, is taken off: a tone is left with
-    A₀ = j₀(x) − e^(−iθ)·[j₀(y) + H·(6i/t_c)·j₁(y)] and A₁ = 3i·j₁(x) − (T/2)·e^(−iθ)·(6i/t_c)·j₁(y) of orders 0 and 1
-    at the aperture edge, x = πfT, y = πft_c, θ = 2πfH. Higher orders are those of the free clock. Derived here;
-    bounded for slopes to f⁻⁴. Beyond 24 cycles within the age setting and aperture know nothing of each other.
+    A line fitted to the clock's phase over the averaging, `age` before mid-aperture, is subtracted. It leaves a tone
+    with A₀ = j₀(x) − e^(−iθ)·[j₀(y) + H·(6i/t_c)·j₁(y)] and A₁ = 3i·j₁(x) − (T/2)·e^(−iθ)·(6i/t_c)·j₁(y) of orders 0
+    and 1 at the aperture edge, x = πfT, y = πft_c, θ = 2πfH. Higher orders are those of the free clock. Derived here;
+    bounded for slopes to f⁻⁴. Beyond 24 cycles within the age, setting and aperture are uncorrelated.
 
     Parameters
     ----------
     pieces : sequence of PowerLawPiece
-        Of a one-sided spectrum. [rad²/Hz]
+        Pieces of a one-sided spectrum. [rad²/Hz]
     aperture_time, age, averaging : (cases,)
         T, H from the middle of the averaging to mid-aperture, at least (t_c + T)/2, and t_c. [s]
     """
@@ -301,7 +302,7 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
     times, above = (aperture_time, aperture_time, averaging), (0.0 * beyond, beyond, beyond)
     of_each = np.array(parts(pieces, np.concatenate(times), np.concatenate(above))[:_INTEGRAL_COUNT])
     free, of_clock, of_line = (Parts(*columns) for columns in np.split(of_each, 3, axis=1))
-    fast = of_line.linear * (2 / averaging) ** 2  # of the slope of the line
+    fast = of_line.linear * (2 / averaging) ** 2  # mean square of the line's slope
     half = aperture_time / 2
     together = [
         of_clock.constant + of_line.constant + age**2 * fast,
@@ -342,16 +343,16 @@ def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Fl
 
 
 # ---------------------------------------------------------------------- a clock that is heard twice
-_FOLLOWED_DELAY_CYCLES = 12  # turns of a tone within the delay that are followed
+_FOLLOWED_DELAY_CYCLES = 12  # turns of a tone within the delay up to which panels resolve them
 
 
 def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, delay: Any) -> Parts:
-    """Integrate what a clock has of a spectrum that is heard twice, so long apart: S·4 sin²(πfΔt).
+    """Integrate the difference of a clock's phase between two times, `delay` apart: S·4 sin²(πfΔt).
 
     Parameters
     ----------
     pieces : sequence of PowerLawPiece
-        Of a one-sided spectrum. [rad²/Hz]
+        Pieces of a one-sided spectrum. [rad²/Hz]
     aperture_time, delay : float or (cases,)
         T and Δt. [s]
     """
@@ -368,18 +369,18 @@ def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, delay: Any)
 
     scale = math.pi * times
     total = _over_panels(heard, edges, last, scale)
-    _add_fast(total, pieces, last, scale, 2.0)  # it turns within the delay so often that its mean counts
+    _add_fast(total, pieces, last, scale, 2.0)  # fast noise turns many times within the delay: its mean counts
     return _like(total, aperture_time)
 
 
 # ---------------------------------------------------------------------- synchronisation
 def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, interval: float) -> Parts:
-    """The same of what synchronisation leaves: a phase less the straight lines between samples of it.
+    """Integrate the rest of a spectrum after synchronisation: the phase less the straight lines between its samples.
 
-    Straight lines pass sinc²(f·T_s) of a tone, and fold every tone that is m/T_s away on it: of a spectrum S they
-    leave S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines begin anywhere in the interval. Pieces may be
-    narrow or steep, and begin and end anywhere: all is right to 1e-4, but for phases of what turns more than 24 times
-    within the aperture, which are means over its turns.
+    Straight lines pass sinc²(f·T_s) of a tone, and fold every tone at a distance of m/T_s onto it. They leave of a
+    spectrum S the spectrum S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines begin anywhere in the interval.
+    Pieces may be narrow or steep, and begin and end anywhere. The result is right to 1e-4, except for tones that turn
+    more than 24 times within the aperture: their phases are means over their turns.
     """
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     scale = math.pi * times
@@ -389,7 +390,7 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, inte
     images = _image_edges(ends, rate)
     edges = [[*_exchange_edges(T, rate), *images] for T in times.tolist()]
     total = _over_panels(lambda f, cases: _unjoined(pieces, f, rate), edges, last, scale)
-    _add_fast(total, pieces, last, scale, 1.0)  # straight lines pass nothing any more
+    _add_fast(total, pieces, last, scale, 1.0)  # straight lines pass no fast noise
     total += parts(_far_images(pieces, images, rate), times)[:_INTEGRAL_COUNT]
     return _like(total, aperture_time)
 
@@ -411,7 +412,7 @@ def _over_panels(
     high: Floats,
     scale: Floats,
 ) -> Floats:
-    """Integrate a density, of frequencies in cases, with the parts of a tone from 0 Hz on, between edges."""
+    """Integrate a density, a function of frequencies and cases, with a tone's parts, from 0 Hz on between edges."""
     panels = [
         (low, top, case)
         for case, (of_case, end) in enumerate(zip(edges, high.tolist(), strict=True))
@@ -429,7 +430,7 @@ def _over_panels(
 
 
 def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scale: Floats, times: float) -> None:
-    """Add what a spectrum, so many times, has beyond the last frequencies, where what turns is averaged."""
+    """Add `times` a spectrum beyond the last frequencies, where terms that turn with a tone are averaged."""
     for piece in pieces:
         to_angle = times * piece.density * scale ** (piece.slope - 1)
         low, high = np.maximum(piece.low, last) * scale, piece.high * scale
@@ -469,8 +470,8 @@ def _unjoined(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats
 def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
     """Sum of a piece at m·rate ± start, m = 1, 2 …; `start` is at most half a rate. [rad²/Hz]
 
-    Those where the power law bends within a rate are counted one by one, those beyond by the formula of Euler and
-    Maclaurin.
+    Aliases where the power law bends within a rate are added one by one. The formula of Euler and Maclaurin gives the
+    sum of the farther aliases.
     """
     far = math.ceil(_NEAR_ALIAS_COUNT + abs(piece.slope) / 2)
     first, end = max(1, math.floor(piece.low / rate)), min(far, math.ceil(piece.high / rate) + 1)
@@ -486,10 +487,10 @@ def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
 
 
 def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: float) -> list[PowerLawPiece]:
-    """Mean of the images beyond those that are followed, (2/T_s³)·∫ S·sin⁴(πfT_s) df/(πf)⁴, as pieces.
+    """Mean of the images beyond the images that are followed, (2/T_s³)·∫ S·sin⁴(πfT_s) df/(πf)⁴, as pieces.
 
-    They lie x rates from whole ones: by Euler and Maclaurin B₂(x) times the slope where they begin is missing, which
-    beginnings half a rate before and behind make up.
+    They lie x rates from whole rates. By Euler and Maclaurin the mean lacks B₂(x) times the slope where the images
+    begin. Beginnings half a rate before and half a rate behind replace that term.
     """
     low, high = np.array(list(_panels(rate / 2, [rate / 4, *edges]))).T
     f = low + (high - low) * _NODES
@@ -505,10 +506,10 @@ def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: f
 
 
 def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) -> Floats:
-    """Sum of a power law at steps from `low` to `high`, both with, by Euler and Maclaurin. [rad²/Hz]
+    """Sum of a power law at steps from `low` to `high`, both included, by Euler and Maclaurin. [rad²/Hz]
 
-    The integral over the step, half of both ends, and B₂ₖ/(2k)!·step^(2k−1) times what odd derivatives differ by:
-    the first, the third and the fifth.
+    The sum is the integral over the step, plus half of both ends, plus B₂ₖ/(2k)!·step^(2k−1) times the difference of
+    odd derivatives between the ends: the first, the third and the fifth.
     """
     slope, density, derivatives = piece.slope, [], []
     for f in (low, high):
@@ -523,7 +524,7 @@ def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) 
 
 
 def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
-    """Frequencies between which a tone's parts, and what straight lines pass, are smooth. [Hz]"""
+    """Frequencies between which a tone's parts, and the share that straight lines pass, are smooth. [Hz]"""
     edges = [*_tone_edges(aperture_time), rate / 4, *(rate * n / 2 for n in range(1, 2 * _FOLLOWED_IMAGE_COUNT + 1))]
     octave = _FOLLOWED_TURN_COUNT / aperture_time
     while octave < rate / 4:
@@ -544,7 +545,7 @@ def _image_edges(ends: Sequence[float], rate: float) -> list[float]:
 
 
 def _ends(piece: PowerLawPiece) -> Iterator[float]:
-    """Where a piece begins and ends, and where a steep one has fallen from there by a few powers of e. [Hz]"""
+    """Ends of a piece, and frequencies at which a steep piece has fallen by a few powers of e. [Hz]"""
     yield from (piece.low, piece.high)
     if abs(piece.slope) > _STEEP_EXPONENT:
         dense = piece.low if piece.slope > 0 else piece.high
@@ -553,7 +554,7 @@ def _ends(piece: PowerLawPiece) -> Iterator[float]:
 
 
 def _panels(high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
-    """Neighbouring edges from 0 Hz on; of two that are the same, computed in two ways, one.
+    """Neighbouring edges from 0 Hz on. Two computations of the same edge count as one edge.
 
     Between the two a tone would be folded on 0 Hz, where a spectrum has no value.
     """

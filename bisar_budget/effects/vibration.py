@@ -1,24 +1,24 @@
-"""Declared vibrations as they count: as paired echoes, along the line of sight, as slow phases, and by spectra.
+"""Declared vibrations: their paired echoes, components along the line of sight, slow phases, and spectra.
 
-Of a receiver that hears the transmitter data hold ranges less the direct path: there a vibration counts as what it
-changes of that.
+For a receiver that hears the transmitter the data hold ranges less the direct path. There a vibration counts by its
+change of this difference.
 
-A vibration of peak phase φ and n < 1 cycles per aperture makes no echoes. It has the Legendre parts 5·j₂(πn)·φ and
-7·j₃(πn)·φ over the aperture where they are largest; 3/2 and 5/2 of them stand at its edge. Its sign and phase are not
-known, so that it counts like any other error: alone against a limit, and in sums and root-sum-squares.
+A vibration of peak phase φ and n < 1 cycles per aperture makes no echoes. Its largest Legendre parts over the
+aperture are 5·j₂(πn)·φ and 7·j₃(πn)·φ; at the aperture edge the phases are 3/2 and 5/2 of these parts. Its sign and
+phase are unknown, so it counts like any other error: alone against a limit, and in sums and root-sum-squares.
 
-A vibration of n > 1 cycles per aperture and peak phase φ makes echoes at n cells from the response, of φ/2 of its
-amplitude and of its shape: of a uniform aperture sinc(x) = sin(πx)/(πx), whose sidelobes reach the next echo. The
-phases of vibrations are not known. At a place x the echoes of several are at their worst in phase, with
-Σ φ_k/2·|sinc(x − n_k)|, and what counts is the place where that is largest. Derived here; held within 0.5 dB to
-transforms of the phasor in the worst of its phases, from three cycles per aperture on
-(`tests/effects/test_echoes.py`). The echoes at −n_k are left out: they add up to 0.3 dB at three cycles, and less
-beyond.
+A vibration of n > 1 cycles per aperture and peak phase φ makes echoes at n cells from the response. An echo has φ/2
+of the amplitude of the response and the same shape: for a uniform aperture sinc(x) = sin(πx)/(πx), whose sidelobes
+reach the next echo. The phases of vibrations are unknown. At a position x the worst case of several echoes is in
+phase, Σ φ_k/2·|sinc(x − n_k)|, and the position with the largest sum counts. Derived here; within 0.5 dB of
+transforms of the phasor in its worst phases, from three cycles per aperture on (`tests/effects/test_echoes.py`). The
+echoes at −n_k are left out: they add up to 0.3 dB at three cycles, and less beyond.
 
-Acceleration of a spectrum S_a is displacement of S_x = S_a/(2πf)⁴. Its quadratic and cubic phase, what spreads and
-what displaces are the integrals of `spectra`, so that what is slower than the aperture counts as what it is.
+A spectrum S_a of acceleration is a spectrum S_x = S_a/(2πf)⁴ of displacement. Its quadratic phase, cubic phase,
+spread and displacement are the integrals of `spectra`, so motion slower than the aperture counts as the phase that it
+is.
 
-Numbers of a mission may be arrays (cases,); its geometry then is that of these cases, else the mission's own.
+Numbers of a mission may be arrays (cases,). The geometry then holds these cases; otherwise it is the mission's own.
 """
 
 import math
@@ -44,32 +44,32 @@ from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.units import format_quantity
 
 NEAR_CYCLES = 2.5  # per aperture; farther apart, two equal lines raise each other's echo by less than 1.1 dB
-SLOWEST_ECHO_CYCLES = 1.0  # cycles per aperture; what is slower makes no echoes
+SLOWEST_ECHO_CYCLES = 1.0  # cycles per aperture; a slower vibration makes no echoes
 ECHO_CYCLES = 3.0  # likewise; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
 
 _STEPS = (0.1, 0.02)  # of the search, in cells
 _REACH = np.arange(-6, 7)[:, None, None]
-_SEARCH_START_COUNT = 16  # places around which it looks
-_MAX_ECHO_COUNT = 200_000  # echoes that are looked at together
+_SEARCH_START_COUNT = 16  # positions around which the search looks
+_MAX_ECHO_COUNT = 200_000  # echoes in one array
 
 DISPLACED = ((2 * math.pi) ** -4, 4.0)  # S_x = S_a/(2πf)⁴
 _STEEP_DENSITY_EXPONENT = 20.0  # slope of a density beyond which its powers would overflow
-_STEEP_PIECE_COUNT = 16  # by which such a piece is taken instead: it is narrow, or nearly nothing at one of its ends
+_STEEP_PIECE_COUNT = 16  # flat pieces in place of a steep piece, which is narrow, or nearly zero at one end
 
 
 # ---------------------------------------------------------------------- echoes that add
 class Worst(NamedTuple):
-    """Lines in their worst phases: the amplitude of one line with an echo as high, and the place of that echo."""
+    """Lines in their worst phases: the amplitude of one line with an echo as high, and the position of that echo."""
 
     amplitude: Any
     cycles: Any
 
 
 def near_groups(cycles: Floats) -> NDArray[np.intp]:
-    """Tell which lines, (n, cases), follow each other within 2.5 cycles per aperture, two or more together.
+    """Group lines, (n, cases), that follow each other within 2.5 cycles per aperture, two or more to a group.
 
-    Groups of a case are numbered from the lowest frequency on; -1 where a line is in none, as those slower than one
-    cycle per aperture are.
+    Groups of a case are numbered from the lowest frequency on. A line outside all groups has -1, as has every line
+    slower than one cycle per aperture.
     """
     order = np.argsort(cycles, axis=0, kind="stable")
     placed = np.take_along_axis(cycles, order, axis=0)
@@ -92,22 +92,22 @@ def near_lines(cycles: Sequence[float]) -> list[tuple[int, ...]]:
 
 
 def worst_phases(amplitudes: Any, cycles: Any, is_member: Truths | None = None) -> Worst:
-    """Find how high the echoes of several lines stand together in the worst phases.
+    """Find the height of the echoes of several lines together in their worst phases.
 
     Parameters
     ----------
     amplitudes : (n,) or (n, cases)
         0 to peak, in any unit.
-    cycles : of the same shape
-        Per aperture.
-    is_member : of the same shape, optional
-        Which of the lines are looked at, at least one in each case; all without it.
+    cycles : same shape
+        Cycles per aperture.
+    is_member : same shape, optional
+        Which lines count, at least one in each case; all lines if omitted.
 
     Returns
     -------
     Worst
-        Amplitude of one line whose echo is as high, in the unit of `amplitudes`; at least the largest of them, and
-        their sum where all have one frequency.
+        Amplitude of one line whose echo is as high, in the unit of `amplitudes`. It is at least the largest
+        amplitude, and the sum of all amplitudes where all lines have one frequency.
     """
     sizes, frequencies = np.asarray(amplitudes, dtype=float), np.asarray(cycles, dtype=float)
     count, *shape = sizes.shape
@@ -119,12 +119,12 @@ def worst_phases(amplitudes: Any, cycles: Any, is_member: Truths | None = None) 
     here = np.arange(frequencies.shape[1])
     order = np.argsort(frequencies, axis=0, kind="stable")[:count]
     sizes, frequencies = sizes[order, here], frequencies[order, here]
-    if is_member is not None:  # where a case has fewer, lines without an amplitude beside the last
+    if is_member is not None:  # a case with fewer lines gets lines without an amplitude at the last frequency
         is_line = np.isfinite(frequencies)
         sizes = np.where(is_line, sizes, 0.0)
         frequencies = np.where(is_line, frequencies, np.where(is_line, frequencies, 0.0).max(axis=0))
     begins = np.flatnonzero(np.append(True, (frequencies[1:] != frequencies[:-1]).any(axis=1)))
-    sizes, frequencies = np.add.reduceat(sizes, begins, axis=0), frequencies[begins]  # lines of one frequency are one
+    sizes, frequencies = np.add.reduceat(sizes, begins, axis=0), frequencies[begins]  # lines of one frequency merge
     if len(frequencies) == 1:
         return Worst(sizes[0].reshape(shape)[()], frequencies[0].reshape(shape)[()])
     starts = np.sort(np.concatenate((frequencies, (frequencies[1:] + frequencies[:-1]) / 2)), axis=0)
@@ -140,7 +140,7 @@ def worst_phases(amplitudes: Any, cycles: Any, is_member: Truths | None = None) 
 
 
 def _highest(sizes: Floats, frequencies: Floats, starts: Floats) -> Floats:
-    """Places within a cell of which lie the lines that make most of an echo: the highest of them, each once."""
+    """Highest starts, each once, by the sum of the amplitudes of the lines within a cell of the start."""
     summed = np.concatenate((np.zeros((1, sizes.shape[1])), np.cumsum(sizes, axis=0)))
     before, until = (_count(frequencies, starts, reach) for reach in (-1, 1))
     around = np.take_along_axis(summed, until, axis=0) - np.take_along_axis(summed, before, axis=0)
@@ -150,7 +150,7 @@ def _highest(sizes: Floats, frequencies: Floats, starts: Floats) -> Floats:
 
 
 def _count(frequencies: Floats, starts: Floats, reach: int) -> NDArray[np.intp]:
-    """Number of places below each start less a cell, or up to each start and a cell; both are sorted."""
+    """Number of lines below each start less a cell, or up to each start plus a cell; both arrays are sorted."""
     ends = starts + reach
     both = (frequencies, ends) if reach > 0 else (ends, frequencies)
     order = np.argsort(np.concatenate(both), axis=0, kind="stable")
@@ -161,7 +161,7 @@ def _count(frequencies: Floats, starts: Floats, reach: int) -> NDArray[np.intp]:
 
 
 def _searched(sizes: Floats, frequencies: Floats, starts: Floats) -> tuple[Floats, Floats]:
-    """Height and place of the highest echo at the starts and in steps around them."""
+    """Height and position of the highest echo at the starts and in steps around them."""
     best = starts
     for step in _STEPS:
         tried = best + step * _REACH
@@ -174,7 +174,7 @@ def _searched(sizes: Floats, frequencies: Floats, starts: Floats) -> tuple[Float
 
 
 def _heights(sizes: Floats, frequencies: Floats, x: Floats) -> Floats:
-    """Height of all echoes together, in phase, at places (…, cases)."""
+    """Height of all echoes together, in phase, at positions (…, cases)."""
     return np.asarray((sizes * np.abs(np.sinc(x[..., None, :] - frequencies))).sum(axis=-2))
 
 
@@ -182,7 +182,7 @@ def _heights(sizes: Floats, frequencies: Floats, x: Floats) -> Floats:
 class Line(NamedTuple):
     """One sinusoid: amplitude along the line of sight, 0 to peak [m], and frequency [Hz].
 
-    `per_metre` is what the unit of its row has of a metre of it: (2πf)² where the file states its acceleration.
+    `per_metre` is the size of a metre of it in the unit of its row: (2πf)² where the file states its acceleration.
     """
 
     amplitude: Any
@@ -191,7 +191,7 @@ class Line(NamedTuple):
 
 
 def sight_of(mission: Mission, name: str, geometry: Any = None) -> Vector:
-    """Part of a metre of a platform's motion that the range loses, or the range less the direct path. [-]"""
+    """Range, or range less the direct path, that a metre of a platform's motion removes. [-]"""
     sights = (geometry or mission.geometry).sights(has_direct_path=mission.has_direct_path)
     sight: Vector = sights[PLATFORMS.index(name)]
     return sight
@@ -200,10 +200,10 @@ def sight_of(mission: Mission, name: str, geometry: Any = None) -> Vector:
 def seen_of_axes(
     mission: Mission, name: str, *, is_vector: bool, geometry: BistaticGeometry | None = None
 ) -> list[Any]:
-    """Part of a metre along each axis of a platform's error that the range has, rms over the aperture. [-]
+    """Share of a metre along each axis of a platform's error that the range contains, rms over the aperture. [-]
 
-    The line of sight turns. No echo is higher than by the rms, and as much spreads. A vibration that is no vector is
-    along the line of sight, of which the range has all, and the range less the direct path a part.
+    The line of sight turns. The rms bounds the height of every echo, and gives the spread. A vibration that is no
+    vector runs along the line of sight: the range contains all of it, and the range less the direct path a part.
     """
     geometry, is_heard = geometry or mission.geometry, mission.has_direct_path
     if not is_vector and not is_heard:
@@ -222,9 +222,9 @@ def seen_of_axes(
 
 
 def counted(mission: Mission, name: str, value: Any, metric: str, geometry: BistaticGeometry | None = None) -> Any:
-    """Amplitude (`pslr`) or rms (`islr`) of a platform's vibration along the line of sight: of `seen_of_axes`. [m]
+    """Amplitude (`pslr`) or rms (`islr`) of a platform's vibration along the line of sight, by `seen_of_axes`. [m]
 
-    Projections of amplitudes add, as the axes may vibrate in any phase; rms values are taken for independent and add
+    Projections of amplitudes add, because the axes may vibrate in any phase. Rms values count as independent and add
     as squares.
     """
     is_vector = isinstance(value, tuple)
@@ -248,7 +248,7 @@ def lines_of(mission: Mission, name: str, geometry: Any = None) -> list[Line]:
 
 
 def unit_of_line(mission: Mission, name: str, entry: int) -> str:
-    """Unit of the row of a sinusoid: that of its acceleration where the file states that."""
+    """Unit of the row of a sinusoid: the unit of acceleration where the file states the acceleration."""
     lines = getattr(mission.platforms, name).motion_error.vibration.sinusoidal
     return "m/s^2" if entry < len(lines) and isinstance(lines[entry], AcceleratedSinusoid) else "m"
 
@@ -256,10 +256,10 @@ def unit_of_line(mission: Mission, name: str, entry: int) -> str:
 def projected(
     mission: Mission, value: float | Vector, error: MotionError, along: float, *, is_slow: bool = False
 ) -> tuple[Note, ...]:
-    """Say of a vibration along three axes what is along the line of sight; nothing of one that is.
+    """Note on a vibration along three axes: its component along the line of sight; empty for any other vibration.
 
-    With a direct path say of either what is left in the range less the direct path. One that `is_slow` does as much
-    as that.
+    With a direct path the note gives, for either vibration, the component in the range less the direct path. A
+    vibration that `is_slow` has the same effect as its component.
     """
     says = phrases.does_as_much_as_along_the_sight if is_slow else phrases.seen_of_vibration
     if not isinstance(value, tuple):
@@ -276,22 +276,22 @@ def projected(
 def quadratic_part(cycles: Any) -> Any:
     """Worst quadratic phase at the aperture edge of a sinusoid, over its peak phase: 7.5·j₂(π·cycles).
 
-    The least-squares quadratic of cos(πnx) over the aperture; half of it is a Taylor term where n is small.
+    It is the least-squares quadratic of cos(πnx) over the aperture. Where n is small it is the Taylor term (πn)²/2.
     """
     return np.abs(tone(math.pi * cycles)[0])
 
 
 def cubic_part(cycles: Any) -> Any:
-    """Worst cubic phase likewise: 17.5·j₃(π·cycles), of the least-squares cubic of sin(πnx)."""
+    """Worst cubic phase at the aperture edge: 17.5·j₃(π·cycles), the least-squares cubic of sin(πnx)."""
     return np.abs(tone(math.pi * cycles)[1])
 
 
 class DeclaredPhase(NamedTuple):
     """Phases of one declared error, which sums count: row id, owner, quadratic and cubic phase. [rad]
 
-    What is a quadratic phase and nothing else has no cubic one: None. A vibration is there, and its phases are not
-    0, only in the cases in which it is slow. `coverage` is the coverage factor that both phases have in them. The
-    `hidden` phase is what band and turn do not resolve of a loss, which counts with the quadratic one. [rad]
+    A pure quadratic phase has no cubic phase: None. `is_there` marks the cases in which a vibration is slow; in all
+    other cases its phases are 0. `coverage` is the coverage factor in both phases. The `hidden` phase is the part of
+    a loss that band and turn do not resolve, and counts with the quadratic phase. [rad]
     """
 
     row_id: str
@@ -303,14 +303,14 @@ class DeclaredPhase(NamedTuple):
     hidden_rad: Any = 0.0
 
     def judged(self, gain: Any) -> Any:
-        """Magnitude of the phase that is held to a limit with autofocus' gain in it: `Declared.judged`. [rad]"""
+        """Magnitude of the phase that counts against a limit raised by autofocus' gain: `Declared.judged`. [rad]"""
         return np.hypot(self.qpe_rad, gain * self.hidden_rad)
 
 
 def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
-    """How each vibration below one cycle per aperture moves its platform: along each axis, as cosine and as sine.
+    """Motion of a platform by each vibration below one cycle per aperture: along each axis, as cosine and as sine.
 
-    One that is stated along the line of sight moves along that of the centre. [m]
+    A vibration stated along the line of sight moves along the line of sight of the scene centre. [m]
     """
     for name in PLATFORMS:
         for index, line in enumerate(seen.error(name).vibration.sinusoidal):
@@ -337,14 +337,14 @@ def power_of(vibration: Vibration | FeltVibration) -> Any:
 def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -> tuple[PowerLawPiece, ...]:
     """A spectrum of acceleration [(m/s²)²/Hz] as pieces of power laws, times factor·f^(−slope) of a law.
 
-    One of displacement is that of its acceleration, (2πf)⁴ times as large. Numbers only.
+    A spectrum of displacement enters as the spectrum of its acceleration, (2πf)⁴ times as large. Numbers only.
     """
     factor, slope = law
     if not spectrum.is_accelerated:
         factor, slope = factor / DISPLACED[0], slope - DISPLACED[1]
     pieces = []
     for (f, density), (g, last) in pairwise(spectrum.points):
-        if not (density and last):  # made so small that nothing is left, of which there is no logarithm
+        if not (density and last):  # a density so small that it became 0 has no logarithm
             continue
         own_slope = math.log(density / last) / math.log(g / f)
         if abs(own_slope) <= _STEEP_DENSITY_EXPONENT:
@@ -367,8 +367,9 @@ def spectrum_parts(
 ) -> Parts:
     """Parts over the aperture of a spectrum times a law, (cases,) each, see `spectrum_pieces`.
 
-    `interval` is that of exchanged pulses, of which then counts what they leave, `delay` that between two times of
-    which only the difference counts. Densities, intervals and delays may differ from case to case.
+    `interval` is the interval of exchanged pulses: the parts are the rest after the exchanges. `delay` is the time
+    between two moments of which only the difference counts. Densities, intervals and delays may differ from case to
+    case.
     """
     total = np.zeros((len(Parts._fields), seen.cases))
     for (of_group, exchanged), cases in seen.alike((spectrum, interval)):
@@ -382,7 +383,7 @@ def spectrum_parts(
 
 
 def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Vibration of a platform by its spectrum: its unit is that of noise, a factor of amplitude, declared 1."""
+    """Vibration of a platform by its spectrum. Its unit is the unit of noise, a factor of amplitude, declared 1."""
     vibration = seen.error(name).vibration
     if vibration.spectrum is None:
         return
@@ -390,12 +391,12 @@ def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
     platform_index = PLATFORMS.index(name)
     x, y, z = (
         track / seen.exact.ranges[platform_index] for track in seen.exact.tracks[platform_index]
-    )  # it shakes along these
+    )  # the line of sight, along which the platform shakes
     published, full = seen.of_parts(noise.times(power_of(vibration)), seen.exact.along(platform_index, (x, y, z)))
     path = ("platforms", name, "motion_error", "vibration", "spectrum")
     row_subject = subject(name, "vibration", "spectrum")
     moves: tuple[Moves, ...] = ()
-    if seen.has_edge:  # along the line of sight of the centre, and nothing is said of other motion
+    if seen.has_edge:  # along the line of sight of the centre: the file states no other motion
         way = seen.factor * seen.vector(getattr(seen.geometry, name).look)[None, :, None]
         courses = seen.courses(noise.times(power_of(vibration)).covariance)
         moves = (Moves(platform_index, way, courses),)

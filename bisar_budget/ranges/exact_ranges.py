@@ -1,29 +1,30 @@
 """Effects of errors of any size by exact ranges, in many cases at once: no expansion.
 
-The data hold the ranges of the true path; the processor subtracts those of the measured one. For a ground point x the
-range error ρ(τ; x) is the recorded range less the expected one. The phase over band and aperture is 2πfρ/c, and to
-second order in that phase the image peaks where the phase has the least variance, a constant phase being free:
+The data hold the ranges of the true path; the processor subtracts the ranges of the measured path. For a ground point
+x the range error ρ(τ; x) is the recorded range less the expected range. The phase over band and aperture is 2πfρ/c.
+To second order in that phase the image peaks where the phase has the least variance, a constant phase being free:
 
     V(x) = Var_τ(ρ) + b²⟨ρ²⟩,    b² = B²/(12 f₀²),
 
 for a band of width B, evenly filled, about f₀; ⟨ ⟩ is the mean over the aperture. With the product that belongs to V,
-⟨a, c⟩ = (1 + b²)⟨ac⟩ − ⟨a⟩⟨c⟩, the point obeys ⟨∂ρ/∂x, ρ⟩ = 0. Where b is much larger than the square of the turn
-of the line of sight, ρ then has no part along the Legendre polynomials P₀ and P₁ of the aperture; a narrow band or a
-wide turn leaves some of both.
+⟨a, c⟩ = (1 + b²)⟨ac⟩ − ⟨a⟩⟨c⟩, the point obeys ⟨∂ρ/∂x, ρ⟩ = 0. Where b is much larger than the square of the turn of
+the line of sight, ρ then has no part along the Legendre polynomials P₀ and P₁ of the aperture. A narrow band or a
+wide turn leaves a part of both.
 
 Fitted over the aperture at the nodes of Gauss-Legendre quadrature, the P₂ and P₃ parts of ρ at that point are the
-quadratic and the cubic phase, and the rest beyond P₃ spreads. The hidden phase is the quadratic phase of as much loss
-of the peak as all of V that is neither quadratic, nor cubic, nor rest: what the band and the turn do not resolve.
+quadratic and the cubic phase, and the rest beyond P₃ spreads. The hidden phase holds the part of V that is neither
+quadratic, nor cubic, nor rest, which band and turn do not resolve: it is the quadratic phase with the same loss of
+the peak.
 
-For errors so small that their effects are proportional to them, `effect` gives the same. Derived here; held to images
-by direct sums in `tests/theory/test_image_point.py`.
+For errors so small that their effects are proportional to them, `effect` gives the same. Derived here. Images by
+direct sums check it in `tests/theory/test_image_point.py`.
 
-A receiver that hears the transmitter takes the direct path as its clock: the data then hold R_t + R_r less the actual
-distance of the platforms, and the processor subtracts ranges less the measured one. No ground point changes that
-distance, so that it counts like a clock error, c·t̃ = |r̂_t − r̂_r| − |r_t − r_r|, and other clock errors have no part.
+A receiver that hears the transmitter takes the direct path as its clock. The data then hold R_t + R_r less the actual
+distance of the platforms, and the processor subtracts ranges less the measured distance. No ground point changes that
+distance, so it counts like a clock error, c·t̃ = |r̂_t − r̂_r| − |r_t − r_r|, and no other clock error counts.
 
-What is sampled over the aperture is (nodes, cases); what is asked of errors is (nodes, lanes), a lane being one error
-of one case. A single case serves any number of lanes as it stands.
+Samples over the aperture are (nodes, cases). Effects of errors are (nodes, lanes): a lane is one error of one case. A
+single case serves any number of lanes.
 """
 
 import math
@@ -46,7 +47,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Truths = NDArray[np.bool_]
 
-FINE_NODE_COUNT = 24  # nodes of courses that are not as smooth as those of (22)
+FINE_NODE_COUNT = 24  # nodes of courses less smooth than the courses of (22)
 RANGE_ROUNDING_FRACTION = 2e-15  # rounding error of a few operations, as a fraction of a range sum
 MAX_TURN_RAD = 1.0  # turn of a line of sight within the aperture up to which Legendre orders have a meaning
 
@@ -111,7 +112,7 @@ class PointSettings:
 
 SETTINGS = PointSettings()
 
-# Arrays of all samples that hold measured paths, and those with the arrays that a step works on.
+# Number of arrays of all samples that hold measured paths, and the number together with the arrays of a step.
 _MEASURED_ARRAY_COUNT, _ARRAY_COUNT = 8, 16
 
 
@@ -148,10 +149,10 @@ class FullEffect(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeTags:
-    """Lanes that are time tags: each takes the path of a platform for what it is later, p(τ + δt) − p(τ).
+    """Lanes that are time tags: each takes a platform's path at a later time, p(τ + δt) − p(τ).
 
-    `paths` are those of both platforms, `times` the nodes of the cases (nodes, cases) [s]. `case` (lanes,) is the one
-    whose path each lane takes, -1 of a lane that is no time tag.
+    `paths` are the paths of both platforms, `times` the nodes of the cases (nodes, cases) [s]. `case` (lanes,) is the
+    case whose path each lane takes, -1 for a lane that is no time tag.
     """
 
     paths: tuple[PlatformState, PlatformState]
@@ -159,12 +160,12 @@ class TimeTags:
     case: Indices
 
     def of(self, lanes: Indices) -> "TimeTags | None":
-        """Some of the lanes; None where none of them is a time tag."""
+        """Some of the lanes; None if no lane of them is a time tag."""
         case = self.case.take(lanes)
         return replace(self, case=case) if (case >= 0).any() else None
 
     def put(self, platform: int, tag_s: Floats, along: Sequence[Floats], *, is_rate: bool = False) -> list[Any]:
-        """Put what time tags (nodes, lanes) shift a platform by [m], or that per second more, into other motions."""
+        """Insert a platform's shift by time tags (nodes, lanes) [m], or its rate per second, into other motions."""
         tagged = np.flatnonzero(self.case >= 0)
         (times,), tag_s = _take_cases([self.times], self.case[tagged]), tag_s[:, tagged]
         path = self.paths[platform].of(self.case[tagged])
@@ -177,24 +178,25 @@ class TimeTags:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lanes:
-    """Units of errors, one a lane: of the position of platforms along a direction, or of the range by a clock.
+    """Units of errors, one per lane: a position error of platforms along a direction, or a range error by a clock.
 
     Attributes
     ----------
     case : (lanes,)
-        The case that each is an error of.
+        The case of each error.
     at_nodes : (nodes, lanes)
-        Position error, of a clock range error [m/unit]; of a time tag its sign.
+        Position error, or for a clock the range error [m/unit], or for a time tag its sign.
     moves : two of float or (lanes,)
-        1 where transmitter, receiver moves, else 0.
+        1 where the transmitter, or the receiver, moves, else 0.
     direction : Vectors
-        Of the motion; floats, (lanes,), or (nodes, lanes) of one that turns. Of a small time tag the velocity. [m/s]
+        Direction of the motion: floats, (lanes,), or (nodes, lanes) for a direction that turns. For a small time tag
+        the velocity. [m/s]
     order : int or (lanes,)
-        Power of slow time that a position error grows with, those of velocity turn Doppler; -1 of a clock.
+        Power of slow time with which a position error grows; -1 for a clock. An error of velocity turns Doppler.
     of_receiver : Vectors, optional
-        Direction of the receiver's motion where it is another one.
+        Direction of the receiver's motion if it differs.
     tags : TimeTags, optional
-        What lanes that are time tags take for the path, where there are any.
+        Paths of the lanes that are time tags, if any lane is.
     """
 
     case: Indices
@@ -207,7 +209,7 @@ class Lanes:
 
     @property
     def directions(self) -> tuple[Vectors, Vectors]:
-        """Directions in which transmitter and receiver are moved."""
+        """Directions in which errors move transmitter and receiver."""
         return self.direction, self.direction if self.of_receiver is None else self.of_receiver
 
     @property
@@ -217,7 +219,7 @@ class Lanes:
 
     @property
     def platforms(self) -> list[int]:
-        """Those that any of the lanes moves."""
+        """Platforms that any of the lanes moves."""
         return [platform for platform in (0, 1) if np.any(self.moves[platform])]
 
     def of(self, lanes: Indices) -> "Lanes":
@@ -232,11 +234,11 @@ class Lanes:
         return Lanes(self.case.take(lanes), at_nodes, (u, v), (x, y, z), order, of_receiver, tags)
 
     def there(self, case: Indices) -> "Lanes":
-        """The same of lanes, one a case, where cases are chosen anew: errors of `ExactRanges.at`."""
+        """The lanes, one per case, for a new choice of cases: errors of `ExactRanges.at`."""
         return replace(self.of(case), case=np.arange(case.size))
 
     def shifts(self, size: Any) -> list[Any]:
-        """Shift of each platform by errors of sizes at the nodes. [m]"""
+        """Shift of each platform at the nodes by errors of given sizes. [m]"""
         along = [self.at_nodes * (size * component) for component in self.direction]
         both = [along, along]
         if self.of_receiver is not None:
@@ -249,7 +251,7 @@ class Lanes:
         return [_weighted(shift, weight) for shift, weight in zip(both, self.moves, strict=True)]
 
     def ways(self, size: Any) -> tuple[Sequence[Any], Sequence[Any]]:
-        """Directions in which larger errors move transmitter and receiver on; those of time tags turn as paths do."""
+        """Directions in which larger errors move transmitter and receiver; for time tags they turn with the paths."""
         if self.tags is None:
             return self.directions
         of_transmitter, of_receiver = (
@@ -259,7 +261,7 @@ class Lanes:
         return of_transmitter, of_receiver
 
     def clock(self, size: Any) -> Any:
-        """Range error by clocks of errors of sizes at the nodes. [m]"""
+        """Range error at the nodes by clock errors of given sizes. [m]"""
         transmitter, receiver = self.moves
         is_clock = 1.0 - np.maximum(transmitter, receiver)
         return self.at_nodes * (size * is_clock) if np.any(is_clock) else np.zeros_like(self.at_nodes)
@@ -268,10 +270,10 @@ class Lanes:
 class SmallErrors(NamedTuple):
     """Small errors that all cases have.
 
-    `courses` of errors over the aperture are (courses, nodes, cases) [m/unit], and `course` is that of each error,
-    (errors,). `ways` say how far each moves the transmitter east, north and up, so the receiver, and the range by the
-    clock, (errors, 7, cases); what all cases share is there once. Of errors that turn it is `turning` that says so,
-    by the place of each, at the nodes, (7, nodes, cases).
+    `courses` of errors over the aperture are (courses, nodes, cases) [m/unit], and `course` is the index of the
+    course of each error, (errors,). `ways` are the shifts by each error, (errors, 7, cases): transmitter east, north
+    and up, receiver east, north and up, and the range by the clock. A row that all cases share has one case. For
+    errors that turn, `turning` has these shifts at the nodes, (7, nodes, cases), by the index of the error.
     """
 
     courses: Floats
@@ -281,7 +283,7 @@ class SmallErrors(NamedTuple):
 
     @classmethod
     def of(cls, errors: Sequence[Lanes]) -> "SmallErrors":
-        """Errors whose lanes are the cases."""
+        """Small errors from lanes, one `Lanes` per error, whose lanes are the cases."""
         courses: dict[Any, Floats] = {}
         components = [
             component
@@ -307,16 +309,17 @@ class SmallErrors(NamedTuple):
         return cls(np.array(list(courses.values())), np.array(course), ways, turning)
 
     def there(self, case: Indices) -> "SmallErrors":
-        """The same errors where cases are chosen anew; as `Lanes.there`."""
+        """The same errors for a new choice of cases, like `Lanes.there`."""
         courses, ways, *turning = _take_cases([self.courses, self.ways, *self.turning.values()], case)
         return SmallErrors(courses, self.course, ways, dict(zip(self.turning, turning, strict=True)))
 
 
 class ImagePoints(NamedTuple):
-    """Effects of errors by exact ranges; `is_settled` where they are certain at once.
+    """Effects of errors by exact ranges; `is_settled` where the search was certain at once.
 
     Displacement east, north [m]; quadratic and cubic phase at the aperture edge, signed like β̃; the `hidden` phase,
-    and the rms beyond the cubic. [rad] `turn` is the area that the gradients of V span there, over the centre's.
+    and the rms beyond the cubic. [rad] `turn` is the area that the gradients of V span at the point, over their area
+    at the centre.
     """
 
     is_settled: Truths
@@ -345,11 +348,11 @@ class ExactEffect:
 
     @property
     def equal_loss(self) -> float:
-        """Quadratic phase of as much loss of the peak as quadratic and hidden phase together. [rad]"""
+        """Quadratic phase with the same loss of the peak as quadratic and hidden phase together. [rad]"""
         return math.hypot(self.quadratic, self.hidden)
 
     def moved(self, by: GroundVector) -> GroundVector:
-        """The displacement and another one together."""
+        """Sum of this displacement and a second displacement."""
         return self.displacement[0] + by[0], self.displacement[1] + by[1]
 
 
@@ -363,9 +366,10 @@ class ExactRanges:
     band : (n,)
         b², the variance of the frequency over the band, over the square of its centre.
     sampling : Sampling
-        When the paths are sampled, at nodes or anywhere.
+        Slow times at which the paths are sampled, at nodes or anywhere.
     tracks : sequence of Vectors
-        Positions of both platforms at the nodes, as what stands for the scene centre sees them, (nodes, n). [m]
+        Positions of both platforms at the nodes, relative to the scene centre or the point in its place, (nodes, n).
+        [m]
     positions : sequence of Vectors
         The same at the middle of the aperture, (n,). [m]
     has_direct_path : bool
@@ -374,7 +378,7 @@ class ExactRanges:
     Attributes
     ----------
     gradient : (2, 4, n)
-        Mean, P₁ part at the edge, quadratic and cubic part of what a metre east, and north, adds to the range error.
+        Mean, P₁ part at the edge, quadratic and cubic part of the range error that a metre east, and north, adds.
     """
 
     def __init__(
@@ -408,7 +412,7 @@ class ExactRanges:
         *,
         has_direct_path: bool = False,
     ) -> "ExactRanges":
-        """Exact ranges of collections, at their scene centres: of transmitter and receiver."""
+        """Exact ranges of collections, with paths of transmitter and receiver, at their scene centres."""
 
         def of_each(value: Any) -> Floats:
             return np.array(np.broadcast_to(np.asarray(value, dtype=float), (cases,)))
@@ -428,7 +432,7 @@ class ExactRanges:
         return cls(half, k, band, sampling, tracks, middles, has_direct_path=has_direct_path)
 
     def at(self, east: Floats, north: Floats, case: Indices) -> "ExactRanges":
-        """Exact ranges of cases at points of the ground, (case,), in place of the centre. [m]"""
+        """Exact ranges of cases at points of the ground, (case,), instead of the centre. [m]"""
         tracks = [(x - east, y - north, z) for x, y, z in (_take_cases([*track], case) for track in self.tracks)]
         positions = [(x[case] - east, y[case] - north, z[case]) for x, y, z in self.positions]
         half, k, band = self.half[case], self.k[case], self.band[case]
@@ -442,7 +446,7 @@ class ExactRanges:
 
     @cached_property
     def slopes(self) -> Floats:
-        """Decrease of the range at the nodes per metre east, and north, (2, nodes, n): u_t + u_r on the ground."""
+        """Decrease of the range at the nodes per metre east, and north, u_t + u_r on the ground, (2, nodes, n)."""
         (p, q), (R, S) = self.tracks, self.ranges
         return np.array([p[axis] / R + q[axis] / S for axis in (0, 1)])
 
@@ -455,7 +459,7 @@ class ExactRanges:
     def is_turned(self) -> Truths:
         """Whether a line of sight turns by more than `MAX_TURN_RAD` between two times of the aperture, (n,)."""
         least = np.full(self.half.shape, math.inf)
-        if self.fit.shape[1] > FEWEST_NODES:  # with fewer nodes no platform gets so far
+        if self.fit.shape[1] > FEWEST_NODES:  # with fewer nodes no line of sight turns that far
             for track, ranges in zip(self.tracks, self.ranges, strict=True):
                 looks = np.stack(np.broadcast_arrays(*(component / ranges for component in track)))
                 looks = np.concatenate((looks, self.sampling.to_ends @ looks), axis=1)
@@ -470,12 +474,12 @@ class ExactRanges:
 
     @cached_property
     def nearest(self) -> Floats:
-        """Least range at the nodes and, where they leave it out, at the middle of the aperture. [m]"""
+        """Least range at the nodes, and at the middle of the aperture, which the nodes may leave out. [m]"""
         return np.asarray(np.minimum(np.minimum(*map(norm, self.positions)), self.nearest_node))
 
     @cached_property
     def rounding(self) -> Floats:
-        """A phase history in double precision holds no phase that is smaller. [rad]"""
+        """Smallest phase that a phase history in double precision can hold. [rad]"""
         recorded = (self.ranges[0] + self.ranges[1]).max(axis=0)
         if self.has_direct_path:
             recorded = recorded + self.baselines.max(axis=0)
@@ -483,7 +487,7 @@ class ExactRanges:
 
     @cached_property
     def _between(self) -> Vectors:
-        """The transmitter at the nodes, as the receiver has it. [m]"""
+        """Position of the transmitter relative to the receiver at the nodes. [m]"""
         (x, y, z), (u, v, w) = self.tracks
         return (x - u, y - v, z - w)
 
@@ -494,14 +498,14 @@ class ExactRanges:
 
     @cached_property
     def heard_along(self) -> tuple[Vectors, Vectors]:
-        """Unit vectors along the direct path at the nodes, from the other platform to each."""
+        """Unit vectors along the direct path at the nodes: receiver to transmitter, transmitter to receiver."""
         x, y, z = (component / self.baselines for component in self._between)
         return ((x, y, z), (-x, -y, -z))
 
     # ------------------------------------------------------------------ small errors
     @cached_property
     def powers(self) -> dict[str, Floats]:
-        """Position error at the nodes of a unit of an error: 1, τ or τ²/2 of (22)."""
+        """Position error at the nodes by a unit of an error: 1, τ or τ²/2 of (22)."""
         return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
 
     def clock_course(self, terms: Sequence[Any]) -> Floats:
@@ -510,21 +514,21 @@ class ExactRanges:
         return np.asarray(SPEED_OF_LIGHT * seconds + np.zeros_like(self.times))
 
     def along(self, platform: int, direction: Vectors) -> Floats:
-        """Change of a platform's range at the nodes per metre along a direction, −u·d; if heard, −(u − b)·d."""
+        """Change of a platform's range at the nodes per metre along a direction: −u·d, or −(u − b)·d if heard."""
         change: Floats = -dot(self.tracks[platform], direction) / self.ranges[platform]
         return change + dot(self.heard_along[platform], direction) if self.has_direct_path else change
 
     def range_error(self, lanes: Lanes) -> Floats:
-        """Range error at the nodes of a small unit of errors, one of each case, or all of a single case. [m/unit]"""
+        """Range error at the nodes by a small unit of errors, one per case, or all of a single case. [m/unit]"""
         moved = lanes.clock(1.0)
         for platform in lanes.platforms:
             moved = moved + lanes.moves[platform] * self.along(platform, lanes.directions[platform]) * lanes.at_nodes
         return np.asarray(moved)
 
     def quadratics_of(self, errors: SmallErrors) -> Floats:
-        """Quadratic phase of a unit of small errors, that of `effect`, (errors, cases). [rad/unit]"""
+        """Quadratic phase by a unit of small errors, as in `effect`, (errors, cases). [rad/unit]"""
         weights = self.phase_weights[0]
-        along = np.empty((7, *weights.shape))  # what a metre does to the range at the nodes, along each way
+        along = np.empty((7, *weights.shape))  # range change at the nodes by a metre along each way
         for platform in (0, 1):
             of_axes = along[3 * platform : 3 * platform + 3]
             for axis in (0, 1, 2):
@@ -560,7 +564,7 @@ class ExactRanges:
     def hidden_weights(self) -> Floats:
         """Parts of the hidden phase per metre at each node, whose squares add up, (4, nodes, n). [rad/m]
 
-        By orders 0 to 3; what lies beyond counts with the small b² alone, and where the aperture turns with all.
+        By orders 0 to 3. The rest beyond order 3 counts only with the small b², or in full where the aperture turns.
         """
         of_orders = np.array([self.band, (1 + self.band) / 3, self.band / 5 / 1.5**2, self.band / 7 / 2.5**2])
         of_orders[3] += self.is_turned / (7 * 2.5**2)
@@ -568,19 +572,19 @@ class ExactRanges:
 
     @cached_property
     def most_per_metre(self) -> Floats:
-        """Bounds of effects of a range error of a metre at most, whatever its course, (4, n).
+        """Bounds of the effects of a range error of at most a metre, for any course, (4, n).
 
         Quadratic, cubic and hidden phase [rad], and displacement. [m]
         """
         mean, slope, quadratic, cubic = np.abs(self.order_weights).sum(axis=1)
-        # Displaced, nothing has a larger V than before: 1 + b² at most, of which the variance is a part.
+        # The displacement never increases V, which is 1 + b² at most, its variance included.
         hidden = QUADRATIC_OF_VARIANCE * np.sqrt(self.band * (1 + self.band + mean**2) + slope**2 / 3)
         hidden = np.where(self.is_turned, QUADRATIC_OF_VARIANCE * np.sqrt(1 + self.band), hidden)
         east, north = (np.abs(weights).sum(axis=0) for weights in self.place_weights)
         return np.array((self.k * quadratic, self.k * cubic, self.k * hidden, np.hypot(east, north)))
 
     def effect(self, range_error: Floats) -> FullEffect:
-        """Effect of small range errors at the nodes, (..., nodes, cases), that of the displacement included."""
+        """Effect of small range errors at the nodes, (..., nodes, cases), with the effect of the displacement."""
         size = np.abs(range_error)
         (east, seen_east), (north, seen_north) = (
             ((weights * range_error).sum(axis=-2), (np.abs(weights) * size).sum(axis=-2))
@@ -594,11 +598,11 @@ class ExactRanges:
             phase = order_phase + by_east * east + by_north * north
             seen = most + np.abs(by_east) * seen_east + np.abs(by_north) * seen_north
             phases.append(self.k * _unless_rounding(phase, seen))
-        # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
+        # Where terms cancel exactly, the rest is rounding and would give a limit where none exists.
         return FullEffect(_unless_rounding(east, seen_east), _unless_rounding(north, seen_north), *phases)
 
     def left_of_small(self, range_error: Floats, moved: tuple[Any, Any]) -> Floats:
-        """Range error that small errors (..., nodes, cases) leave where they move the point, (..., cases). [m]"""
+        """Range error that small errors (..., nodes, cases) leave at the point they move to, (..., cases). [m]"""
         (by_east, by_north), (east, north) = self.slopes, (np.asarray(component)[..., None, :] for component in moved)
         return np.asarray(range_error + by_east * east + by_north * north)
 
@@ -609,22 +613,22 @@ class ExactRanges:
         return _unresolved(np.moveaxis(orders, -2, 0), squares, self.k, self.band, self.is_turned)
 
     def mean_squares(self, remaining: Floats, orders: Floats) -> tuple[Floats, Floats]:
-        """Mean squares of range errors left at the nodes, and of what they have beyond orders 0 to 3. [m²]"""
+        """Mean squares of range errors left at the nodes, and of their rest beyond orders 0 to 3. [m²]"""
         beyond = remaining - self._legendre @ orders
         return self.fit[0] @ (remaining * remaining), self.fit[0] @ (beyond * beyond)
 
     @cached_property
     def _legendre(self) -> Floats:
-        """Orders 0 to 3 that are 1 at the edge by their leading terms, at the nodes, (nodes, 4)."""
+        """Orders 0 to 3 at the nodes, each with its leading term equal to 1 at the edge, (nodes, 4)."""
         return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEADING)
 
     # ------------------------------------------------------------------ errors of any size
     def phases(self, lanes: Lanes, size: Floats, near: tuple[Any, Any], *, is_at_fold: bool = False) -> ImagePoints:
-        """Find where errors of given sizes move a point at the centre, and what defocuses there.
+        """Find the point to which errors of given sizes move a point at the centre, and the defocus there.
 
-        The search starts `near` [m]. A point is found where the search settles at once; `is_at_fold`, where V leads
-        down to it from there. `paths` follows a point. A point beyond a line on which range and Doppler gradients are
-        parallel is not found: no error leads there from nothing.
+        The search starts `near` [m]. It finds a point where it settles at once, or, `is_at_fold`, where V leads down
+        to the point from the start. `point_paths` follows a point. The search does not find a point beyond a line on
+        which range and Doppler gradients are parallel: no growing error leads there.
         """
         return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
@@ -635,16 +639,17 @@ class ExactRanges:
         return _remaining(measured, *point, room[_MEASURED_ARRAY_COUNT:])
 
     def _heard(self, shifts: Sequence[Any], case: Indices) -> Floats:
-        """The c·t̃ at the nodes by shifts of the platforms where the direct path is the clock. [m]"""
+        """The c·t̃ at the nodes by shifts of the platforms if the direct path is the clock. [m]"""
         a, b, c = (of_transmitter - of_receiver for of_transmitter, of_receiver in zip(*shifts, strict=True))
         x, y, z, baseline = _take_cases([*self._between, self.baselines], case)
         grown = a * (2 * x + a) + b * (2 * y + b) + c * (2 * z + c)
         return np.asarray(grown / (baseline + np.sqrt(np.abs(baseline * baseline + grown))))
 
     def way(self, lanes: Lanes, size: Floats, point: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-        """Where points go with larger errors, at the places that errors of sizes move them to. [m/unit]
+        """Motion of points with growing errors, at the points to which errors of given sizes move them. [m/unit]
 
-        As the least of V does: by its second derivative, and by what a larger error changes of its slope.
+        It is the motion of the least of V: by the second derivative of V, and by the change of its slope with the
+        error.
         """
         course, ways = lanes.at_nodes, lanes.ways(size)
         east, north = point
@@ -686,8 +691,8 @@ class ExactRanges:
     ) -> ImagePoints:
         """Newton's method for the least of V, or `is_at_fold` a descent.
 
-        Range errors by clocks (nodes, lanes) [m], three shifts of each platform there [m], where the search starts
-        [m], and the cases of the lanes.
+        `clock` are range errors by clocks (nodes, lanes) [m], `shifts` three shifts of each platform at the nodes
+        [m], `near` the start of the search [m], and `case` the cases of the lanes.
         """
         lanes = clock.shape[1]
         size = max(1, min(lanes, SETTINGS.samples_at_once // self.fit.shape[1]))
@@ -717,16 +722,17 @@ class ExactRanges:
         return points
 
     def _room(self, lanes: int) -> Floats:
-        """Room in which so many lanes are worked on: the system takes longer to give it than it takes to fill it."""
+        """Work arrays for a number of lanes, allocated once because allocation takes longer than filling them."""
         return np.empty((_ARRAY_COUNT, self.fit.shape[1], lanes))
 
     def _measured(self, clock: Floats, shifts: Sequence[Any], case: Indices, room: Floats) -> list[Floats]:
         """Parts of errors that `_seen` takes, (nodes, lanes): the clock error, and five of each platform, in `room`.
 
-        A range R grows by p/(R + √(R² + p)) where d is added to its vector r, with p = d·(2r + d): that has no
-        rounding of the range itself. From a point at g = (east, north) it is p - 2r̂·g + |g|².
+        If d is added to a platform's vector r, its range R grows by p/(R + √(R² + p)), with p = d·(2r + d). This form
+        has no rounding of the range itself. From a point at g = (east, north) the growth has p - 2r̂·g + |g|²
+        instead.
         """
-        if self.has_direct_path:  # whose own clock errors are nothing
+        if self.has_direct_path:  # no other clock error counts
             clock = clock + self._heard(shifts, case)
         measured = [clock]
         for track, ranges, (a, b, c), room_of_platform in zip(
@@ -735,7 +741,7 @@ class ExactRanges:
             x, y, z, R = _take_cases([*track, ranges], case)
             u, v, p, squared_range = room_of_platform[
                 ..., : max(x.shape[-1], a.shape[-1])
-            ]  # what all lanes share is worked out once
+            ]  # arrays that all lanes share are computed once
             np.add(x, a, out=u)
             np.add(y, b, out=v)
             np.add(x, u, out=p)
@@ -754,9 +760,9 @@ class ExactRanges:
 
 
 class _PointSearch:
-    """Newton's method for the points of lanes, those that have settled left out: `alive` are their places in `found`.
+    """Newton's method for the points of the lanes that have not settled. `alive` are their indices in `points`.
 
-    With them their cases, the points so far [m], and what is measured, in some room.
+    The search also keeps the cases of these lanes, their points so far [m], the measured arrays, and work arrays.
     """
 
     def __init__(
@@ -808,7 +814,7 @@ class _PointSearch:
                 self._go_on(going)
 
     def descend(self) -> None:
-        """Search by damped steps that only go down V: slower, and safe where V hardly bends, as near a fold."""
+        """Search by damped steps that only go down V. It is slower, and safe where V hardly bends, as near a fold."""
         exact = self.exact
         k, meets, band = _take_cases([exact.k, exact.nearest, exact.band], self.of)
         damping = SETTINGS.damping_fraction * sum(_take_cases([exact.matrix.xx + exact.matrix.yy], self.of))
@@ -852,9 +858,9 @@ class _PointSearch:
     def _keep(
         self, is_done: Truths, remaining: Floats, slopes: Floats, step: tuple[Floats, Floats], turn: Floats
     ) -> None:
-        """Note the lanes that have settled; what is less than rounding leaves is none.
+        """Store the lanes that have settled; a phase below the rounding counts as 0.
 
-        Their range error is that which was `left` before the last step, and what the step adds to it.
+        The range error is `remaining` before the last step, plus the change by the step.
         """
         done = np.flatnonzero(is_done)
         if not done.size:
@@ -875,10 +881,10 @@ class _PointSearch:
 
 
 def _newton_step(matrix: GroundMatrix, remaining: Floats, looks: Floats, distances: Floats) -> tuple[Floats, Floats]:
-    """Step east and north to where V is least, by its slope and how that changes. [m]
+    """Step east and north to the least of V, by its slope and the change of the slope. [m]
 
-    Range errors left at the nodes (nodes, lanes) [m], the components of the lines of sight of both platforms over the
-    ground (2, 2, nodes, lanes), and their ranges. [m]
+    `remaining` are range errors left at the nodes (nodes, lanes) [m], `looks` the components of the lines of sight of
+    both platforms over the ground (2, 2, nodes, lanes), and `distances` their ranges. [m]
     """
     slope = np.einsum("anc,nc->ac", matrix.projection, remaining)
     return _against(matrix, matrix.projected(remaining), looks, distances, slope)
@@ -887,7 +893,7 @@ def _newton_step(matrix: GroundMatrix, remaining: Floats, looks: Floats, distanc
 def _against(
     matrix: GroundMatrix, weights: Floats, looks: Floats, distances: Floats, slope: Floats
 ) -> tuple[Floats, Floats]:
-    """Step that takes away half a slope of V, by how that changes; where V is no bowl, by H alone. [m]"""
+    """Step that removes half a slope of V, by the change of the slope; where V is no bowl, by H alone. [m]"""
     xx, xy, yy = _bends(matrix, weights, looks, distances)
     is_bowl = (xx * yy - xy * xy > SETTINGS.bowl_fraction * matrix.determinant) & (xx > 0)
     if not is_bowl.all():
@@ -904,7 +910,7 @@ def _bends(matrix: GroundMatrix, weights: Floats, looks: Floats, distances: Floa
 
 
 def _solved(bends: tuple[Floats, Floats, Floats], slope: Floats) -> tuple[Floats, Floats]:
-    """Step that takes away half a slope of V where V bends so. [m]"""
+    """Step that removes half a slope of V, by half the second derivative of V. [m]"""
     (xx, xy, yy), (x, y) = bends, slope
     determinant = xx * yy - xy * xy
     return (xy * y - yy * x) / determinant, (xy * x - xx * y) / determinant
@@ -926,14 +932,14 @@ def _unless_rounding(value: Floats, seen: Floats) -> Floats:
 
 
 def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:
-    """A shift of a platform that lanes move or leave where it is."""
+    """Shift of a platform, multiplied by the weight with which lanes move the platform."""
     if np.ndim(weight):
         return [weight * component for component in along]
     return along if weight else STILL
 
 
 def _grow(platform: Sequence[Floats], east: Any, north: Any, room: Floats, distance: Floats) -> None:
-    """Fill with how much longer than the true range a platform's range to points is, and with that range. [m]"""
+    """Fill `room` with the growth of a platform's range to points, and `distance` with the range itself. [m]"""
     u, v, R, p, squared_range = platform
     grown, scratch = room[:2]
     np.multiply(u, 2 * east, out=grown)
@@ -948,7 +954,7 @@ def _grow(platform: Sequence[Floats], east: Any, north: Any, room: Floats, dista
 
 
 def _remaining(measured: Sequence[Floats], east: Any, north: Any, room: Floats) -> Floats:
-    """Range error at the nodes that is left at points (lanes,), (nodes, lanes). [m]"""
+    """Range error left at the nodes at points (lanes,), (nodes, lanes). [m]"""
     clock, first, second = measured[0], room[:3], room[3:6]
     _grow(measured[1:6], east, north, first, room[6])
     _grow(measured[6:], east, north, second, room[6])
@@ -958,9 +964,10 @@ def _remaining(measured: Sequence[Floats], east: Any, north: Any, room: Floats) 
 
 
 def _seen(measured: Sequence[Floats], east: Floats, north: Floats, room: Floats) -> tuple[Floats, Floats, Floats]:
-    """Range error at the nodes that is left at points, (nodes, lanes) [m]; and what both platforms see, in `room`.
+    """Range error left at the nodes at points, (nodes, lanes) [m], and the view of both platforms, in `room`.
 
-    Components east and north of their lines of sight, (2, 2, nodes, lanes), and their ranges, (2, nodes, lanes). [m]
+    The view has the components east and north of the lines of sight, (2, 2, nodes, lanes), and the ranges, (2, nodes,
+    lanes). [m]
     """
     both = room[:8].reshape(2, 4, *room.shape[1:])
     for platform, out in zip((measured[1:6], measured[6:]), both, strict=True):
@@ -974,24 +981,24 @@ def _seen(measured: Sequence[Floats], east: Floats, north: Floats, room: Floats)
 
 
 def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Indices) -> ImagePoints:
-    """Find where errors of any course move a point at the centre, in steps from no error on where need be.
+    """Find where errors of any course move a point at the centre, if necessary in steps from no error on.
 
     Parameters
     ----------
     exact : ExactRanges
-        Of the cases.
+        Exact ranges of the cases.
     clock : (nodes, lanes)
-        Range errors by clocks, none where the direct path is the clock. [m]
+        Range errors by clocks; zero if the direct path is the clock. [m]
     shifts : two of three of (nodes, lanes)
-        Of both platforms. [m]
+        Shifts of both platforms. [m]
     case : (lanes,)
-        The case that each is an error of.
+        The case of each error.
 
     Returns
     -------
     ImagePoints
-        NaN where no ground point has the recorded history, or only one to which no error leads from nothing.
-        As on a way of `point_paths`, none has it where half a cycle is hidden and gradients of V span little.
+        NaN if no ground point has the recorded history, or only a point to which no growing error leads. As on a path
+        of `point_paths`, no point has it if half a cycle is hidden and the gradients of V span little.
     """
     points = _within_ends(exact.settled(clock, shifts, (0.0, 0.0), case))
     for steps in SETTINGS.course_steps:
@@ -1004,7 +1011,7 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Ind
             fraction = (step + 1) / steps
             ahead = [[fraction * along for along in shift] for shift in moved]
             there = _within_ends(exact.settled(fraction * noise, ahead, near, case[missed]))
-            near = np.array((there.east, there.north)) * ((step + 2) / (step + 1))  # NaN from the first lost one on
+            near = np.array((there.east, there.north)) * ((step + 2) / (step + 1))  # NaN from the first lost point on
         for column, later in zip(points, there, strict=True):
             column[missed] = later
     has_ended = (np.abs(points.turn) < SETTINGS.folded_fraction) & (points.hidden > SETTINGS.end_rad)
@@ -1015,14 +1022,14 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Ind
 
 
 def _within_ends(points: ImagePoints) -> ImagePoints:
-    """The same without points beyond the end of the image."""
+    """The points, without points beyond the end of the image."""
     is_gone = (np.abs(points.turn) < SETTINGS.folded_fraction) & (points.hidden > SETTINGS.end_rad)
     return ImagePoints(points.is_settled & ~is_gone, *(np.where(is_gone, math.nan, column) for column in points[1:]))
 
 
 def _take(arrays: Sequence[Floats], indices: Indices) -> list[Floats]:
-    """Some lanes of arrays (nodes, lanes); what all of them share stays as it is."""
+    """Some lanes of arrays (nodes, lanes). An array that all lanes share stays as it is."""
     return [array if array.shape[-1] == 1 else array.take(indices, axis=-1) for array in arrays]
 
 
-_take_cases = _take  # of cases, arrays (nodes, cases) or (cases,): a single case is shared by all lanes
+_take_cases = _take  # for cases, arrays (nodes, cases) or (cases,): all lanes share a single case

@@ -158,7 +158,7 @@ def find_first_sizes(paths: PointPaths, searches: LimitSearches, smallest: Float
         index, size = state.next_sizes(going, is_several=tries_several_sizes(going.size, paths.is_alike))
         paths.step_toward(searches.lane[index], size)
         searches, tries, low = searches.of(going), tries[going] + state.is_between[going], state.low[going]
-    np.minimum.at(smallest, (searches.requirement, searches.group), low)  # below every limit, and safe
+    np.minimum.at(smallest, (searches.requirement, searches.group), low)  # safe: below every limit
 
 
 class _SearchState:
@@ -332,7 +332,7 @@ def _on_cubic(position: Floats, start: Floats, rise: Floats, slope_low: Floats, 
 
 
 def _crests(slope_low: Floats, rise: Floats, slope_high: Floats) -> tuple[Floats, Floats]:
-    """Positions at which the cubic has no slope; not finite where there is none."""
+    """Positions at which the cubic has no slope; not finite without such a position."""
     b, c = 3 * rise - 2 * slope_low - slope_high, slope_low + slope_high - 2 * rise
     far = -(b + np.copysign(np.sqrt(b * b - 3 * c * slope_low), b))
     return far / (3 * c), slope_low / far

@@ -18,7 +18,7 @@ from bisar_budget.constants import ROUNDING
 from bisar_budget.ranges.exact_ranges import SETTINGS as POINT_SETTINGS
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Indices, Lanes, Truths
 
-# Rows of a known point: the size of the error [unit], then the fields of `Found`.
+# Rows of a known point: the size of the error [unit], then the fields of `ImagePoints`.
 SIZE, EAST, NORTH, QUADRATIC, CUBIC, HIDDEN, REST, AREA = ROWS = range(8)
 _NO_ERROR = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
 
@@ -116,7 +116,7 @@ class PointPaths:
         self._longest_step = np.full(lane_count, math.inf)
         self._limited_from = np.zeros(lane_count)  # size from which `_longest_step` holds
         self._missed_last = np.zeros(lane_count, dtype=bool)  # whether the last step of the lane led nowhere
-        self._missed_ever = np.zeros(lane_count, dtype=bool)  # then the start of the path predicts nothing any more
+        self._missed_ever = np.zeros(lane_count, dtype=bool)  # after a miss the start of the path predicts no point
 
     def known(self, lane: Indices, size: Floats) -> Floats:
         """Known points at sizes to which `follow_to` went, (rows, lanes); not a number beyond the end of a path."""
@@ -175,7 +175,7 @@ class PointPaths:
             & (np.abs(point[AREA]) < POINT_SETTINGS.folded_fraction)
             & (point[HIDDEN] > POINT_SETTINGS.end_rad)
         )
-        # Several steps may start from one known point. Those before the first miss count.
+        # Several steps may start from one known point. The steps before the first miss count.
         is_miss = ~is_on_path | is_end
         misses = np.cumsum(is_miss)
         misses = misses - (misses - is_miss)[np.maximum.accumulate(np.where(begins, np.arange(lane.size), 0))]
@@ -238,7 +238,7 @@ class PointPaths:
         changed, first, count = np.unique(lane, return_index=True, return_counts=True)
         filled = np.isfinite(self.known_points[SIZE, changed]).sum(axis=1)
         width, needed = self.known_points.shape[2], int((filled + count).max())
-        if needed > width:  # the first step adds few points, most others one
+        if needed > width:  # the first step adds few points, most other steps one
             more = np.full((len(ROWS), self.end.size, max(width, needed - width)), math.inf)
             self.known_points = np.concatenate((self.known_points, more), axis=2)
         self.known_points[:, lane, np.repeat(filled - first, count) + np.arange(lane.size)] = point

@@ -1,11 +1,12 @@
 """Resolution on the ground: widths of the response of band and aperture to a point, without errors.
 
 A step x over the ground changes the phase at a frequency f and a slow time τ by 2πf·g(τ)·x/c, with g the sum of both
-lines of sight over the ground. The vectors 2πf·g/c are the wave-number support; the response to a step is the mean of
-e^(i·phase) over it. The cross-range width is that along the line of equal range at mid-aperture. The range width is
-that along the conjugate direction, in which the phase of a step is not correlated with the phase of a step along the
-line; it is stated as the distance across the line. For a short aperture the conjugate direction is the line of equal
-Doppler: the support is a parallelogram, first nulls lie at c/(B|s|) and λ/(T|ṡ⊥|), and half power is 0.886 as wide.
+lines of sight over the ground. The vectors 2πf·g/c are the wave-number support. The response to a step is the mean of
+e^(i·phase) over the support. The cross-range width is the width along the line of equal range at mid-aperture. The
+range width is the width along the conjugate direction, in which the phase of a step is not correlated with the phase
+of a step along the line. It is given as the distance across the line. For a short aperture the conjugate direction is
+the line of equal Doppler: the support is a parallelogram, first nulls lie at c/(B|s|) and λ/(T|ṡ⊥|), and half power
+is 0.886 as wide.
 """
 
 import math
@@ -19,21 +20,21 @@ from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.image_plane import Band, nodes
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 
-BENT_EDGE_FRACTION = 0.05  # of half the support, by which its edges may bend: the closed widths are then right to 1 %
+BENT_EDGE_FRACTION = 0.05  # of half the support; edges that bend less leave the closed widths right to 1 %
 _HALF_POWER = 0.5
 _HALF_POWER_OF_NULL_RATIO = 0.88589  # full width at half power of a sinc, over the distance of its first null
-_BAND_NODE_COUNT, _APERTURE_NODE_COUNT = 16, 64  # for phases of ±20 rad, those of the last step
+_BAND_NODE_COUNT, _APERTURE_NODE_COUNT = 16, 64  # for phases of ±20 rad, reached at the last step
 # Steps, in half widths at half power of a parabola with the same bend. Of 3000 arcs of a circle none has its first
 # minimum beyond 6.
 _STEP_RATIO, _MAX_STEP_COUNT = 0.25, 64
 _NEWTON_ROUNDS = 5  # rounds: the last changes a width by less than 1e-6
-_MAX_CASE_COUNT = 128  # sampled at once
+_MAX_CASE_COUNT = 128  # cases in one block of samples
 
 
 class Resolution(NamedTuple):
     """Widths of the response on the ground, along range and across: to the first null, and in full at half power. [m]
 
-    A support that is no parallelogram may have no null: the first minimum counts.
+    A support that is no parallelogram may have no null. Then the first minimum counts.
     """
 
     range: Any
@@ -71,7 +72,7 @@ def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aper
 def cells_of_support(sight: Floats, axes: Floats, radar: Band) -> Floats:
     """Cells that sample a response along axes (2, axes), for sums of lines of sight over the ground (times, 2). [m]
 
-    They are one over the extent of the wave-number support along each axis, corners included.
+    A cell is one over the extent of the wave-number support along its axis, corners included.
     """
     band = radar.center_frequency + np.array((-0.5, 0.5)) * radar.bandwidth
     extent: Floats = np.ptp(np.multiply.outer(band, sight @ axes), axis=(0, 1))
@@ -79,7 +80,7 @@ def cells_of_support(sight: Floats, axes: Floats, radar: Band) -> Floats:
 
 
 def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, across: Floats) -> Any:
-    """Whether the support is a parallelogram, as far as that matters to widths."""
+    """Whether the support is close enough to a parallelogram for the closed widths."""
     band = np.hypot(*exact.gradient[:, 0]) * relative_band / 2
     _, _, *bends = np.abs(np.einsum("aon,an->on", exact.gradient, conjugate))
     _, turn, *bends_across = np.abs(np.einsum("aon,an->on", exact.gradient, across))
@@ -87,7 +88,7 @@ def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, acro
 
 
 def _slopes(geometry: BistaticGeometry, half: Floats, some: Any, count: int) -> Floats:
-    """Sum of both lines of sight over the ground of some cases, at so many nodes, (2, nodes, some)."""
+    """Sum of both lines of sight over the ground in some cases, at `count` nodes, (2, nodes, some)."""
     slopes = np.zeros((2, count, some.size))
     for path in geometry.both:
         x, y, z = path.of(some).place(nodes(count).places[:, None] * half[some])
@@ -100,7 +101,7 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
     frequencies, of_band = np.polynomial.legendre.leggauss(_BAND_NODE_COUNT)
     wavenumbers = k * (1 + np.multiply.outer(frequencies, relative_band / 2))
     mean = np.multiply.outer(of_band / 2, nodes(len(slopes)).fit[0])[..., None]
-    rates = wavenumbers[:, None] * slopes  # of phase [rad/m]
+    rates = wavenumbers[:, None] * slopes  # change of phase by a metre [rad/m]
     rates -= (mean * rates).sum(axis=(0, 1))
     unit = math.sqrt(_HALF_POWER) / np.sqrt((mean * rates**2).sum(axis=(0, 1)))
     rates *= unit
@@ -135,7 +136,7 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
 
 
 def _settled(step: Floats, reach: float, value: Callable[[Floats], tuple[Floats, Floats]]) -> Floats:
-    """Newton's method for where a value, given with its slope, is nothing within reach of a step."""
+    """Newton's method for the root of a value, given with its slope, within reach of a step."""
     low, high = step - reach, step + reach
     for _ in range(_NEWTON_ROUNDS):
         left, slope = value(step)
