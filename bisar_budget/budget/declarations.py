@@ -39,7 +39,7 @@ class Missing(NamedTuple):
 def swings_nothing(platform: Platform) -> bool:
     """Whether the file states a lever arm of a platform, but no attitude error that swings the arm."""
     lever, imu = platform.motion_error.lever_arm, platform.motion_error.imu
-    if lever is None or lever.arm is None or not any(lever.arm):
+    if lever is None or lever.arm is None or not any(map(np.any, lever.arm)):
         return False
     return imu is None or all(getattr(imu, figure) is None for figure in TILTS)
 

@@ -25,7 +25,10 @@ name: a pair
 radar: {{center_frequency: 9.6 GHz, bandwidth: 200 MHz}}
 collection: {{aperture_time: {T} s}}
 platforms:
-  transmitter: {{position: [20 km, -6 km, 5 km], velocity: [20 m/s, 140 m/s, 0 m/s]}}
+  transmitter:
+    position: [20 km, -6 km, 5 km]
+    velocity: [20 m/s, 140 m/s, 0 m/s]
+    oscillator: {{frequency: 10 MHz, power_law: {{h0: 1e-30}}}}
   receiver:
     position: [5 km, 7 km, 2 km]
     velocity: [-50 m/s, 30 m/s, 0 m/s]

@@ -186,7 +186,8 @@ def test_the_best_quadratic_takes_up_its_share_of_higher_powers() -> None:
     place = np.linspace(-1, 1, 20001)
     coefficients = np.array([0.3, -1.0, 0.4, 0.7, -0.2, 0.5, 0.1])
     quadratic, cubic = 0.4 - 0.2 * 6 / 7 + 0.1 * 5 / 7, 0.7 + 0.5 * 10 / 9
-    for places, fit in map(nodes, (6, 10, 16, 32, 64)):
+    for sampling in map(nodes, (6, 10, 16, 32, 64)):
+        places, fit = sampling.places, sampling.fit
         there = np.polynomial.polynomial.polyval(places, coefficients)
         assert there @ fit[2] == pytest.approx(quadratic, rel=1e-12)
         assert there @ fit[3] == pytest.approx(cubic, rel=1e-12)
