@@ -63,15 +63,15 @@ class Aggregates:
     def _quadratic(self, mine: Together, theirs: Together, owner: str) -> "Aggregate":
         split, limit, gain = self.allocation.qpe, self.allocation.qpe_limit(owner), self.allocation.autofocus_gain
         members, their_members = mine.owed(split, owner), theirs.owed(split, owner)
-        parts, size_by_theirs = mine.judged_parts(members), theirs.judged(their_members)
-        size = mine.combined(parts)
+        judged_phases, size_by_theirs = mine.judged_parts(members), theirs.judged(their_members)
+        size = mine.combined(judged_phases)
         equal_loss = mine.judged(members, gain=1.0) if np.any(gain != 1) else size
         published, full = (members, their_members) if mine.model == "published" else (their_members, members)
         of_full = self.together("full").combined(quadratics(full))
         aggregate = self._row(
             subject(owner, QUADRATIC),
             self._is_declared(members),
-            parts,
+            judged_phases,
             size,
             limit * gain,
             theirs,
