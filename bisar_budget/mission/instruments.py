@@ -165,6 +165,8 @@ _COEFFICIENT = Quantity(units.RATIO, ge=0, le=1)
 class _PowerLawReader(Reader):
     """A mapping of h-2 … h2 to coefficients."""
 
+    accepted = "{h-2: 4e-23, h-1: 2e-21, h0: 8e-20} and the like"
+
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each coefficient; a problem is reported at its own path."""
         accepted = f"accepted: {', '.join(POWERS)}"

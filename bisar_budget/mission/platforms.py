@@ -224,6 +224,7 @@ class _Lines(Reader):
     """The two lines of an element set."""
 
     is_word = True
+    accepted = "[line 1, line 2]"
 
     def read(self, value: Any, path: tuple[Any, ...], report: Report) -> Any:
         """Read both lines."""
@@ -276,7 +277,7 @@ class _Instant(Reader):
     """An instant of UTC."""
 
     is_word = True
-    accepted = "accepted: 2026-06-01T05:20:31.250Z and the like"
+    accepted = "2026-06-01T05:20:31.250Z and the like"
 
     def leaf(self, value: Any) -> Any:
         """Read 2026-06-01T05:20:31.250Z, or with an offset from UTC."""
@@ -285,7 +286,7 @@ class _Instant(Reader):
             is_zoneless = isinstance(value, str) and parse_instant(value, needs_zone=False) is not None
             problem = "has no zone" if is_zoneless else "must be an instant of UTC"
             hint = "Write Z behind it where it is UTC, or the offset from UTC, such as +01:00" if is_zoneless else ""
-            raise InvalidValueError(problem, self.accepted, hint)
+            raise InvalidValueError(problem, f"accepted: {self.accepted}", hint)
         return instant
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:

@@ -298,7 +298,7 @@ class YesNo(Reader):
     """True or false."""
 
     is_word = True
-    what = "true or false"
+    accepted = "true or false"
 
     def leaf(self, value: Any) -> bool:
         """Read true or false, in the spellings of YAML 1.2; options may have a boolean already."""

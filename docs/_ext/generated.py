@@ -290,7 +290,7 @@ def _form(reader: readers.Reader) -> str:
     for kind, word in words.items():
         if isinstance(reader, kind):
             return word
-    if example := getattr(reader, "what", ""):
+    if example := getattr(reader, "accepted", ""):
         return f"such as `{example.removesuffix(' and the like')}`"
     # Of a reader that only its own module knows, the schema says what it takes.
     schema = reader.schema({})
