@@ -96,7 +96,7 @@ def test_what_is_said_of_it() -> None:
 
 
 class TestAccuracy:
-    """Of the header, 2² mm in the file, and of the places, whose exponents stand behind the clock, of base 1.25."""
+    """Accuracies of the header (2² mm) and of the positions (base 1.25; the exponents stand behind the clock)."""
 
     DEVIATIONS = re.compile(r"^(PG05.{56}) *\d+ +\d+ +\d+", re.MULTILINE)
     AT = epoch_of(epochs(TEXT)[48]).after(1.0)
