@@ -77,21 +77,22 @@ class Page:
         return text
 
     def _console(self, text: str) -> str:
-        shown = []
+        shown: list[str] = []
+        faults: list[str] = []  # of all commands: a build that names the first alone must run once for each
         for command, stated in commands(text):
             if self.exit_code and command != "echo $?":
-                raise ExampleError(
-                    f"the command before `{command}` exits with {self.exit_code}, which no `$ echo $?` says"
-                )
+                faults.append(self._silent(f"the one before `{command}`"))
             got = self._shell(command)
             if stated and not re.fullmatch(_pattern(stated), got):
                 difference = difflib.unified_diff(
                     stated.splitlines(), got.splitlines(), "page", "command", lineterm=""
                 )
-                raise ExampleError("\n".join([f"`{command}` prints something else:", *difference]))
+                faults += [f"`{command}` prints something else:", *difference]
             shown.append(f"$ {command}\n{stated or got}")
         if self.exit_code:
-            raise ExampleError(self._silent("the last one"))
+            faults.append(self._silent("the last one"))
+        if faults:
+            raise ExampleError("\n".join(faults))
         return "".join(shown).rstrip("\n")
 
     def _silent(self, which: str) -> str:

@@ -46,6 +46,11 @@ class TestExamples:
         with pytest.raises(ExampleError, match="prints something else"):
             page.run("console", f"$ printf 'a\\nb\\n'\n{stated}")
 
+    def test_all_other_outputs_of_a_block_are_named(self, page: Page) -> None:
+        """A page with two rows of another width was mended in one of them, and refused again."""
+        with pytest.raises(ExampleError, match=r"(?s)`echo a` prints something else.*`echo c` prints something else"):
+            page.run("console", "$ echo a\nx\n$ echo b\nb\n$ echo c\ny\n")
+
     @pytest.mark.parametrize(
         "stated", ["2.8002236 s", "2.800220 s", "99.9999961 %", "0.00123456789", "1.5", "12345678.9"]
     )
