@@ -1191,11 +1191,11 @@ def sight_turns(platform: str, half_turn: float) -> str:
 
 
 @phrase
-def image_has_no_one_peak(loss_db: float) -> str:
+def image_may_have_several_peaks(loss_db: float) -> str:
     """Said of a collection whose declared errors take much of the peak. [dB]"""
     return (
-        f"{loss_db:.3g} dB by the declared errors; beyond 3 dB an image has no one peak, and phase and location are "
-        "those of the point with the least phase variance"
+        f"{loss_db:.3g} dB by the declared errors; above 3 dB an image may have several peaks, and phase and "
+        "location hold for the point with the smallest phase variance"
     )
 
 
@@ -1254,8 +1254,11 @@ def unknown_drift_is_not_drawn(platforms: Sequence[str]) -> str:
 
 @phrase
 def hidden_phase_is_not_drawn(row_ids: Sequence[str]) -> str:
-    """Said of Monte Carlo, of sensors and clocks whose phase a narrow band or a long aperture hides."""
-    return f"{', '.join(row_ids)}: the quadratic phase is drawn, the phase that band and turn hide is in check alone"
+    """Said of Monte Carlo, if a narrow band or a turning line of sight hides a part of the phase of random errors."""
+    return (
+        f"{', '.join(row_ids)}: Monte Carlo draws the quadratic phase; only check adds the phase that a narrow band "
+        "or a turning line of sight hides"
+    )
 
 
 @phrase

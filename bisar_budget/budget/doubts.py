@@ -412,7 +412,7 @@ def collection_notes(case: Case) -> Iterator[Note]:
         if turn > _TURNING_RAD:
             yield phrases.sight_turns(name, turn)
     if case.peak_loss_db is not None and case.peak_loss_db > ONE_PEAK_DB:
-        yield phrases.image_has_no_one_peak(case.peak_loss_db)
+        yield phrases.image_may_have_several_peaks(case.peak_loss_db)
     if mission.has_direct_path:
         yield phrases.direct_path_is_the_clock()
     if mission.requirements.location_error is None and (missing := missing_settings(mission)):

@@ -21,7 +21,7 @@ platforms:
 @pytest.mark.parametrize(("band", "aperture", "is_hidden"), [("7.61 MHz", "60 s", True), ("200 MHz", "2 s", False)])
 def test_a_hidden_phase_of_a_sensor_is_said_not_to_be_drawn(band: str, aperture: str, *, is_hidden: bool) -> None:
     drawn = bb.monte_carlo(bb.loads(TELEVISION.replace("BAND", band).replace("APERTURE", aperture)), 200)
-    assert any("band and turn hide" in note for note in drawn.notes) is is_hidden
+    assert any("a turning line of sight hides" in note for note in drawn.notes) is is_hidden
 
 
 def test_root_sum_square_beside_the_draws_is_that_of_the_check() -> None:
