@@ -182,7 +182,8 @@ def test_every_case_is_that_of_check(data, family, seed) -> None:
         return
     cases = grid(mission, **axes)
     whole = swept(mission, cases)
-    assert_as_checked(mission, cases, whole)
+    # A search for a limit ends within this fraction of the limit; what else is searched decides where within.
+    assert_as_checked(mission, cases, whole, near=LIMIT_FRACTION)
 
 
 def test_where_an_image_ends_is_found_to_rounding() -> None:
