@@ -432,7 +432,7 @@ def symbols(directive: Generated) -> str:
 def note_codes(_: Generated) -> str:
     """Codes of what findings, warnings and verdicts say, with what each is said of."""
     return table(
-        ("code", "said"), [(f"`{code}`", about.removeprefix("Said ")) for code, about in sorted(CODES.items())]
+        ("code", "is said"), [(f"`{code}`", about.removeprefix("Said ")) for code, about in sorted(CODES.items())]
     )
 
 
