@@ -83,7 +83,7 @@ def _by_source(rows: list[Row]) -> Iterable[str]:
         sources[", ".join(filter(None, (row["source"], row["version"])))].append(row)
     for source, of_it in sources.items():
         yield f"**{source}**"
-        cells = (_cells(row, row["what"] + (" [differs](#what-disagrees)" if row["reason"] else "")) for row in of_it)
+        cells = (_cells(row, row["what"] + (" [differs](#disagreements)" if row["reason"] else "")) for row in of_it)
         yield table(("value", "there", "here", "ratio", "tolerance"), cells)
 
 
@@ -108,9 +108,8 @@ def disagreements(_: Generated) -> str:
     """How many values are compared, and how many differ."""
     rows = _rows()
     differ, sources = sum(bool(row["reason"]) for row in rows), len({row["source"] for row in rows})
-    return (
-        f"Of {len(rows)} values of {sources} sources {len(rows) - differ} agree. {differ} differ, each with a reason."
-    )
+    agree = len(rows) - differ
+    return f"{agree} of {len(rows)} values from {sources} sources agree. {differ} differ, each with a reason."
 
 
 def differing(_: Generated) -> str:
