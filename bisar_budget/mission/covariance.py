@@ -259,7 +259,7 @@ def error_index(name: str) -> int | None:
 
 
 class Sigmas(NamedTuple):
-    """One sigma of position and velocity error along the frame's axes, and how they are correlated."""
+    """One sigma of position and velocity error along the frame's axes, and their correlations."""
 
     position: Annotated[
         Vector, Key(Triple(Quantity(units.LENGTH, ge=0, le=1e9), or_scalar=True), "One sigma at the midpoint.")
@@ -269,7 +269,10 @@ class Sigmas(NamedTuple):
     ]
     correlation: Annotated[
         _Correlations,
-        Key(_CorrelationReader(), "Of pairs, such as position.x-velocity.x: 0.3, or a 6 x 6 matrix; else none."),
+        Key(
+            _CorrelationReader(),
+            "Correlations of pairs, such as position.x-velocity.x: 0.3, or a 6 x 6 matrix; omitted: none.",
+        ),
     ] = _Correlations(_symmetric([[0.0] * SIZE] * SIZE))
 
 

@@ -36,10 +36,13 @@ _ANGLE_WALK = Triple(Quantity(units.ANGLE_RANDOM_WALK, ge=0, le=1e2), or_scalar=
 
 
 # Figures that a mission states, and a part of the catalogue.
-AccelerometerBias = Annotated[Vector | None, Key(_BIAS, "What is left of it in flight.")]
-AccelerometerScaleFactor = Annotated[Vector | None, Key(_SCALE, "What each axis measures too much of what it feels.")]
+AccelerometerBias = Annotated[Vector | None, Key(_BIAS, "Residual bias in flight.")]
+AccelerometerScaleFactor = Annotated[
+    Vector | None,
+    Key(_SCALE, "Scale factor error of each axis: excess of the measured specific force, as a fraction."),
+]
 Attitude = Annotated[Vector | None, Key(_TILT, "Tilt and heading at mid-aperture, about each axis.")]
-GyroBias = Annotated[Vector | None, Key(_DRIFT, "What is left of it in flight.")]
+GyroBias = Annotated[Vector | None, Key(_DRIFT, "Residual bias in flight.")]
 VelocityRandomWalk = Annotated[Vector | None, Key(_VELOCITY_WALK, "Noise of the accelerometers.")]
 AngleRandomWalk = Annotated[Vector | None, Key(_ANGLE_WALK, "Noise of the gyros.")]
 
@@ -107,7 +110,7 @@ IMU_KINDS = Imu._fields[:-1]  # keys of the figures, without the source
 
 
 class GaussMarkov(NamedTuple):
-    """A first-order Gauss-Markov position error: what is left of GNSS noise, say."""
+    """A first-order Gauss-Markov position error, such as residual GNSS noise."""
 
     name: Annotated[str, Key(Text(), "Becomes the row id PLATFORM.random.NAME.")]
     sigma: Annotated[Vector, Key(Triple(Quantity(units.LENGTH, ge=0, le=1e6), or_scalar=True), "1 sigma, each axis.")]
@@ -131,7 +134,8 @@ class LeverArm(NamedTuple):
     uncertainty: Annotated[
         Vector | None,
         Key(
-            Triple(Quantity(units.LENGTH, ge=0, le=1e3), or_scalar=True), "1 sigma, each axis; it turns as the body."
+            Triple(Quantity(units.LENGTH, ge=0, le=1e3), or_scalar=True),
+            "1 sigma, each axis; it turns with the body.",
         ),
     ] = None
     source: Source = None
@@ -205,7 +209,9 @@ NOT_SENSITIVE = Problem(
 )
 
 
-Frequency = Annotated[float | None, Key(Quantity(units.FREQUENCY, gt=0, ge=1, le=1e15), "At which a mask is stated.")]
+Frequency = Annotated[
+    float | None, Key(Quantity(units.FREQUENCY, gt=0, ge=1, le=1e15), "Frequency at which a mask is stated.")
+]
 PhaseNoise = Annotated[
     Points | None,
     Key(
@@ -241,7 +247,7 @@ AccelerationSensitivity = Annotated[
     float | None,
     Key(
         Quantity(units.ACCELERATION_SENSITIVITY, ge=0, le=1e-3),
-        "Γ, by which part its frequency changes with acceleration, in the direction where it is largest.",
+        "Γ: change of the fractional frequency per acceleration, in the direction of the largest change.",
     ),
 ]
 
@@ -261,7 +267,7 @@ class Oscillator(NamedTuple):
         float | None,
         Key(
             Quantity(units.FREQUENCY, gt=0, ge=1e-3, le=1e12),
-            "Phase noise counts up to here; omitted: a mask to its last point, another form to 1 kHz.",
+            "Phase noise counts up to this offset; omitted: a mask to its last point, another form to 1 kHz.",
         ),
     ] = None
     spurs: Annotated[
@@ -277,18 +283,19 @@ class Oscillator(NamedTuple):
         ),
     ] = ()
     aging: Aging = None
-    level: Annotated[float, Key(LEVEL, "Shifts the whole spectrum of its noise; spurs stay.")] = 0.0
+    level: Annotated[float, Key(LEVEL, "Shifts the whole spectrum of the noise, but not the spurs.")] = 0.0
     acceleration_sensitivity: AccelerationSensitivity = None
     vibration: Annotated[
         FeltVibration | None,
         Key(
             FELT_VIBRATION,
-            "What it feels where it is mounted; omitted: motion_error.vibration of its platform, which is what "
+            "Vibration at its mount; omitted: motion_error.vibration of its platform, the vibration that "
             "navigation does not sense.",
         ),
     ] = None
     sensor: Annotated[
-        str | None, Key(Reference(), "A part of the catalogue, or a file; keys beside it override.")
+        str | None,
+        Key(Reference(), "A part of the catalogue, or a file; other keys of the section override its figures."),
     ] = None
     source: Source = None
     overridden: tuple[Overridden, ...] = ()
@@ -351,10 +358,13 @@ class Synchronization(NamedTuple):
 
     error: Annotated[
         float | None,
-        Key(Quantity(units.ANGLE, ge=0, lt=math.pi / 2), "Phase error of the link, 1 sigma, each time; no holdover."),
+        Key(
+            Quantity(units.ANGLE, ge=0, lt=math.pi / 2),
+            "Phase error of the link, 1 sigma, at each exchange or pulse; not with holdover.",
+        ),
     ] = None
     interval: Annotated[
-        float | None, Key(Quantity(units.TIME, gt=0, ge=1e-9, le=1e6), "Between exchanged pulses; linear.")
+        float | None, Key(Quantity(units.TIME, gt=0, ge=1e-9, le=1e6), "Time between exchanged pulses; linear.")
     ] = None
     method: Annotated[
         str,
@@ -369,26 +379,27 @@ class Synchronization(NamedTuple):
         float | None,
         Key(
             Quantity(units.TIME, gt=0, ge=1e-6, le=1e8),
-            "From the middle of the averaging to mid-aperture; holdover.",
+            "Time from the middle of the averaging to mid-aperture; holdover.",
         ),
     ] = None
     averaging: Annotated[
         float | None,
         Key(
             Quantity(units.TIME, gt=0, ge=1e-6, le=1e8),
-            "A line fitted to time over so long is what the clock was set by; holdover.",
+            "Duration over which a line was fitted to the time, to set the clock; holdover.",
         ),
     ] = None
     time_error: Annotated[
         float | None,
         Key(
             Quantity(units.TIME, ge=-1e6, le=1e6),
-            "Time that setting left between clocks, 1 sigma; direct_path: the difference of the channels' delays.",
+            "Time error between the clocks after setting, 1 sigma; direct_path: the difference of the channels' "
+            "delays.",
         ),
     ] = None
     frequency_error: Annotated[
         float | None,
-        Key(Quantity(units.RATIO, ge=-1e-2, le=1e-2), "Fractional frequency that setting left, 1 sigma."),
+        Key(Quantity(units.RATIO, ge=-1e-2, le=1e-2), "Error of the fractional frequency after setting, 1 sigma."),
     ] = None
     source: Source = None
 

@@ -86,22 +86,24 @@ class Collection(NamedTuple):
     """The data collection."""
 
     aperture_time: Annotated[float, Key(DURATION, "T; the aperture is -T/2 to T/2.")]
-    pulses: Annotated[int | None, Key(Whole(2, 10_000_000), "For the simulator; omitted: what the patch needs.")] = (
-        None
-    )
+    pulses: Annotated[
+        int | None, Key(Whole(2, 10_000_000), "For the simulator; omitted: as many as the patch needs.")
+    ] = None
     center_time: Annotated[Instant | None, Key(INSTANT, "UTC of the middle of the aperture.")] = None
 
 
 class Scene(NamedTuple):
     """The imaged ground."""
 
-    latitude: Annotated[float | None, Key(LATITUDE, "Of its centre, geodetic, WGS-84; all three or none.")] = None
-    longitude: Annotated[float | None, Key(DIRECTION, "Of its centre, positive to the east.")] = None
-    height: Annotated[float | None, Key(HEIGHT, "Of its centre above the ellipsoid.")] = None
+    latitude: Annotated[
+        float | None, Key(LATITUDE, "Latitude of the centre, geodetic, WGS-84; all three coordinates or none.")
+    ] = None
+    longitude: Annotated[float | None, Key(DIRECTION, "Longitude of the centre, positive to the east.")] = None
+    height: Annotated[float | None, Key(HEIGHT, "Height of the centre above the ellipsoid.")] = None
 
     radius: Annotated[float | None, Key(RANGE, "Radius of the scene about its centre.")] = None
     height_error: Annotated[
-        float | None, Key(COORDINATE, "How much higher the scene is than the processor takes it for.")
+        float | None, Key(COORDINATE, "Height of the scene above the height that the processor assumes.")
     ] = None
 
     @staticmethod
@@ -132,14 +134,16 @@ _POLE = Quantity(units.ANGLE, ge=-MAX_POLE_RAD, le=MAX_POLE_RAD)
 
 
 class EarthOrientation(NamedTuple):
-    """UT1 - UTC and polar motion in the middle of the aperture; orbits in axes of the stars need them."""
+    """UT1 - UTC and polar motion in the middle of the aperture; orbits in celestial axes need them."""
 
     ut1_minus_utc: Annotated[
         float | None, Key(Quantity(units.TIME, ge=-MAX_UT1_S, le=MAX_UT1_S), "IERS, Bulletin A or B.")
     ] = None
-    polar_motion_x: Annotated[float | None, Key(_POLE, "Of the pole, towards Greenwich.")] = None
-    polar_motion_y: Annotated[float | None, Key(_POLE, "Of the pole, towards 90 deg west.")] = None
-    file: Annotated[str | None, Key(Reference(), "Table of the IERS instead: finals2000A, daily or all.")] = None
+    polar_motion_x: Annotated[float | None, Key(_POLE, "Position of the pole, towards Greenwich.")] = None
+    polar_motion_y: Annotated[float | None, Key(_POLE, "Position of the pole, towards 90 deg west.")] = None
+    file: Annotated[
+        str | None, Key(Reference(), "Table of the IERS in place of the figures: finals2000A, daily or all.")
+    ] = None
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -173,12 +177,12 @@ class TimingError(NamedTuple):
 
 
 class OtherError(NamedTuple):
-    """An error from elsewhere by what it does to the image; at least one of its effects."""
+    """An error from elsewhere, stated by its effects on the image; at least one effect."""
 
     name: Annotated[str, Key(Text(), "Becomes the row ids other.NAME, other.NAME.cubic_phase_error and so on.")]
     quadratic_phase_error: Annotated[float | None, Key(PHASE, "At the aperture edge.")] = None
     cubic_phase_error: Annotated[float | None, Key(PHASE, "At the aperture edge.")] = None
-    location_error: Annotated[float | None, Key(SIZE, "Displacement of the image, in whatever direction.")] = None
+    location_error: Annotated[float | None, Key(SIZE, "Displacement of the image, in any direction.")] = None
     islr: Annotated[float | None, Key(SIDELOBE_REQUIREMENT, "Power that it spreads over the image. [dB]")] = None
     source: Annotated[str | None, Key(Text())] = None
 
@@ -219,7 +223,7 @@ class Requirements(NamedTuple):
     """Requirements: limits that the image has to keep, and errors that the file has to declare."""
 
     quadratic_phase_error: Annotated[
-        float, Key(PHASE_REQUIREMENT, "Total for any one error, at the aperture edge; default π/4.")
+        float, Key(PHASE_REQUIREMENT, "Total for a single error, at the aperture edge; default π/4.")
     ] = math.pi / 4
     cubic_phase_error: Annotated[float | None, Key(PHASE_REQUIREMENT, "At the aperture edge.")] = None
     pslr: Annotated[float | None, Key(SIDELOBE_REQUIREMENT, "Bounds the echoes that vibration adds. [dB]")] = None
@@ -235,10 +239,10 @@ class Requirements(NamedTuple):
                 *_OF_ONE_PLATFORM,
                 accepted=f"{', '.join(DECLARABLE)}; of one platform receiver.imu and the like",
             ),
-            "Errors that the file must declare, for both platforms or for one (receiver.imu); what is missing is "
-            "not_evaluated. A zero declares; a still platform owes its position only. A covariance declares position "
-            "and velocity; timing: any term of timing_error; propagation: the delays of each leg; common: "
-            "common_motion_error; other: other_errors.",
+            "Errors that the file must declare, for both platforms or for one (receiver.imu); a missing error is "
+            "not_evaluated. A zero declares; a still platform has to declare only its position. A covariance "
+            "declares position and velocity; timing: any term of timing_error; propagation: the delays of each leg; "
+            "common: common_motion_error; other: other_errors.",
         ),
     ] = ()
 
@@ -307,7 +311,7 @@ class Shares(NamedTuple):
 
     transmitter: Annotated[float, Key(SHARE)]
     receiver: Annotated[float, Key(SHARE)]
-    clock: Annotated[float | None, Key(SHARE, "Omitted: the clock is held to the receiver's share.")] = None
+    clock: Annotated[float | None, Key(SHARE, "Omitted: the clock has the receiver's share.")] = None
     reserve: Annotated[float, Key(Quantity(units.RATIO, ge=0, lt=1))] = 0.0
 
     def of(self, owner: str) -> float:
@@ -362,14 +366,14 @@ class AllocationRules(NamedTuple):
         str | Shares | MetricSplits,
         Key(
             OneOf(_form_of_split, (RULE, SHARES, METRIC_SPLITS)),
-            "equal, balanced, shares that sum to 1, or one of these per metric.",
+            "equal, balanced, shares that sum to 1, or one of these for each metric.",
         ),
     ] = "equal"
     combine: Annotated[
         str,
         Key(
             Choice("each", "sum", "rss"),
-            "rss: independent errors together; sum: all at their worst; each: every error alone, as the paper.",
+            "rss: independent errors together; sum: all at their worst; each: every error alone, as in the paper.",
         ),
     ] = "rss"
     model: Annotated[
@@ -466,10 +470,10 @@ class Mission(NamedTuple):
     scene: Annotated[Scene, Key(Section(Scene))] = Scene()
     earth_orientation: Annotated[
         EarthOrientation | None,
-        Key(Section(EarthOrientation), "How the Earth is turned, for orbits in axes of the stars."),
+        Key(Section(EarthOrientation), "Orientation of the Earth, for orbits in celestial axes."),
     ] = None
     common_motion_error: Annotated[
-        CommonMotionError | None, Key(Section(CommonMotionError), "The same for both platforms.")
+        CommonMotionError | None, Key(Section(CommonMotionError), "Motion error common to both platforms.")
     ] = None
     timing_error: Annotated[TimingError, Key(Section(TimingError))] = TimingError()
     synchronization: Annotated[
@@ -486,7 +490,8 @@ class Mission(NamedTuple):
         Mapping[str, "Number"],
         Key(
             SizeMap(),
-            "Largest sizes that suppliers are held to, by the keys of errors; `check` holds the file's own to them.",
+            "Largest sizes that suppliers may deliver, by the keys of errors; `check` compares the declared sizes "
+            "with them.",
         ),
     ] = {}
     allocation: Annotated[AllocationRules, Key(Section(AllocationRules))] = AllocationRules()

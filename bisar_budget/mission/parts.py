@@ -73,20 +73,22 @@ Find = Callable[[str], tuple[str, bytes]]  # name of a part to the path and the 
 MOTION_ERROR = Section(MotionError)
 _TEXT = Text()
 _NAME = Key(_TEXT, "Maker, type, and revision or mode; reports show it.")
-_SAYS = Key(_TEXT, "What its figures are in their source: which statistic, typical or largest, in which conditions.")
+_SAYS = Key(
+    _TEXT, "Meaning of the figures in their source: which statistic, typical or largest, in which conditions."
+)
 _SOURCE = either(dict, TextMap("figure"), _TEXT)
-_SOURCES = Key(_SOURCE, "Document, revision and table of every figure, or of each by its key.")
-_IN_ORBIT = Key(YesNo(), "Whether it serves a satellite. `allocate` offers a satellite no other part of this kind.")
-_KIND = "Which kind of part it is, and which figures it has."
-_POSITION = "1 sigma east, north, up; a single value stands for each."
-_NOISE = "Position errors that change within an aperture: what is left of its noise."
+_SOURCES = Key(_SOURCE, "Document, revision and table of every figure, or of each figure by its key.")
+_IN_ORBIT = Key(YesNo(), "Whether it serves a satellite. `allocate` offers a satellite only such parts of this kind.")
+_KIND = "Kind of the part; it determines the figures."
+_POSITION = "1 sigma east, north, up; a single value means each axis."
+_NOISE = "Position errors that change within an aperture: the residual noise."
 _GNSS_KINDS = ("position", "velocity", "random")
 _SUFFIXES = (".yaml", ".yml")
 _MAX_FOLDER_FILES = 1000  # parts that are read of one folder
 
 
 class ImuPart(NamedTuple):
-    """An inertial sensor, 1 sigma; a single value stands for each axis."""
+    """An inertial sensor, 1 sigma; a single value means each axis."""
 
     kind: Annotated[str, Key(Choice("imu"), _KIND)]
     name: Annotated[str, _NAME]
@@ -107,7 +109,7 @@ class ImuPart(NamedTuple):
 
 
 class GnssPart(NamedTuple):
-    """A GNSS receiver in one of its modes: what its position and velocity are wrong by, 1 sigma, east, north, up."""
+    """A GNSS receiver in one of its modes: errors of its position and velocity, 1 sigma, east, north, up."""
 
     kind: Annotated[str, Key(Choice("gnss"), _KIND)]
     name: Annotated[str, _NAME]

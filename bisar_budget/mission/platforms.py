@@ -87,7 +87,7 @@ PARTS = either(list, TextList(), Reference())
 
 
 class MotionError(NamedTuple):
-    """How wrong the measured motion of one platform may be. A scalar means each axis.
+    """Error of the measured motion of one platform. A scalar means each axis.
 
     `of_parts` names the figures that come from parts of the catalogue, and the source of each. `overridden` lists the
     figures of parts that another key of the file replaces.
@@ -108,7 +108,8 @@ class MotionError(NamedTuple):
         Covariance | None,
         Key(
             COVARIANCE,
-            "Of position and velocity, instead of the two: 6 x 6 in m and s, or sigmas with correlations.",
+            "Covariance of position and velocity, in place of the two keys: 6 x 6 in m and s, or sigmas with "
+            "correlations.",
         ),
     ] = None
     distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTIONS)] = "normal"
@@ -124,7 +125,7 @@ class MotionError(NamedTuple):
     ] = ()
     time_tag: Annotated[
         float | None,
-        Key(TIME_TAG, "Of the navigation against the radar: positive, positions are those of later moments."),
+        Key(TIME_TAG, "Time error of the navigation against the radar; positive: positions belong to later times."),
     ] = None
     lever_arm: Annotated[
         LeverArm | None, Key(LEVER_ARM, "From the navigation's reference to the antenna's phase centre.")
@@ -192,13 +193,14 @@ class CommonMotionError(NamedTuple):
     acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
     distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTIONS)] = "normal"
     random: Annotated[
-        tuple[GaussMarkov, ...], Key(RANDOM, "Position errors that change within the aperture, the same of both.")
+        tuple[GaussMarkov, ...],
+        Key(RANDOM, "Position errors that change within the aperture, the same on both platforms."),
     ] = ()
     time_tag: Annotated[
         float | None,
         Key(
             TIME_TAG,
-            "As that of a platform, where one clock tags both.",
+            "As for a platform, if a single clock tags both platforms.",
         ),
     ] = None
     source: Source = None
@@ -249,13 +251,15 @@ class OrbitSource(NamedTuple):
         ),
     ] = None
     omm: Annotated[str | None, Key(_FILE, "Orbit mean-elements message, text, XML, JSON or CSV; SGP4.")] = None
-    oem: Annotated[str | None, Key(_FILE, "Orbit ephemeris message, text or XML; interpolated as it says.")] = None
+    oem: Annotated[
+        str | None, Key(_FILE, "Orbit ephemeris message, text or XML; interpolated as the message states.")
+    ] = None
     eof: Annotated[str | None, Key(_FILE, "Orbit file of a Sentinel, POEORB or RESORB; Hermite.")] = None
     sp3: Annotated[str | None, Key(_FILE, "Orbits of GNSS or low satellites, SP3-c or SP3-d; object: G05.")] = None
     object: Annotated[str | None, Key(Reference(), "Name or catalogue number, where a file has several.")] = None
     planned: Annotated[
         bool | None,
-        Key(YesNo(), "The orbit is the plan, flown as it stands: neither its age nor its interpolation counts."),
+        Key(YesNo(), "The orbit is the plan, flown as stated: neither its age nor its interpolation counts."),
     ] = None
 
     @staticmethod
@@ -313,50 +317,55 @@ class _Talker(Text):
 class TrajectorySource(NamedTuple):
     """A log of a flight."""
 
-    file: Annotated[str, Key(_FILE, "Beside the mission file.")]
+    file: Annotated[str, Key(_FILE, "The log, with its path from the mission file.")]
     format: Annotated[
-        str | None, Key(Choice(*_LOG_FORMATS), "Omitted: by the content, or else the ending of the name.")
+        str | None,
+        Key(Choice(*_LOG_FORMATS), "Omitted: detected from the content, or else from the ending of the name."),
     ] = None
     week: Annotated[int | None, Key(Whole(0, 9999), "GPS week in which an SBET begins, not rolled over.")] = None
     time_scale: Annotated[
-        str | None, Key(Choice(*SCALES), "Of stamps in CSV, where the header does not say it; other logs say it.")
+        str | None,
+        Key(Choice(*SCALES), "Time scale of stamps in CSV, if the header does not state it; other logs state it."),
     ] = None
     geoid_separation: Annotated[
         float | None,
         Key(
             Quantity(units.LENGTH, ge=-200, le=200),
-            "Height of the geoid above the ellipsoid, of a log whose heights are above mean sea level.",
+            "Height of the geoid above the ellipsoid, for a log whose heights are above mean sea level.",
         ),
     ] = None
     center: Annotated[
         float | None,
         Key(
             Quantity(units.TIME, ge=-1e11, le=1e11),
-            "Time of the log that is the middle of the aperture; omitted: collection.center_time, or 0 s.",
+            "Time of the log at the middle of the aperture; omitted: collection.center_time, or 0 s.",
         ),
     ] = None
     accuracy: Annotated[
         str | None, Key(_FILE, "SBET accuracy file (smrmsg): fills position and velocity of motion_error.")
     ] = None
     talker: Annotated[
-        str | None, Key(_Talker(), "Receiver of an NMEA log with fixes of several: the two letters behind the $.")
+        str | None,
+        Key(_Talker(), "Receiver in an NMEA log with fixes of several receivers: the two letters after the $."),
     ] = None
     track: Annotated[
         str | None,
         Key(
             Reference(),
-            "Track of a GPX file with several, by its name or number; omitted: the one that covers the aperture.",
+            "Track of a GPX file with several tracks, by its name or number; omitted: the track that covers the "
+            "aperture.",
         ),
     ] = None
     instance: Annotated[
-        int | None, Key(Whole(0, 255), "Receiver of a log of PX4 or ArduPilot with fixes of several, from 0.")
+        int | None,
+        Key(Whole(0, 255), "Receiver in a log of PX4 or ArduPilot with fixes of several receivers, counted from 0."),
     ] = None
     processed: Annotated[
         str | None,
         Key(
             Choice(SMOOTHED, RAW),
-            "Path that the processor flies: smoothed, a smooth one through the log; raw, its fixes as they are, of "
-            "which the noise spreads.",
+            "Path that the processor uses: smoothed: a smooth path through the log; raw: the fixes themselves, "
+            "whose noise spreads.",
         ),
     ] = None
 
@@ -500,7 +509,7 @@ class FlownPath(NamedTuple):
 
 
 class Platform(NamedTuple):
-    """Its path over the aperture, in one of five ways, and the motion error."""
+    """A platform: its path over the aperture, in one of five forms, and its motion error."""
 
     position: Annotated[Vector | None, Key(Triple(COORDINATE), "East, north, up of the scene centre.")] = None
     velocity: Annotated[Vector | None, Key(Triple(VELOCITY), "East, north, up.")] = None
@@ -514,7 +523,7 @@ class Platform(NamedTuple):
     latitude: Annotated[float | None, Key(LATITUDE, "Geodetic, WGS-84.")] = None
     longitude: Annotated[float | None, Key(DIRECTION, "Positive to the east.")] = None
     altitude: Annotated[float | None, Key(HEIGHT, "Above the ellipsoid; level flight follows it.")] = None
-    heading: Annotated[float | None, Key(DIRECTION, "Of the way over ground, from north, clockwise.")] = None
+    heading: Annotated[float | None, Key(DIRECTION, "Direction of motion over ground, from north, clockwise.")] = None
     slant_range: Annotated[float | None, Key(RANGE, "Distance to the scene centre.")] = None
     azimuth: Annotated[float | None, Key(DIRECTION, "From east, counter-clockwise.")] = None
     elevation: Annotated[float | None, Key(ELEVATION, "Above the ground, seen from the scene centre.")] = None
@@ -617,7 +626,7 @@ def _bends(jerk: Vector | None, snap: Vector | None) -> tuple[Vector, ...]:
 
 
 class Platforms(NamedTuple):
-    """The two of them."""
+    """Transmitter and receiver."""
 
     transmitter: Annotated[Platform, Key(Section(Platform))]
     receiver: Annotated[Platform, Key(Section(Platform))]

@@ -24,14 +24,15 @@ _APERTURE_TIMES = np.linspace(-1.0, 1.0, 9)[:, None]  # in halves of the apertur
 
 
 class LegDelay(NamedTuple):
-    """Delays on one leg that correction leaves, 1 sigma."""
+    """Residual delays on one leg after correction, 1 sigma."""
 
-    zenith_delay: Annotated[float | None, Key(_ZENITH_DELAY, "Of the troposphere.")] = None
+    zenith_delay: Annotated[float | None, Key(_ZENITH_DELAY, "Delay of the troposphere.")] = None
     zenith_electron_content: Annotated[
-        float | None, Key(_ELECTRON_CONTENT, "Of the ionosphere; 1 TECU is 1e16/m².")
+        float | None, Key(_ELECTRON_CONTENT, "Electron content of the ionosphere; 1 TECU is 1e16/m².")
     ] = None
     correlation_time: Annotated[
-        float | None, Key(_CORRELATION_TIME, "In which the delays of this leg change; without it they stay.")
+        float | None,
+        Key(_CORRELATION_TIME, "Time in which the delays of this leg change; omitted: they are constant."),
     ] = None
     source: Source = None
 
@@ -54,20 +55,21 @@ _LEG = Section(LegDelay)
 
 
 class Propagation(NamedTuple):
-    """Delays in the air that correction leaves, 1 sigma: one air for both legs, or of each leg its own."""
+    """Residual delays in the air after correction, 1 sigma: one air for both legs, or separate delays of each leg."""
 
     zenith_delay: Annotated[
-        float | None, Key(_ZENITH_DELAY, "Of the troposphere: one air, which both legs have over them.")
+        float | None, Key(_ZENITH_DELAY, "Delay of the troposphere, of one air over both legs.")
     ] = None
     zenith_electron_content: Annotated[
-        float | None, Key(_ELECTRON_CONTENT, "Of the ionosphere, likewise; 1 TECU is 1e16/m².")
+        float | None,
+        Key(_ELECTRON_CONTENT, "Electron content of the ionosphere, of one air over both legs; 1 TECU is 1e16/m²."),
     ] = None
     correlation_time: Annotated[
         float | None,
         Key(
             _CORRELATION_TIME,
-            "In which the delays change, as a Gauss-Markov process, of one air or of each leg that states no other; "
-            "without it they stay as they are within the aperture.",
+            "Time in which the delays change, as a Gauss-Markov process, of one air or of each leg that states no "
+            "time; omitted: they are constant within the aperture.",
         ),
     ] = None
     transmitter: Annotated[LegDelay | None, Key(_LEG, "From the transmitter to the scene, alone.")] = None

@@ -741,4 +741,4 @@ SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
 SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)
 DISTRIBUTION = Choice("normal", "uniform", "bound")
 DISTRIBUTIONS = "normal: the values are one sigma; uniform, bound: they are not exceeded."
-Source = Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")]
+Source = Annotated[str | None, Key(Text(), "Source of the values; shown as evidence.")]

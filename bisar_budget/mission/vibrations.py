@@ -92,9 +92,9 @@ class Sinusoid(NamedTuple):
 
 
 class AcceleratedSinusoid(NamedTuple):
-    """One sinusoidal vibration by its acceleration, which it keeps when its frequency changes."""
+    """One sinusoidal vibration by its acceleration, which is constant if the frequency changes."""
 
-    amplitude: Annotated[float | Vector, Key(_ACCELERATION, f"Of its acceleration, 0 to peak, {_ALONG}.")]
+    amplitude: Annotated[float | Vector, Key(_ACCELERATION, f"Amplitude of the acceleration, 0 to peak, {_ALONG}.")]
     frequency: Annotated[float, Key(VIBRATION_FREQUENCY)]
 
     @property
@@ -189,8 +189,8 @@ class Vibration(NamedTuple):
         Spectrum | None,
         Key(
             SPECTRUM,
-            "One-sided, of acceleration (g^2/Hz) or of displacement (m^2/Hz), along the line of sight; interpolated "
-            "over logarithms, nothing beside its points.",
+            "One-sided, of acceleration (g^2/Hz) or of displacement (m^2/Hz), along the line of sight; "
+            "interpolated over logarithms, zero outside its points.",
         ),
     ] = None
     spectrum_level: Annotated[float | None, Key(LEVEL, "Shifts the spectrum.")] = None
@@ -209,7 +209,7 @@ class Vibration(NamedTuple):
 
 
 class FeltVibration(NamedTuple):
-    """Vibration that an oscillator feels where it is mounted, whatever navigation senses of it."""
+    """Vibration at the mount of an oscillator, including the vibration that navigation senses."""
 
     sinusoidal: Annotated[tuple[Sinusoid | AcceleratedSinusoid, ...], Key(SINUSOIDS, "One entry per line.")] = ()
     spectrum: Annotated[
