@@ -1,9 +1,10 @@
-"""Exported CPHD files, focused by an image former that has nothing of the package, NumPy over sarkit's reader.
+"""Exported CPHD files, focused by an image former that shares no code with the package: NumPy over sarkit's reader.
 
-`simulate -o FILE.cphd` records what the errors do to a point, and writes the measured places beside it. From the file
-alone the image former finds where the point is, its phase over the aperture, and its response in an image. They are
-held to what `simulate` and `verify` say of the same errors. Of all examples the table has the one that takes most of
-its tolerance. A displacement there is the one here and what lies between both points.
+`simulate -o FILE.cphd` records the effect of the errors on a point, and writes the measured positions beside it. From
+the file alone the image former finds the position of the point, its phase over the aperture, and its response in an
+image. The tests compare them with the results of `simulate` and `verify` for the same errors. The table has the
+example that uses most of its tolerance. Its displacement there is the displacement here plus the distance of both
+points.
 """
 
 import math

@@ -1,8 +1,8 @@
-"""What a quadratic phase does to a point response: a direct FFT of the aperture against the package's measures.
+"""Effect of a quadratic phase on a point response: a direct FFT of the aperture against the package's measures.
 
-The FFT reads 2 048 samples of the aperture at 1 024 points per resolution cell, with the window of SciPy: nothing of
-the package. The package measures a cut of 256 samples, eight to a cell, and interpolates it: to 1e-4 dB at the peak
-and 2e-5 of a width. The sampling of the aperture makes the rest of the tolerances.
+The FFT reads 2 048 samples of the aperture at 1 024 points per resolution cell, with the window of SciPy, and uses
+nothing of the package. The package measures a cut of 256 samples, eight to a cell, and interpolates it: to 1e-4 dB at
+the peak and 2e-5 of a width. The sampling of the aperture makes the rest of the tolerances.
 """
 
 import math

@@ -1,7 +1,7 @@
-"""Orbits and places on the Earth against other programs: those of the SGP4 project, Skyfield, pymap3d.
+"""Orbits and positions on the Earth against other programs: the SGP4 project, Skyfield, pymap3d.
 
-The package flies elements with `sgp4` and turns axes with ERFA. Skyfield turns them by itself, and has UT1 of tables
-where a mission takes UT1 = UTC: its places are turned by that difference.
+The package propagates elements with `sgp4` and rotates axes with ERFA. Skyfield has its own rotation, with UT1 from
+tables, while a mission takes UT1 = UTC: the tests rotate Skyfield's positions by that difference.
 """
 
 import math

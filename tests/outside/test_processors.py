@@ -1,9 +1,9 @@
 """Processors of others on exported data: FastSAR forms the image, perseo-quality measures it.
 
-FastSAR has two ways in. Its `backproject` takes the places of transmitter and receiver: that is bistatic, and shows
-a point where bisar-budget says. Its reader of files, `form_cphd`, puts one antenna at the middle of both platforms.
-That is monostatic: it serves where the platforms are near each other, and misplaces and blurs a wide bistatic scene.
-The image formers of bisar-budget and of these tests take both places everywhere.
+FastSAR has two entry points. Its `backproject` takes the positions of transmitter and receiver. It is bistatic, and
+shows a point at the position that bisar-budget gives. Its reader of files, `form_cphd`, assumes a single antenna in
+the middle of both platforms. It is monostatic: sufficient for platforms near each other, while it misplaces and blurs
+a wide bistatic scene. The image formers of bisar-budget and of these tests always use both positions.
 """
 
 import math

@@ -1,7 +1,7 @@
-"""Figures in print against what this program finds: `published.csv` has each with its source.
+"""Figures in print against results of this program: `published.csv` has each figure with its source.
 
-Tolerances are half of the last digit printed, where the note there says nothing else. A source that prints a formula
-and no number is worked out by hand, apart from the package; the note says that too.
+Tolerances are half of the last printed digit, unless the note in the file states another. For a source that prints a
+formula and no number, the value is worked out by hand, without the package; the note states that too.
 """
 
 import csv

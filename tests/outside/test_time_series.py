@@ -1,9 +1,9 @@
 """Random errors against time series: drawn moment by moment, put through exact ranges, and fitted.
 
-What draws and what fits is NumPy alone, and allantools: nothing of the package. A sigma of N draws is known to
-1/√(2N) of itself, 1.1 % for 4 096 draws; the tolerance is four of these standard errors. A phase of variance σ² that
-spreads leaves e^−σ² of a point's energy where it was: its ISLR is e^σ² − 1. The tolerance there is as many standard
-errors of a sigma, in dB: a window has many moments, which vary less.
+The code that draws and fits uses only NumPy and allantools, and nothing of the package. A sigma of N draws is known
+to 1/√(2N) of itself, 1.1 % for 4 096 draws; the tolerance is four of these standard errors. A phase of variance σ²
+that spreads leaves e^−σ² of a point's energy in the response: its ISLR is e^σ² − 1. The tolerance of the ISLR is four
+standard errors of a sigma, in dB: a window has many moments, which vary less.
 """
 
 import math
