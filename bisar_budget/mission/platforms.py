@@ -317,7 +317,7 @@ class _Talker(Text):
 class TrajectorySource(NamedTuple):
     """A log of a flight."""
 
-    file: Annotated[str, Key(_FILE, "The log, with its path from the mission file.")]
+    file: Annotated[str, Key(_FILE, "The log, by its path relative to the mission file.")]
     format: Annotated[
         str | None,
         Key(Choice(*_LOG_FORMATS), "Omitted: detected from the content, or else from the ending of the name."),

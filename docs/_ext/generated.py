@@ -290,6 +290,8 @@ def _form(reader: readers.Reader) -> str:
     for kind, word in words.items():
         if isinstance(reader, kind):
             return word
+    if getattr(reader, "accepted", "") == "true or false":
+        return "`true` or `false`"
     if example := getattr(reader, "accepted", ""):
         return f"such as `{example.removesuffix(' and the like')}`"
     # Of a reader that only its own module knows, the schema says what it takes.
@@ -331,7 +333,7 @@ def units(_: Generated) -> str:
         )
         for dimension in DIMENSIONS
     ]
-    return table(("quantity", "units", "a bare number is in"), rows)
+    return table(("quantity", "units", "unit of a bare number"), rows)
 
 
 # Missions of the gallery
@@ -430,9 +432,10 @@ def symbols(directive: Generated) -> str:
 
 
 def note_codes(_: Generated) -> str:
-    """Codes of what findings, warnings and verdicts say, with what each is said of."""
+    """Codes of the sentences of findings, warnings and verdicts, with the subject of each sentence."""
     return table(
-        ("code", "is said"), [(f"`{code}`", about.removeprefix("Said ")) for code, about in sorted(CODES.items())]
+        ("code", "a sentence about"),
+        [(f"`{code}`", about.removeprefix("Said of ")) for code, about in sorted(CODES.items())],
     )
 
 
