@@ -1,0 +1,14 @@
+"""Types of arrays, and of numbers that may stand for one case or for many."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Booleans = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+
+PerCase = float | Floats
+"""A number of one case, or an array with one number per case, (cases,)."""
+PerCaseFlag = bool | Booleans
+"""A condition of one case, or an array with one condition per case, (cases,)."""
