@@ -232,7 +232,7 @@ def _hold_to_datum(lines: Sequence[str], name: str) -> None:
         match = _DATUM.match(line.strip())
         if match is not None and not is_wgs84(match[1]):
             raise PathFileError(
-                f"{name}:{number}: has places of the datum {shown(match[1])}",
+                f"{name}:{number}: has positions of the datum {shown(match[1])}",
                 "accepted: WGS-84 or ITRF",
             )
 
@@ -342,7 +342,7 @@ def _places(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) 
             radius < _DEEPEST_M,
             lambda i: (
                 f"x, y, z are {radius[i] / 1e3:.4g} km from the Earth's centre; Earth-fixed coordinates are wanted, "
-                "places of the scene are named east, north, up"
+                "positions of the scene are named east, north, up"
             ),
         )
     return np.array(found)
@@ -465,8 +465,8 @@ def _accuracy_columns(
         is_beside |= meaning == BESIDE
         if meaning == UNCLEAR:
             refuse(
-                f"{shown(column)} looks like an accuracy of the places, and is none that is read: name it as what it "
-                f"is, or leave it out where it is of something else; {ACCEPTED}"
+                f"{shown(column)} looks like an accuracy of the positions, but is not a known one: name it as what "
+                f"it is, or leave it out where it is of something else; {ACCEPTED}"
             )
         if meaning in (None, BESIDE):
             continue
@@ -534,10 +534,10 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
         found[column] = (index, unit)
     kinds = [kind for kind in _KINDS if any(axis in found for axis in kind)]
     if not kinds:
-        refuse("names no place; the first line names columns, like 'latitude [deg]', 'x [m]' or 'east [m]'")
+        refuse("names no position; the first line names columns, like 'latitude [deg]', 'x [m]' or 'east [m]'")
     if len(kinds) > 1:
         one, other = (next(axis for axis in kind if axis in found) for kind in kinds[:2])
-        refuse(f"mixes {one} with {other}; places are {', or '.join(', '.join(kind) for kind in _KINDS)}")
+        refuse(f"mixes {one} with {other}; positions are {', or '.join(', '.join(kind) for kind in _KINDS)}")
     kind = kinds[0]
     if kind == _GEODETIC and "altitude" in found:
         if "height" in found:
@@ -592,7 +592,7 @@ def _vendor_header(
             columns.setdefault(known.name, known._replace(place=index))
     if "height" not in columns and "altitude" not in columns:
         raise PathFileError(
-            f"{where}: {vendor.words} has no height above the sea or the ellipsoid; one above take-off is no place"
+            f"{where}: {vendor.words} has no height above the sea or the ellipsoid; one above take-off is no position"
         )
     if "height" in columns:
         columns.pop("altitude", None)
@@ -667,7 +667,7 @@ def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
             is_any = True
             _read_rows([chunk[n] for n in kept], np.array(kept) + first + 1, header, name, rows)
     if not is_any:
-        raise PathFileError(f"{name}:{header.line}: has a header and no places")
+        raise PathFileError(f"{name}:{header.line}: has a header and no fixes")
     return rows
 
 
