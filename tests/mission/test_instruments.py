@@ -114,7 +114,7 @@ def test_a_mask_that_does_not_rise_is_said_to_be_sorted(is_sorted: bool) -> None
     mask = ", ".join(points if is_sorted else reversed(points))
     text = receiver(f"oscillator: {{frequency: 10 MHz, phase_noise: {{{mask}}}}}")
     noise = next(one.noise for one in Analysis(parse_mission(text)).random if one.subject.kind == "oscillator")
-    assert ["in another order" in str(note) for note in noise.notes] == [True] * (not is_sorted)
+    assert ["not in rising order" in str(note) for note in noise.notes] == [True] * (not is_sorted)
 
 
 def test_a_mask_that_ends_below_its_bandwidth_says_so() -> None:
