@@ -1,8 +1,7 @@
-"""Warnings about a mission file: their sentences, and the finders that decide when to give each.
+"""Warnings about a mission file: the finders that decide when to give each; `phrases` has the sentences.
 
-The name of a sentence's function is its code, as in `phrases`. Most warnings change no verdict. A warning that doubts
-the checked mission sets the status to `warn` at least. A finder gives a sentence and the key that it is about; the
-line of the key is looked up here, once.
+Most warnings change no verdict. A warning that doubts the checked mission sets the status to `warn` at least. A
+finder gives a sentence and the key that it is about; the line of the key is looked up here, once.
 """
 
 from collections.abc import Iterator, Sequence
@@ -225,7 +224,3 @@ def _of_autofocus(mission: Mission, resolution: Resolution) -> Iterator[_Warned]
                 largest_n_pull=largest_n_pull,
             ),
         )
-
-
-# ---------------------------------------------------------------------- waivers
-# ---------------------------------------------------------------------- images
