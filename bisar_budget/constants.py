@@ -25,6 +25,7 @@ MAX_DRAWS = 10**12  # of a Monte Carlo that many machines share
 
 EARTH_GRAVITATIONAL_PARAMETER = 3.986004418e14  # m³/s², GM of WGS-84, atmosphere included
 EARTH_RADIUS = 6.371e6  # m, mean radius; depth of the Earth's centre below the scene
+LEAST_FALLING_HEIGHT = 100e3  # m, of a path in free fall; below it the air carries or brakes
 FASTEST_FLIGHT = 3e3  # m/s; every aircraft is slower, and every satellite in a low orbit is faster
 MAX_DAYS = 366.0  # of a search for passes of a satellite
 

@@ -125,6 +125,30 @@ class CurvedPath(Protocol):
         """The paths of some cases, by their indices."""
 
 
+class Fall(Protocol):
+    """The dynamics of errors of a platform in free fall: `paths.free_fall.FreeFall`."""
+
+    def motions(self, path: "PlatformState", half: NDArray[np.float64], places: NDArray[np.float64]) -> Any:
+        """Motion by unit errors of the state at mid-aperture, (3, 3, 3, nodes, cases). [m]"""
+
+    def rate_against_stars(self, position: Vectors) -> Vectors:
+        """Rate in the axes of the scene of a position error that is at rest against the stars."""
+
+    def orbit_rate(self, path: "PlatformState") -> Vectors:
+        """Angular rate of the orbit. [rad/s]"""
+
+    @property
+    def centre(self) -> Vectors:
+        """The Earth's centre. [m]"""
+
+    @property
+    def rotation(self) -> Vectors:
+        """Rate at which the axes of the scene turn against the stars. [rad/s]"""
+
+    def of(self, cases: Any) -> "Fall":
+        """The dynamics in some of the cases, by their indices."""
+
+
 @dataclass(frozen=True)
 class Pieces:
     """A path in polynomials, each over its own piece of slow time; the first and the last continue beyond the ends.
@@ -218,6 +242,7 @@ class PlatformState:
     Position [m] and velocity [m/s] at the midpoint, acceleration [m/s²], and in `bends` the coefficients of τ³, τ⁴, …
     [m/s³], [m/s⁴], … form a polynomial. Without a `curve` the polynomial is the full path; with a `curve` it is the
     path near the midpoint. `radial` are the axes of the platform's `ric` frame, if the Earth's centre is known.
+    `fall` are the dynamics of errors of a platform in free fall; None for any other platform.
     """
 
     position: Vectors
@@ -226,6 +251,7 @@ class PlatformState:
     bends: tuple[Vectors, ...] = ()
     radial: Axes | None = None
     curve: CurvedPath | None = None
+    fall: Fall | None = None
 
     @property
     def is_still(self) -> Any:
@@ -283,6 +309,7 @@ class PlatformState:
             acceleration=_vector_of_cases(self.acceleration, cases),
             bends=tuple(_vector_of_cases(bend, cases) for bend in self.bends),
             curve=self.curve and self.curve.of(cases),
+            fall=self.fall and self.fall.of(cases),
         )
 
     @cached_property

@@ -155,7 +155,7 @@ def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) 
     usual position error if the file declares no position error.
     """
     platform: Platform = getattr(mission.platforms, name)
-    stated_covariance = _stated_covariance(stated, kind)
+    stated_covariance = _stated_covariance(stated, kind, platform)
     declared = _declared_covariance(platform, kind)
     if stated.covariance is None:
         is_more = kind == "position" and stated.total**2 > np.trace(declared, axis1=-2, axis2=-1) * (
@@ -175,15 +175,25 @@ def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) 
     return is_more
 
 
-def _stated_covariance(stated: StatedAccuracy, kind: str) -> Floats | None:
-    """Covariance (..., 3, 3) of a kind of error along the scene's axes; None if the source does not state it."""
-    if stated.covariance is None:
+def _stated_covariance(stated: StatedAccuracy, kind: str, platform: Platform) -> Floats | None:
+    """Covariance (..., 3, 3) of a kind of error along the scene's axes; None if the source does not state it.
+
+    A velocity of a platform in free fall is against the stars where the file states its errors in `ric`.
+    """
+    covariance, row, fall = stated.covariance, 3 * KINDS.index(kind), platform.state.fall
+    if covariance is None or len(covariance) <= row:
         return None
-    first = 3 * KINDS.index(kind)
-    if len(stated.covariance) <= first:
-        return None
-    rows = [row[first : first + 3] for row in stated.covariance[first : first + 3]]
-    return _stack(rows)
+
+    def block(first: int, second: int) -> Floats:
+        return _stack([line[second : second + 3] for line in covariance[first : first + 3]])
+
+    if kind == "position" or fall is None or platform.motion_error.frame != "ric":
+        return block(row, row)
+    x, y, z = fall.rotation
+    turning = _stack(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    mixed = turning @ block(0, 3)
+    turned = turning @ block(0, 0) @ np.swapaxes(turning, -1, -2)
+    return np.asarray(block(3, 3) + mixed + np.swapaxes(mixed, -1, -2) + turned)
 
 
 def _declared_covariance(platform: Platform, kind: str) -> Floats:
@@ -210,7 +220,7 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
     """The doubt by the errors that a source states and that the file declares, on the axis of largest difference."""
     error = platform.motion_error
     key = f"platforms.{name}.motion_error.{kind if error.covariance is None else 'covariance'}"
-    stated_covariance, declared = _stated_covariance(stated, kind), _declared_covariance(platform, kind)
+    stated_covariance, declared = _stated_covariance(stated, kind, platform), _declared_covariance(platform, kind)
     unit_name = MOTION_UNITS[kind]
     is_declared = error.stated(kind) is not None or (kind == "position" and bool(error.random))
     if stated_covariance is None:
@@ -309,13 +319,9 @@ def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Any:
     """Whether an error of a platform, by its covariance, uses more than a negligible part of a requirement."""
     needs, half = mission.requirements, np.asarray(mission.collection.aperture_time) / 2
     with np.errstate(all="ignore"):
-        ways = [_sight(mission, name, time) for time in (-half, 0.0 * half, half)]
-        before, middle, after = (np.stack(np.broadcast_arrays(*way), axis=-1) for way in ways)
+        before, middle, after = _range_errors(mission, name, kind, half)
         at_ends = np.asarray(half)[..., None]
-        if kind == "position":
-            constant, linear, edge = middle, (after - before) / (2 * at_ends), (after + before) / 2 - middle
-        else:
-            constant, linear, edge = 0 * middle, (after + before) / 2, (after - before) * at_ends / 2
+        constant, linear, edge = middle, (after - before) / (2 * at_ends), (after + before) / 2 - middle
         at_edge = np.sqrt(np.einsum("...i,...ij,...j->...", edge, covariance, edge))
         phase = 2 * np.pi / np.asarray(mission.radar.wavelength) * at_edge
         matters = np.logical_not(
@@ -326,6 +332,31 @@ def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Any:
             spread = np.sqrt(np.einsum("...ai,...ij,...aj->...", moved, covariance, moved))
             matters = matters | np.logical_not(spread < NEGLIGIBLE_USE_FRACTION * np.asarray(needs.location_error))
     return matters
+
+
+def _range_errors(mission: Mission, name: str, kind: str, half: Floats) -> Sequence[Floats]:
+    """Range that a unit error of a platform along each axis adds at both ends of the aperture and in its middle.
+
+    At −T/2, 0 and T/2, (..., 3) each. [m]
+    """
+    sights = [
+        np.stack(np.broadcast_arrays(*_sight(mission, name, time)), axis=-1) for time in (-half, 0.0 * half, half)
+    ]
+    platform: Platform = getattr(mission.platforms, name)
+    path = platform.state
+    if path.fall is None:
+        powers = [1.0, 1.0, 1.0] if kind == "position" else [-half[..., None], 0.0, half[..., None]]
+        return [sight * power for sight, power in zip(sights, powers, strict=True)]
+    halves = np.atleast_1d(np.broadcast_to(half, np.broadcast_shapes(half.shape, sights[0].shape[:-1])))
+    motions = path.fall.motions(path, halves, np.array((-1.0, 0.0, 1.0)))
+    units = motions[KINDS.index(kind)]
+    if kind == "position" and platform.motion_error.frame == "ric":
+        rates = [path.fall.rate_against_stars(axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+        turned = [sum(motions[1][i] * rate[i] for i in range(3)) for rate in rates]
+        units = units + np.stack(turned)
+    at_times = np.stack([np.broadcast_to(sight, (*halves.shape, 3)) for sight in sights])
+    ranges = np.einsum("acqn,qnc->qna", units, at_times)
+    return [range_error.reshape(*sight.shape) for range_error, sight in zip(ranges, sights, strict=True)]
 
 
 def _sight(mission: Mission, name: str, time: Any) -> Any:

@@ -579,10 +579,10 @@ class DeclaredErrors:
         at_nodes = np.moveaxis(courses[:, None] * np.array(signs)[:, None, None], 2, 0)
         moves: list[list[Any]] = [[float(platform in platforms) for platforms in moved] for platform in (0, 1)]
         u, v, order = (self._of_each(values, len(signs)) for values in (*moves, orders))
-        x, y, z = (self._of_each([error.direction[axis] for error in errors], len(signs)) for axis in (0, 1, 2))
+        x, y, z = (self._of_each([error.way_of(0)[axis] for error in errors], len(signs)) for axis in (0, 1, 2))
         of_receiver = None
-        if any(error.of_receiver is not None for error in errors):
-            ways = [[error.direction_of(1)[axis] for error in errors] for axis in (0, 1, 2)]
+        if any(error.way_of(1) is not error.way_of(0) for error in errors):
+            ways = [[error.way_of(1)[axis] for error in errors] for axis in (0, 1, 2)]
             of_receiver = tuple(self._of_each(along, len(signs)) for along in ways)
         case, tags = np.tile(self.each, len(errors) * len(signs)), None
         if any(error.is_time_tag for error in errors):
@@ -592,9 +592,9 @@ class DeclaredErrors:
 
     def edge_of(self, error: ErrorSource) -> Any:
         """Position error at the aperture's edge by a unit of an error, the larger of both platforms; 0 by a clock."""
-        if not error.is_time_tag:
+        if not error.is_time_tag and error.shifts is None:
             return self.edge.get(error.unit, 0.0)
-        return np.max([norm(error.direction_of(platform)).max(axis=0) for platform in error.platforms], axis=0)
+        return np.max([norm(error.way_of(platform)).max(axis=0) for platform in error.platforms], axis=0)
 
     def bent(self, error: ErrorSource, size: Floats) -> Floats:
         """Distance of a time tag's shift, of either sign, from a shift along the velocity, platforms added. [m]"""
@@ -616,10 +616,10 @@ class DeclaredErrors:
         return bend
 
     def _order(self, error: ErrorSource) -> int:
-        """Power of slow time with which a position error grows: -1 for a clock, 0 for a time tag, which may turn."""
+        """Power of slow time with which a position error grows: -1 for a clock, 0 for motions at the nodes."""
         if not error.platforms:
             return -1
-        return 0 if error.is_time_tag else list(self.edge).index(error.unit)
+        return 0 if error.is_time_tag or error.shifts is not None else list(self.edge).index(error.unit)
 
     def _course(self, error: ErrorSource, order: int) -> Floats:
         """Position error at the nodes by a unit of an error, or its range error where it moves no platform."""

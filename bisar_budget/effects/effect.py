@@ -13,7 +13,7 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
+from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector, Vectors
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Effect, FullEffect
 
@@ -86,6 +86,12 @@ def _plain_way(component: Any) -> Any:
     return component if np.ndim(component) > 1 else plain(component)
 
 
+def _plain_vector(vector: Vectors) -> Vector:
+    """A vector in one case."""
+    x, y, z = map(plain, vector)
+    return (x, y, z)
+
+
 class ErrorSource(NamedTuple):
     """One error: subject, declared size and the effect of one unit. Numbers are plain, or arrays over cases.
 
@@ -100,6 +106,10 @@ class ErrorSource(NamedTuple):
 
     `clock` holds t̃₀ … t̃₃ of a unit of a clock error, zeros where synchronisation removes the error. It is None for
     any other error.
+
+    `shifts` are the motions of both platforms over the aperture by a unit of an error, (nodes, cases) for each axis,
+    where a platform is in free fall: its error follows the dynamics of the orbit. [m] `rates` are then the velocities
+    at mid-aperture of position errors in `ric`, which are at rest against the stars. [m/s] Both are None otherwise.
     """
 
     subject: Subject
@@ -116,6 +126,8 @@ class ErrorSource(NamedTuple):
     notes: tuple[Note, ...] = ()
     clock: tuple[Any, ...] | None = None
     of_receiver: Any = None
+    shifts: tuple[Vectors, Vectors] | None = None
+    rates: tuple[Vectors, Vectors] | None = None
 
     @property
     def id(self) -> str:
@@ -129,12 +141,30 @@ class ErrorSource(NamedTuple):
         clock = self.clock and tuple(map(plain, self.clock))
         direction, of_receiver = (way and tuple(map(_plain_way, way)) for way in (self.direction, self.of_receiver))
         return self._replace(
-            declared=declared, effect=effect, full=full, direction=direction, of_receiver=of_receiver, clock=clock
+            declared=declared,
+            effect=effect,
+            full=full,
+            direction=direction,
+            of_receiver=of_receiver,
+            clock=clock,
+            rates=self.rates and (_plain_vector(self.rates[0]), _plain_vector(self.rates[1])),
         )
 
     def direction_of(self, platform_index: int) -> Any:
         """Direction in which the error moves a platform."""
         return self.of_receiver if platform_index == 1 and self.of_receiver is not None else self.direction
+
+    def way_of(self, platform_index: int) -> Any:
+        """Motion of a platform by a unit at each node, if it follows an orbit or a path; else its direction."""
+        return self.direction_of(platform_index) if self.shifts is None else self.shifts[platform_index]
+
+    def state_of(self, platform_index: int) -> tuple[Any, Any, Any]:
+        """Error of position, velocity and acceleration of a platform at mid-aperture by a unit. [m, m/s, m/s²]"""
+        vectors: list[Any] = [NOWHERE, NOWHERE, NOWHERE]
+        if self.rates is not None:
+            vectors[1] = self.rates[platform_index]
+        vectors[tuple(MOTION_UNITS.values()).index(self.unit)] = self.direction_of(platform_index)
+        return vectors[0], vectors[1], vectors[2]
 
     @property
     def owner(self) -> str:

@@ -4,7 +4,7 @@ A check lists all of them, with the errors that the file does not declare, becau
 sizes. A sweep lists the declared errors, and the errors whose rows are asked for.
 """
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -104,6 +104,66 @@ class ErrorListing:
             self._legs[platform_index, kind] = published, full
         return self._legs[platform_index, kind]
 
+    @cached_property
+    def _motions(self) -> list[Any]:
+        """Motion of each platform by unit errors of its state, (3, 3, 3, nodes, cases); None without free fall."""
+        exact = self.exact
+        return [
+            path.fall and path.fall.motions(path, exact.half, exact.sampling.places) for path in self.geometry.both
+        ]
+
+    def _flown(
+        self, kind: str, directions: Mapping[int, Vectors], frame: str
+    ) -> tuple[FullEffect, tuple[Vectors, Vectors], tuple[Vectors, Vectors] | None] | None:
+        """Effect of a unit of an error of platforms in free fall; None if no platform of the error is in free fall.
+
+        A platform in free fall follows the dynamics of its orbit. The velocity of `ric` is that against the stars: a
+        position error without a velocity error turns with nothing. In all other frames it turns with the Earth.
+
+        Parameters
+        ----------
+        kind : str
+            Position, velocity or acceleration.
+        directions : mapping of int to Vectors
+            Direction of the error of each platform that has it, by its index.
+        frame : str
+            Frame in which the file states the error.
+
+        Returns
+        -------
+        full : FullEffect
+            Effect of a small unit.
+        shifts : two of Vectors
+            Motions at the nodes, (nodes, cases). [m]
+        rates : two of Vectors, optional
+            Velocities at mid-aperture of position errors in `ric`. [m/s]
+        """
+        if all(self._motions[platform_index] is None for platform_index in directions):
+            return None
+        moved = np.zeros_like(self.exact.times)
+        shifts, rates = dict[int, Vectors](), dict[int, Vectors]()
+        for platform_index, direction in directions.items():
+            motions, fall = self._motions[platform_index], self.geometry.both[platform_index].fall
+            is_at_rest = kind == "position" and frame == "ric" and fall is not None
+            rates[platform_index] = fall.rate_against_stars(direction) if is_at_rest and fall else NOWHERE
+            if motions is None:
+                course = self.exact.powers[MOTION_UNITS[kind]]
+                x, y, z = (component * course for component in direction)
+            else:
+                state = motions[list(MOTION_UNITS).index(kind)]
+                x, y, z = sum(state[axis] * direction[axis] for axis in range(3))
+                if is_at_rest:
+                    turned = sum(motions[1][axis] * rates[platform_index][axis] for axis in range(3))
+                    x, y, z = x + turned[0], y + turned[1], z + turned[2]
+            shifts[platform_index] = (x, y, z)
+            moved = moved + self.exact.along(platform_index, shifts[platform_index])
+        has_rates = kind == "position" and frame == "ric"
+        return (
+            self.exact.effect(moved),
+            _of_both_platforms(shifts),
+            _of_both_platforms(rates) if has_rates else None,
+        )
+
     def _of_motion(self, platform_index: int, name: str, kind: str, unit: str) -> Iterator[ErrorSource]:
         error: MotionError = getattr(self.mission.platforms, name).motion_error
         values = error.stated(kind)
@@ -133,35 +193,40 @@ class ErrorListing:
                     )
             if covariance is not None:
                 row_path = (*path, *covariance.path(kind, axis))
+            flown = self._flown(kind, {platform_index: _AXES[axis]}, "scene")
             yield ErrorSource(
                 subject=row_subject,
                 unit=unit,
                 declared=on_axis,
                 path=row_path if in_scene and values is not None and key != "sensor" else path,
                 effect=published[axis],
-                full=full[axis],
+                full=full[axis] if flown is None else flown[0],
                 direction=_AXES[axis],
                 equation=equation,
                 no_limit=no_limit,
                 evidence=evidence,
                 is_independent=in_scene,
                 notes=notes,
+                shifts=flown and flown[1],
             )
         if in_scene or values is None:
             return
         for index, (axis_name, direction) in enumerate(zip(FRAME_AXES[error.frame], axes, strict=True)):
+            flown = self._flown(kind, {platform_index: direction}, error.frame)
             yield ErrorSource(
                 subject=subject(name, kind, axis_name, error.frame),
                 unit=unit,
                 declared=values[index] * self.factor,
                 path=(*path, *((index,) if covariance is None else covariance.path(kind, index))),
                 effect=_along(published, direction),
-                full=_along(full, direction),
+                full=_along(full, direction) if flown is None else flown[0],
                 direction=direction,
                 equation=_equation(kind, None),
                 no_limit=_no_limit(kind, _axis_of(error.frame, axis_name)),
                 evidence=evidence,
                 notes=notes,
+                shifts=flown and flown[1],
+                rates=flown and flown[2],
             )
 
     def _of_clock(self) -> Iterator[ErrorSource]:
@@ -294,7 +359,10 @@ class ErrorListing:
                 both = [self.legs(platform_index, kind) for platform_index in (0, 1)]
                 published = self._of_both([legs for legs, _ in both], axis, None if in_scene else ways)
                 full = self._of_both([legs for _, legs in both], axis, None if in_scene else ways)
-                if kind == "position" and name in ("x", "y"):
+                flown = self._flown(kind, dict(enumerate(ways)), error.frame)
+                if flown is not None:
+                    full = flown[0]
+                elif kind == "position" and name in ("x", "y"):
                     # A horizontal shift of both platforms is a shift of the scene: x̂ is the error itself, and β̃ₙ and
                     # ½s̈·x̂ cancel. The rest of a sum of rounded numbers would give a limit where none exists.
                     full = full._replace(qpe=0.0 * full.qpe, cubic=0.0 * full.cubic)
@@ -315,6 +383,8 @@ class ErrorListing:
                     evidence=error.source,
                     notes=(phrases.held_to_the_total("both platforms"),),
                     of_receiver=None if in_scene else ways[1],
+                    shifts=flown and flown[1],
+                    rates=flown and flown[2],
                 )
 
     @staticmethod
@@ -450,6 +520,12 @@ def _along(effects: Sequence[AnyEffect], direction: Vectors) -> AnyEffect:
     """Effect of a unit error along a direction: the projection of the three scene effects."""
     terms = [[part * way for part, way in zip(parts, direction, strict=True)] for parts in zip(*effects, strict=True)]
     return type(effects[0])(*map(_total, terms))
+
+
+def _of_both_platforms(vectors: Mapping[int, Vectors]) -> tuple[Vectors, Vectors]:
+    """Vectors of both platforms from the vectors of the platforms that have an error: the other's is not used."""
+    first = next(iter(vectors.values()))
+    return vectors.get(0, first), vectors.get(1, first)
 
 
 def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:

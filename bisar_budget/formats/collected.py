@@ -22,8 +22,10 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable
 from bisar_budget.formats.containers import Element
 from bisar_budget.geometry import FRAME_AXES, STRAIGHT, Axes, PlatformState, Vector, cross, dot, norm, unit
+from bisar_budget.paths.accuracy import with_rate
 from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes
 from bisar_budget.paths.flight import Fitted, least_squares, path_of, powers_of
+from bisar_budget.paths.free_fall import fall_of
 
 MIN_FIT_PULSES = 5  # in an aperture to which a path is fitted
 MAX_APERTURE_S = 1e6  # of an aperture, and from the file's start to its middle
@@ -223,7 +225,8 @@ def declared(
 ) -> tuple[DeclaredMotionError, list[str]]:
     """Turn a covariance (6, 6) from a file's frame into the frame of a mission, with remarks on the changes.
 
-    ECF becomes the scene's axes, RIC_ECI is `ric`, and RIC_ECF is turned into `ric` about the radial axis. Without
+    ECF becomes the scene's axes, RIC_ECI is `ric`, and RIC_ECF is turned into `ric` about the radial axis; for a
+    platform in free fall its velocities become those against the stars. Without
     correlations the turned covariance becomes its sigmas.
     """
     name = frame.text()
@@ -235,6 +238,10 @@ def declared(
     turn: Floats = np.array(target) @ np.array(source).T  # from the file's frame into the mission's frame
     turn_of_both = np.kron(np.eye(2), turn)
     turned = turn_of_both @ covariance @ turn_of_both.T
+    if name == "RIC_ECF" and (fall := fall_of(state, axes)) is not None:
+        turned = with_rate(
+            turned, np.array(target) @ np.array(fall.rotation)
+        )  # `ric` has velocities against the stars
     remarks = []
     if name != "RIC_ECI" and covariance.any():
         target_axes = (

@@ -26,6 +26,7 @@ from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
 from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
+from bisar_budget.paths.accuracy import block_turned, with_rate
 from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import Instant, parse_instant
 from bisar_budget.simulator.collection import PointCollection
@@ -456,17 +457,25 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
     if is_radial:
         return covariance, "RIC_ECI"
     # Columns are the axes of the error's frame in the scene's axes. Rows are the scene's axes in Earth-fixed axes.
-    turn_of_both = np.kron(np.eye(2), np.array(source).T)
-    covariance = turn_of_both @ covariance @ turn_of_both.T
+    covariance = _along_scene(covariance, state, error.frame)
     if common is not None:
-        turn = np.array(state.frame(common.frame)).T
+        shared = np.zeros((6, 6))
         for index, kind in enumerate(("position", "velocity")):
             if getattr(common, kind) is not None:
                 block = slice(3 * index, 3 * index + 3)
-                covariance[block, block] += turn @ np.diag(np.square(getattr(common, kind))) @ turn.T
+                shared[block, block] = np.diag(np.square(getattr(common, kind)))
+        covariance = covariance + _along_scene(shared, state, common.frame)
         added[f"{owner}.common"] = "the sigmas hold an error that both platforms share"
     turn_of_both = np.kron(np.eye(2), np.array(axes.axes).T)
     return turn_of_both @ covariance @ turn_of_both.T, "ECF"
+
+
+def _along_scene(covariance: Floats, state: PlatformState, frame: str) -> Floats:
+    """A covariance (6, 6) along the axes of a frame, along those of the scene, with Earth-fixed velocities."""
+    axes = np.array(state.frame(frame), dtype=float)
+    if frame == "ric" and state.fall is not None:
+        covariance = with_rate(covariance, -axes @ np.array(state.fall.rotation))
+    return block_turned(covariance, axes.T)
 
 
 def _pos_vel_err(path: str, covariance: Floats, frame: str) -> _Leaves:

@@ -40,6 +40,7 @@ from bisar_budget.paths.accuracy import (
     correlations,
     covering_sigmas,
     diagonal,
+    with_rate,
 )
 from bisar_budget.paths.flight import (
     Fitted,
@@ -57,6 +58,7 @@ from bisar_budget.paths.flight import (
     track_around,
     widest_stretch,
 )
+from bisar_budget.paths.free_fall import fall_of, of_scene
 from bisar_budget.paths.instant import DAY, Instant, later
 from bisar_budget.paths.log_places import LogKeys, filled_sigmas, hold_to_motion
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_earth_rotation
@@ -200,6 +202,7 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
         raise _UnusablePathError((platform.way,), Problem(words))
     if axes is not None:
         path = path._replace(state=with_radial(path.state, axes))
+    path = path._replace(state=with_dynamics(path.state, axes, is_orbit=platform.orbit is not None))
     trajectory, error = platform.trajectory, platform.motion_error
     if trajectory is not None and trajectory.accuracy is not None:
         accuracy, digest = _by_accuracy(mission, trajectory, error, read)
@@ -229,6 +232,11 @@ def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
         return replace(state, radial=axes.radial(state.position, state.velocity))
     except ZeroDivisionError:  # at rest against the stars, on the Earth's axis: no plane
         return state
+
+
+def with_dynamics(state: PlatformState, axes: earth.SceneAxes | None, *, is_orbit: bool = False) -> PlatformState:
+    """The path with the dynamics of its errors if it is an orbit, or a path in free fall."""
+    return replace(state, fall=of_scene(axes) if is_orbit else fall_of(state, axes))
 
 
 class _OrbitFile(NamedTuple):
@@ -520,6 +528,8 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
         return error
     covariance_of_source = diagonal([stated.total**2] * 3) if stated.covariance is None else stated.covariance
     along = block_turned(np.array(covariance_of_source), axes)
+    if error.frame == "ric" and state.fall is not None and len(along) == 6:
+        along = with_rate(along, axes @ np.array(state.fall.rotation))  # velocities in `ric` are against the stars
     kinds = KINDS[: len(along) // 3]
     sigmas = np.sqrt(np.diag(along))
     is_complete = error.covariance is None and error.position is None and error.velocity is None

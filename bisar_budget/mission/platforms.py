@@ -2,12 +2,13 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 
 from bisar_budget import units
+from bisar_budget.constants import LEAST_FALLING_HEIGHT
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.geometry import (
     STILL,
@@ -585,10 +586,11 @@ class Platform(NamedTuple):
             return self.path.state
         acceleration, bends = self.acceleration or STRAIGHT, _bends(self.jerk, self.snap)
         if self.position is not None and self.velocity is not None:
-            return PlatformState(
+            state = PlatformState(
                 position=self.position, velocity=self.velocity, acceleration=acceleration, bends=bends
             )
-        return state_from_angles(
+            return _with_fall(state)
+        state = state_from_angles(
             slant_range=self.slant_range,
             azimuth=self.azimuth,
             elevation=self.elevation,
@@ -598,6 +600,16 @@ class Platform(NamedTuple):
             acceleration=acceleration,
             bends=bends,
         )
+        return _with_fall(state)
+
+
+def _with_fall(state: PlatformState) -> PlatformState:
+    """The path, with the dynamics of its errors if it is in free fall over a scene without a place on the Earth."""
+    if not np.any(np.asarray(state.position[2]) > LEAST_FALLING_HEIGHT):
+        return state
+    from bisar_budget.paths.free_fall import fall_of  # takes 8 ms; most missions have no satellite
+
+    return replace(state, fall=fall_of(state, None))
 
 
 def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: bool) -> Problem | None:

@@ -9,7 +9,13 @@ from functools import lru_cache
 import numpy as np
 
 from bisar_budget.faults import shown
-from bisar_budget.paths.accuracy import CovarianceError, EpochCovariance, held_to_covariance, local_axes
+from bisar_budget.paths.accuracy import (
+    CovarianceError,
+    EpochCovariance,
+    held_to_covariance,
+    local_axes,
+    turns_with_orbit,
+)
 from bisar_budget.paths.ephemeris import (
     DEFAULT_DEGREE,
     MAX_VELOCITY_ERROR_RATIO,
@@ -218,7 +224,7 @@ def read_covariance(
         axes = "earth"
     elif axes is None and covariance_frame in _CELESTIAL_AXES:
         axes, turn = "stars", _turn(covariance_frame, orientation, location)
-    return EpochCovariance(time, values, axes, turn)
+    return EpochCovariance(time, values, axes, turn, turns_with_orbit(covariance_frame))
 
 
 def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 BLOCK_DRAWS = 1 << 15
 CHUNK_DRAWS = 1 << 22  # draws of one stream; a second or so
 EXACT_PIECE_DRAWS = 1 << 18  # of a chunk, which it divides, where each draw goes through exact ranges: as long
-_ORDER = {"m": 0, "m/s": 1, "m/s^2": 2}
 _SAMPLE = 512  # draws that decide whether exact ranges are needed
 _DIFFERENT = 0.01  # of a limit
 _AFTER_BYTES = 256
@@ -220,9 +219,10 @@ class Sums:
         elif source.is_position:
             motion = self._kept(self.motion, owner, (2, 3, 3))
             for platform in source.platforms:
-                for axis, component in enumerate(source.direction_of(platform)):
-                    if component:
-                        motion[platform, _ORDER[source.unit], axis] += size * component * drawn
+                for order, vector in enumerate(source.state_of(platform)):
+                    for axis, component in enumerate(vector):
+                        if component:
+                            motion[platform, order, axis] += size * component * drawn
         elif source.clock is not None:
             self._kept(self.clock, owner, (4,))[:] += np.multiply.outer(size * np.array(source.clock), drawn)
         else:
@@ -271,6 +271,10 @@ class Sums:
         tags = _sum(self.tags, owners, np.broadcast_to(0.0, (2, self.size)))
         clock = _sum(self.clock, owners, np.broadcast_to(0.0, (4, self.size)))
         shifts: list[Any] = [powers @ shift.swapaxes(0, 1) if shift.any() else STILL for shift in motion]
+        for platform, path in enumerate(self.paths):
+            if path.fall is not None and motion[platform].any():
+                of_units = path.fall.motions(path, self.exact.half, self.exact.sampling.places)[..., 0]
+                shifts[platform] = list(np.einsum("kacq,kad->cqd", of_units, motion[platform]))
         for platform, tag in enumerate(tags):
             if tag.any():
                 late = self.paths[platform].later(times[:, None], tag)

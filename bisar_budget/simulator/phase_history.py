@@ -17,6 +17,7 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState,
 from bisar_budget.image_plane import LEADING, Sampling, band_variance
 from bisar_budget.mission.model import Radar
 from bisar_budget.ranges.exact_ranges import ExactEffect, ExactRanges, followed
+from bisar_budget.simulator.orbit_error import orbit_error
 
 _BLOCK_SAMPLES = 1 << 18  # complex numbers held at once
 _MIN_SIGHT_RATIO = 1e-20  # square of the change of the range by a metre of a platform; a smaller square is rounding
@@ -73,6 +74,9 @@ class PathError(NamedTuple):
 
     Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], an error of any form over time, are
     east-north-up. Noise and vibrations without an axis are along the line of sight, positive away from the scene.
+    A platform in free fall flies the errors of position, velocity and acceleration at mid-aperture as another orbit;
+    for any other they are a polynomial of time. `height` [m] is the height by which a scene is too high: it moves the
+    measured path up, and is no error of an orbit.
     `time_tag` [s] is the delay of a time tag: the measured path is the true path that much later. `wideband_rms` [m]
     is the RMS noise of the pulses, white or within `wideband_band` (low, high) [Hz], and needs a generator.
     """
@@ -85,6 +89,7 @@ class PathError(NamedTuple):
     wideband_band: tuple[float, float] | None = None
     course: Course | None = None
     time_tag: float = 0.0
+    height: float = 0.0
 
     def slow(self) -> "PathError":
         """The same error with the smooth part of its course."""
@@ -99,7 +104,8 @@ class PathError(NamedTuple):
         position, velocity, acceleration = (
             (u[0] + v[0], u[1] + v[1], u[2] + v[2]) for u, v in zip(self[:3], other[:3], strict=True)
         )
-        return PathError(position, velocity, acceleration, time_tag=self.time_tag + other.time_tag)
+        time_tag, height = self.time_tag + other.time_tag, self.height + other.height
+        return PathError(position, velocity, acceleration, time_tag=time_tag, height=height)
 
 
 class Errors(NamedTuple):
@@ -291,11 +297,16 @@ def path(
     actual = _placed(state, slow_time)
     if error is None:
         return Path(actual=actual, measured=actual)
-    # (22): p̃ + ṽτ + ãτ²/2
-    tau = slow_time[:, None]
     measured = _placed(state, slow_time + error.time_tag) if error.time_tag else actual
-    measured = measured + np.asarray(error.position) + np.asarray(error.velocity) * tau
-    measured = measured + np.asarray(error.acceleration) * tau**2 / 2
+    if state.fall is None or not any(map(any, error[:3])):
+        # (22): p̃ + ṽτ + ãτ²/2
+        tau = slow_time[:, None]
+        measured = measured + np.asarray(error.position) + np.asarray(error.velocity) * tau
+        measured = measured + np.asarray(error.acceleration) * tau**2 / 2
+    else:
+        measured = measured + orbit_error(state, error.position, error.velocity, error.acceleration, slow_time)
+    if error.height:
+        measured = measured + np.array((0.0, 0.0, error.height))
     if error.course is not None:
         measured = measured + error.course.at(slow_time)
     along = np.zeros_like(slow_time)

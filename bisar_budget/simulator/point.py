@@ -13,7 +13,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.combined import correlated_errors, likely_error
 from bisar_budget.effects.effect import PLATFORMS, LinePiece, gradients_of, indicated_point
 from bisar_budget.effects.vibration import counted, lines_of, sight_of
-from bisar_budget.geometry import GroundVector, Vector, dot
+from bisar_budget.geometry import GroundVector, PlatformState, dot
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError as DeclaredError
 from bisar_budget.ranges.exact_ranges import ExactEffect
@@ -386,18 +386,18 @@ def declared_errors(mission: Mission) -> Errors:
     for name in PLATFORMS:
         declared: DeclaredError = getattr(mission.platforms, name).motion_error
         state = getattr(mission.geometry, name)
-        axes = state.frame(declared.frame)
-        error = _turned((declared.position, declared.velocity, declared.acceleration), axes, factor)
+        error = _turned((declared.position, declared.velocity, declared.acceleration), state, declared.frame, factor)
         error = error._replace(time_tag=factor * (declared.time_tag or 0.0))
         if name in likely_errors:
-            likely_path_error = _turned((likely_errors[name][:3], likely_errors[name][3:]), axes, 1.0)
+            likely_vectors = (likely_errors[name][:3], likely_errors[name][3:])
+            likely_path_error = _turned(likely_vectors, state, declared.frame, 1.0)
             error = likely_path_error._replace(acceleration=error.acceleration)
         if common is not None:
             common_vectors = (common.position, common.velocity, common.acceleration)
-            common_error = _turned(common_vectors, state.frame(common.frame), factor)
+            common_error = _turned(common_vectors, state, common.frame, factor)
             error = error.plus(common_error._replace(time_tag=factor * (common.time_tag or 0.0)))
         if mission.scene.height_error:  # a higher scene: both platforms are measured too high
-            error = error.plus(PathError(position=(0.0, 0.0, mission.scene.height_error)))
+            error = error.plus(PathError(height=mission.scene.height_error))
         wideband = declared.vibration.wideband
         error = error._replace(
             sinusoids=_sinusoids(mission, name),
@@ -411,16 +411,21 @@ def declared_errors(mission: Mission) -> Errors:
     return errors._replace(clock=tuple(map(math.fsum, zip((0.0,) * 4, *clock_terms, strict=True))))
 
 
-def _turned(
-    vectors: Sequence[Sequence[float] | None], axes: tuple[Vector, Vector, Vector], factor: float
-) -> PathError:
-    """Turn position, velocity and acceleration errors from a frame's axes to the scene's axes, signs kept."""
-    turned = []
+def _turned(vectors: Sequence[Sequence[float] | None], state: PlatformState, frame: str, factor: float) -> PathError:
+    """Turn position, velocity and acceleration errors from a frame's axes to the scene's axes, signs kept.
+
+    The velocity of a platform in free fall is against the stars in `ric`, and the rate of the Earth-fixed vector in
+    all other frames.
+    """
+    axes, turned = state.frame(frame), []
     for vector in vectors:
         components = (0.0, 0.0, 0.0) if vector is None else vector
         x, y, z = (factor * sum(d * axis[i] for d, axis in zip(components, axes, strict=True)) for i in range(3))
         turned.append((x, y, z))
     position, velocity, acceleration = (*turned, (0.0, 0.0, 0.0))[:3]
+    if frame == "ric" and state.fall is not None:
+        u, v, w = (a + b for a, b in zip(velocity, state.fall.rate_against_stars(position), strict=True))
+        velocity = (u, v, w)
     return PathError(position, velocity, acceleration)
 
 

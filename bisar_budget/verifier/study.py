@@ -131,14 +131,18 @@ class Study:
         """Return the errors of an image with one error of a size."""
         if source.clock is not None:
             return Errors(clock=tuple(size * term for term in source.clock))
-        kind, errors = source.subject.kind, Errors()
-        if kind == "terrain":  # a higher scene: both platforms measured too high
-            kind = "position"
+        errors = Errors()
         for platform_index in source.platforms:
-            components: Any = size
-            if not source.is_time_tag:
-                components = tuple(size * component for component in source.direction_of(platform_index))
-            errors = errors.of(PLATFORMS[platform_index], PathError(**{kind: components}))
+            if source.is_time_tag:
+                error = PathError(time_tag=size)
+            elif source.subject.kind == "terrain":
+                error = PathError(height=size)
+            else:
+                position, velocity, acceleration = (
+                    (size * x, size * y, size * z) for x, y, z in source.state_of(platform_index)
+                )
+                error = PathError(position, velocity, acceleration)
+            errors = errors.of(PLATFORMS[platform_index], error)
         return errors
 
     def together(self, sizes: Sizes, scale: float = 1.0) -> Errors:
