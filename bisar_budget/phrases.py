@@ -1176,6 +1176,18 @@ def overrides_a_part(key: str, text: str, part: str) -> str:
 
 # ---------------------------------------------------------------------- the collection
 @phrase
+def orbit_errors_are_independent(platform: str, position_m: float, rate: float, velocity: float) -> str:
+    """Said of the position and velocity errors of a platform in free fall. [m, rad/s, m/s]"""
+    sigma, rest = format_quantity(position_m, "m"), format_quantity(velocity, "m/s")
+    return (
+        f"the {platform} is in free fall: a position error of {sigma} goes with a velocity error of about "
+        f"{format_quantity(rate * position_m, 'm/s')} (rate of the orbit times position error); the file declares "
+        f"{rest}, independent of the position, which is pessimistic; the covariance of both says more "
+        "(motion_error.covariance)"
+    )
+
+
+@phrase
 def path_curves(platform: str) -> str:
     """Said of a collection."""
     return f"the {platform}'s path curves: the published model takes it for straight, the full model does not"

@@ -10,6 +10,7 @@ the fixes has both errors in its image. If the file does not state the choice (`
 can be judged.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -377,6 +378,26 @@ def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floa
     east = (np.asarray(d)[..., None] * constant - np.asarray(b)[..., None] * linear) / determinant
     north = (np.asarray(a)[..., None] * linear - np.asarray(c)[..., None] * constant) / determinant
     return np.stack((east, north), axis=-2)
+
+
+# ---------------------------------------------------------------------- errors of an orbit
+def orbit_notes(case: Case, rows: Sequence[Row]) -> Iterator[Note]:
+    """Notes on platforms in free fall whose position and velocity errors cannot be independent.
+
+    The errors of an orbit are correlated: a position error δr goes with a velocity error of about n·δr, n the rate of
+    the orbit. Declared as independent and smaller than n·δr, they leave more phase than the orbit's covariance. The
+    note is given if the position errors use more than a negligible part of a limit.
+    """
+    for index, name in enumerate(PLATFORMS):
+        state, error = case.geometry.both[index], getattr(case.mission.platforms, name).motion_error
+        position, velocity = error.stated("position"), error.stated("velocity") or (0.0, 0.0, 0.0)
+        if state.fall is None or error.covariance is not None or position is None:
+            continue
+        rate = norm(state.fall.orbit_rate(state))
+        sizes = math.hypot(*position), math.hypot(*velocity)
+        uses = [row.utilization or 0.0 for row in rows if row.owner == name and row.subject.kind == "position"]
+        if rate * sizes[0] > sizes[1] and max(uses, default=0.0) > NEGLIGIBLE_USE_FRACTION:
+            yield phrases.orbit_errors_are_independent(name, sizes[0], rate, sizes[1])
 
 
 # ---------------------------------------------------------------------- the published model

@@ -547,6 +547,7 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
     if not residual.ranges:
         yield step(f"Full model{each}: no ground point has the range history that this error leaves")
         return
+    yield from _orbit_motion(analysis, source, residual.size)
     sign = "" if residual.is_small or residual.size == size else ", with the other sign, which leaves more"
     yield step(
         f"Full model{each}{sign}: the ground point at which V = Var(ρ) + b²·⟨ρ²⟩ is least, ρ the range error that is "
@@ -571,6 +572,26 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
     by_rest = worse_sign(analysis, source, size, _beyond_phase)
     if by_rest.beyond_phase > max(_MIN_SHOWN_BEYOND_RAD, float(by_rest.exact.rounding[0])):
         yield from by_rest.rest_steps()
+
+
+def _orbit_motion(analysis: Analysis, source: ErrorSource, size: float) -> Iterator[Step]:
+    """Steps with the motion of each platform in free fall by an error, at the first and the last node of the fit."""
+    if source.shifts is None:
+        return
+    times = analysis.exact.times[:, 0].tolist()
+    against = " against the stars" if source.subject.frame == "ric" else " in Earth-fixed axes"
+    for platform in source.platforms:
+        if analysis.geometry.both[platform].fall is None:
+            continue
+        lines = []
+        for node in (0, -1):
+            x, y, z = (number(size * float(component[node, 0])) for component in source.shifts[platform])
+            lines.append(f"{times[node]:+.6g} s: {x} m east, {y} m north, {z} m up")
+        yield step(
+            f"The {PLATFORMS[platform]} is in free fall: its error at mid-aperture (velocity{against}) follows "
+            "d²δr/dt² = μ/r³*(3(r̂·δr)r̂ − δr), written in Earth-fixed axes",
+            *lines,
+        )
 
 
 def _residual_formula(exact: ExactRanges) -> str:
