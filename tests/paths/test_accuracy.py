@@ -97,6 +97,23 @@ def test_a_velocity_over_the_ground_takes_the_place_with_it() -> None:
     assert covariance[3, 1] == pytest.approx(ROTATION_RATE * 1e8, rel=1e-6)
 
 
+@pytest.mark.parametrize("frame", ["RTN_ROTATING", "TNW_ROTATING"])
+def test_velocities_in_axes_that_turn_with_the_orbit_become_those_against_the_stars(frame: str) -> None:
+    """An error at rest in turning axes is turned by the orbit: its velocity against the stars is n × d."""
+    text = with_covariance((600.0, frame, triangle((1e3, 1e3, 0.0))))
+    place, velocity = state(text)
+    momentum = np.cross(place, velocity)
+    rate = momentum / (place @ place)
+    if frame == "TNW_ROTATING":  # gravity turns the velocity
+        gravity = -3.986004418e14 * place / np.linalg.norm(place) ** 3
+        rate = np.cross(velocity, gravity) / (velocity @ velocity)
+    across = np.eye(3) - np.outer(momentum, momentum) / (momentum @ momentum)  # the variance in the orbit's plane
+    turning = np.array([np.cross(rate - (0, 0, ROTATION_RATE), axis) for axis in np.eye(3)]).T
+    want = turning @ across @ turning.T * 1e6
+    got = np.array(stated(text).covariance)[3:, 3:]
+    assert got == pytest.approx(want, rel=2e-3, abs=2e-3 * np.abs(want).max())
+
+
 @pytest.mark.parametrize(
     ("seconds", "sigma"), [(0.0, 1.0), (300.0, math.sqrt(0.5 + 4.5)), (600.0, 3.0), (900.0, 3.0)]
 )
