@@ -518,7 +518,7 @@ def _dispersion(analysis: Analysis, findings: MissionFindings, row: Row) -> Iter
         path, propagation = getattr(mission.geometry, name), mission.propagation
         if propagation is None:
             continue
-        content = propagation.content(name) * findings.coverage_factor
+        content = (propagation.content(name) or 0.0) * findings.coverage_factor
         values = {
             "K": ELECTRON_DELAY_M3_PER_S2 * content * float(leg_factor(CONTENT, path.position, path.position)),
             "c": SPEED_OF_LIGHT,
