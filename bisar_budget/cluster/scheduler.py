@@ -181,7 +181,7 @@ class Workers:
         scheduler or all workers went away, if a block ended every worker that had it, or if a worker cannot do a
         block. Raises `RuntimeError` if the function raised an error.
         """
-        finished: "SimpleQueue[Future[Result]]" = SimpleQueue()
+        finished: SimpleQueue[Future[Result]] = SimpleQueue()
         # A task makes the common data, not the client: Dask makes them again if a worker with them is lost.
         shared = self.client.submit(pickle.loads, pickle.dumps(common), pure=False)
         pending: dict[object, tuple[Future[Result], Block]] = {}
