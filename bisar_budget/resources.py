@@ -5,7 +5,7 @@ import stat
 import sys
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
+from typing import TYPE_CHECKING, BinaryIO, Protocol
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -215,10 +215,12 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def docstring(documented: Any) -> str:
+def docstring(documented: Callable[..., object] | None) -> str:
     """Docstring of a class or function at the top of its module; from the source if Python dropped it (-OO)."""
     if sys.flags.optimize < 2:
         return documented.__doc__ or ""
+    if documented is None:
+        return ""
     import ast
     from inspect import getsourcefile
 

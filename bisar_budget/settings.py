@@ -29,6 +29,10 @@ _LARGEST = 1 << 20  # bytes
 _MOST_DOTS = 1000  # on a line: tomllib's time grows with the square of the parts of a key
 
 
+SettingValues = Mapping[str, Any]
+"""Values of the table by key, each of the type that `KEYS` states."""
+
+
 class SettingsError(Exception):
     """A table that cannot be used; the message names the file and the key."""
 
@@ -38,7 +42,7 @@ class Settings:
     """The keys and values of the table; `file` is the file of the table, for messages."""
 
     file: str
-    values: Mapping[str, Any]
+    values: SettingValues
 
 
 def project_settings(folder: str, files: Files = DISK) -> Settings | None:

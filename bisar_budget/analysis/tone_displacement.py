@@ -73,6 +73,7 @@ def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: Exac
         error: MotionError = getattr(mission.platforms, name).motion_error
         for index, line in enumerate(error.vibration.sinusoidal):
             value, cycles = line.displacement, line.frequency * T
+            sizes: Sequence[float]
             if isinstance(value, tuple):
                 ways, sizes = getattr(geometry, name).frame(error.frame), value
             else:  # along the line of sight, as it turns

@@ -42,6 +42,7 @@ from bisar_budget.cli.streams import (
 )
 from bisar_budget.constants import MAX_DRAWS, MAX_DRAWS_HERE
 from bisar_budget.faults import closed, fault_words, printable
+from bisar_budget.json_types import JsonObject
 from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
@@ -52,6 +53,8 @@ if TYPE_CHECKING:
     from bisar_budget.settings import Settings
 
 
+Arguments = dict[str, Any]
+"""Arguments of a function by name."""
 _PROJECTS = "bisar_budget.projects"  # in the context of a command
 _OF_RUN = ("format", "color")  # settings of a whole run, if all its projects agree
 
@@ -80,7 +83,7 @@ class _Gate(click.Command):
         context.meta[_PROJECTS] = projects
         return context
 
-    def _common_defaults(self, settings: "Sequence[Settings | None]") -> dict[str, Any]:
+    def _common_defaults(self, settings: "Sequence[Settings | None]") -> JsonObject:
         """Defaults of a run of several projects: options of the whole run on which all settings agree."""
         agreed = {}
         for key in _OF_RUN:
@@ -92,7 +95,7 @@ class _Gate(click.Command):
         options = {p.opts[0].removeprefix("--"): str(p.name) for p in self.params}
         return {options[key]: value for key, value in agreed.items() if value is not None}
 
-    def _context(self, defaults: dict[str, Any], *arguments: Any, **extra: Any) -> click.Context:
+    def _context(self, defaults: JsonObject, *arguments: Any, **extra: Any) -> click.Context:
         try:
             return super().make_context(*arguments, default_map=defaults, **extra)
         except click.BadParameter as error:
@@ -104,7 +107,7 @@ class _Gate(click.Command):
                     )  # the variable, and not the option, which the user did not write
             raise
 
-    def _defaults(self, settings: "Settings | None") -> dict[str, Any]:
+    def _defaults(self, settings: "Settings | None") -> JsonObject:
         from bisar_budget.settings import TABLE
 
         options = {p.opts[0].removeprefix("--"): p for p in self.params if isinstance(p, click.Option) and p.envvar}
@@ -158,7 +161,7 @@ class _Draws(ParamType[int]):
 
     name = "number"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> int:
         from decimal import Decimal, InvalidOperation
 
         try:
@@ -355,7 +358,7 @@ def check(
         from bisar_budget.front.checks import checked, drawn_by
         from bisar_budget.mission.quantities import QuestionError
 
-        settings: dict[str, Any] = {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
+        settings: Arguments = {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
         found: dict[str, MissionFindings | UnusableMission] = {}
         for project in projects:
             judged_on, arguments = _asked(project, len(projects) > 1, today, changes)
@@ -413,7 +416,7 @@ def _reports_of(projects: Sequence[Project]) -> list[tuple[Project, str, str]]:
 
 def _asked(
     project: Project, is_among_others: bool, today: datetime | None, changes: "Sequence[SetValue]"
-) -> tuple[date, dict[str, Any]]:
+) -> tuple[date, Arguments]:
     """Day of waivers and arguments of the check for a project; one of several projects also names its settings."""
     from bisar_budget.findings.requirement import Override
 

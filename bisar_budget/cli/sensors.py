@@ -4,13 +4,14 @@ import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from bisar_budget.cli.options import FILE, TEXT_OR_JSON
 from bisar_budget.cli.streams import EXIT_USAGE, complain, deliver, expand, say_faults, spare
 from bisar_budget.faults import file_fault, printable, sentences
+from bisar_budget.json_types import JsonObject
 
 if TYPE_CHECKING:
     from bisar_budget.mission.parts import Entry, PartError
@@ -125,7 +126,7 @@ def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
     from bisar_budget.mission.parts import PartError
     from bisar_budget.report.formats.json_document import fault_item
 
-    parts = []
+    parts: list[JsonObject] = []
     for file, result in checked.items():
         if isinstance(result, PartError):
             faults = [fault_item(fault) for fault in result.faults]
@@ -136,7 +137,7 @@ def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
     return _document({"format": "bisar-budget/sensors-check/1", "status": status, "parts": parts})
 
 
-def _document(content: dict[str, Any]) -> str:
+def _document(content: JsonObject) -> str:
     """Text of a JSON document."""
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
@@ -165,7 +166,7 @@ def _as_text(chosen: "list[Entry]") -> str:
     return "\n".join(lines)
 
 
-def _item(entry: "Entry") -> dict[str, Any]:
+def _item(entry: "Entry") -> JsonObject:
     """JSON item of a part."""
     from bisar_budget.mission.parts import evidence
 

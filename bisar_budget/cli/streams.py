@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
@@ -231,7 +231,7 @@ def deliver(text: str, output: str | None = None, format_name: str = "text") -> 
         write_file(output, harmless(text, format_name).replace("\n", _LINE_ENDS.get(format_name, "\n")))
 
 
-def deliver_found(form: "ModuleType", results: Any, format_name: str, output: str | None) -> None:
+def deliver_found(form: "ModuleType", results: object, format_name: str, output: str | None) -> None:
     """Write results in a format; `form` is the module with a function for each format."""
     from bisar_budget.report import Style
 

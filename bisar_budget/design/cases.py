@@ -6,12 +6,13 @@ import re
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bisar_budget.faults import Fault, InvalidValueError, shown
+from bisar_budget.json_types import JsonObject
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.quantities import (
     Choices,
@@ -67,7 +68,7 @@ class Cases:
 
     def values(self, start: int, stop: int) -> Mapping[str, Values]:
         """Values of cases `start` to `stop` by key, (stop - start,)."""
-        indices: Any = [slice(start, stop)] * len(self.columns)
+        indices: Sequence[slice | NDArray[np.intp]] = [slice(start, stop)] * len(self.columns)
         if self.is_grid:
             indices = np.unravel_index(np.arange(start, stop), self.shape)
         columns = zip(self.varied, self.columns, indices, strict=True)
@@ -75,7 +76,7 @@ class Cases:
 
 
 # ---------------------------------------------------------------- cases of arrays
-def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Cases:
+def grid_of(tree: JsonObject, values: Mapping[str, ArrayLike]) -> Cases:
     """Every combination of values in arrays; the last key is the fastest.
 
     Parameters
@@ -143,7 +144,7 @@ class _Asked(NamedTuple):
     is_log: bool = False
 
 
-def grid(tree: dict[str, Any], texts: Sequence[str], name: str = "--vary") -> Cases:
+def grid(tree: JsonObject, texts: Sequence[str], name: str = "--vary") -> Cases:
     """Cases of options `KEY=FROM:TO UNIT:COUNT`, with a further `:log` for equal ratios, or `KEY=VALUE,VALUE,...`.
 
     Keys without a number take `KEY=WORD,WORD,...`. Ends belong to the range. Values have few digits in the unit of
@@ -182,7 +183,7 @@ def _axis(asked: _Asked) -> Values:
     return _spread(asked, np.arange(count) / (count - 1))
 
 
-def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Cases:
+def sample(tree: JsonObject, texts: Sequence[str], how: str) -> Cases:
     """Draw a Latin hypercube over ranges: each of `COUNT` equal parts of a range has one value.
 
     Parameters
@@ -224,7 +225,7 @@ def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Cases:
     return Cases(tuple(asked.varied for asked in every), tuple(columns))
 
 
-def _all_asked(tree: dict[str, Any], texts: Sequence[str], name: str) -> Iterator[_Asked]:
+def _all_asked(tree: JsonObject, texts: Sequence[str], name: str) -> Iterator[_Asked]:
     """Options of texts, each key once."""
     if not texts:
         raise QuestionError(f"no {name}: nothing would vary; {_FORMS}")
@@ -238,7 +239,7 @@ def _all_asked(tree: dict[str, Any], texts: Sequence[str], name: str) -> Iterato
         yield asked
 
 
-def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked:
+def _asked(tree: JsonObject, text: str, name: str) -> _Asked:
     """Read one option; its values are checked against the bounds of the key."""
     key, equals, values_text = (part.strip() for part in text.partition("="))
     option = f"{name} {shown(text)}"
@@ -353,7 +354,7 @@ def _rounded(values: Floats) -> Floats:
 
 
 # ---------------------------------------------------------------- cases of a file
-def table_file(tree: dict[str, Any], path: str) -> Cases:
+def table_file(tree: JsonObject, path: str) -> Cases:
     """Read a CSV file of cases, as `table` does; raises `TableError` also if the file is unreadable or too large."""
     if kind := special_file(path):
         raise TableError.of_file(path, f"cannot be read: {kind}; accepted: a regular file")
@@ -368,7 +369,7 @@ def table_file(tree: dict[str, Any], path: str) -> Cases:
     return table(tree, text, path)
 
 
-def table(tree: dict[str, Any], text: str, file: str) -> Cases:
+def table(tree: JsonObject, text: str, file: str) -> Cases:
     """Read a CSV of cases: a header `KEY [unit]` for each column, then one case in each line.
 
     Empty lines and lines that begin with `#` are left out. Plain numbers need no unit, and words have none. The check
@@ -439,7 +440,7 @@ def _cells(line: str) -> Iterator[tuple[int, str]]:
         at += len(cell) + 1
 
 
-def _headed(tree: dict[str, Any], header: str, line_number: int, file: str) -> tuple[Varied, ...]:
+def _headed(tree: JsonObject, header: str, line_number: int, file: str) -> tuple[Varied, ...]:
     """Keys of the header; numbers have the unit of the header."""
     if not header:
         accepted = "accepted: KEY [unit], KEY [unit], ..."
@@ -463,7 +464,7 @@ def _headed(tree: dict[str, Any], header: str, line_number: int, file: str) -> t
     return tuple(varied.values())
 
 
-def _column(tree: dict[str, Any], cell: str) -> Varied:
+def _column(tree: JsonObject, cell: str) -> Varied:
     """Number with the unit of a cell of the header, or the key of words."""
     match = _HEADER.match(cell)
     if match is None:

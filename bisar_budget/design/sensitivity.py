@@ -9,7 +9,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from bisar_budget.design.varied import scaled
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.requirement import Override
+from bisar_budget.json_types import JsonObject
 from bisar_budget.mission.model import MISSION, SHARES, Mission
 from bisar_budget.mission.propagation import DELAYS
 from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, as_number, form_of, tree_of
@@ -40,6 +41,7 @@ from bisar_budget.mission.readers import (
     Version,
     Whole,
 )
+from bisar_budget.mission.tree import Content
 from bisar_budget.workers import Progress, unseen
 
 LITTLE = 1e-4  # of a utilization; a smaller change is not shown
@@ -410,7 +412,7 @@ class _Neighbours:
 
 
 # ---------------------------------------------------------------- numbers of the file
-def stated_numbers(tree: dict[str, Any], nearest_m: float) -> tuple[list[Stated], list[Skipped]]:
+def stated_numbers(tree: JsonObject, nearest_m: float) -> tuple[list[Stated], list[Skipped]]:
     """All numbers of a mission file in its order, and the skipped keys; `tree` is its content as text.
 
     A position on the Earth changes by a fraction of `nearest_m`, the slant range of the nearer platform. [m]
@@ -431,13 +433,13 @@ def stated_numbers(tree: dict[str, Any], nearest_m: float) -> tuple[list[Stated]
     return numbers, skipped
 
 
-Leaf = tuple[str, Reader, Any, Mapping[str, Any] | None]
+Leaf = tuple[str, Reader[object], Content, Mapping[str, object] | None]
 
 
-def _leaves(reader: Reader, value: Any, path: tuple[str, ...], above: Mapping[str, Any] | None) -> Iterator[Leaf]:
+def _leaves(reader: Reader[object], value: object, path: tuple[str, ...], above: JsonObject | None) -> Iterator[Leaf]:
     """Key, reader and value of every leaf of a file; for shares also the section of all shares."""
     reader = form_of(reader, value)
-    children: Sequence[tuple[str, Any]] = ()
+    children: Sequence[tuple[str, object]] = ()
     if isinstance(value, dict):
         children = list(value.items())
     elif isinstance(value, list) and isinstance(reader, ListOf | Triple):
@@ -449,10 +451,11 @@ def _leaves(reader: Reader, value: Any, path: tuple[str, ...], above: Mapping[st
         return
     for name, inner, item in below:
         if inner is not None:
-            yield from _leaves(inner, item, (*path, name), value if reader is SHARES else None)
+            shares = value if reader is SHARES and isinstance(value, dict) else None
+            yield from _leaves(inner, item, (*path, name), shares)
 
 
-def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, Any] | None) -> Stated | Skipped:
+def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, object] | None) -> Stated | Skipped:
     """A number with its step, or why it has none; `shares` are all shares of its section."""
     value = number.value or 0.0
     if number.reader is LATITUDE or number.key.endswith("longitude"):
@@ -478,7 +481,7 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, An
     return Stated(number, text, value, step, 0.01 * value, "1 %", others=further_shares)
 
 
-def _no_number(key: str, reader: Reader) -> str:
+def _no_number(key: str, reader: Reader[object]) -> str:
     """Words for the content of a key without a number; empty for names and remarks, which have no effect."""
     kinds = (
         ("is a whole number", isinstance(reader, Whole | Version)),
@@ -510,7 +513,7 @@ def relaxed_errors(mission: Mission, judged: JudgedMission, today: date) -> Iter
 
 def _declared_errors(mission: Mission) -> Iterator[str]:
     """Keys of the declared errors: for each platform by kind, with figures of parts of the catalogue."""
-    sections: list[tuple[str, Any, Sequence[str], int]] = []  # key, section, its keys, and the length of a list
+    sections: list[tuple[str, object, Sequence[str], int]] = []  # key, section, its keys, and the length of a list
     for name in PLATFORMS:
         error, key = getattr(mission.platforms, name).motion_error, f"platforms.{name}.motion_error"
         sections.append((key, error, ("covariance", *MOTION, "vibration"), 0))

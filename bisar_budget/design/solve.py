@@ -11,7 +11,7 @@ from contextlib import suppress
 from datetime import date
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -49,7 +49,8 @@ _MAX_TURNS = 16  # that are searched
 _LOOK_AHEAD_STEPS, _LOOK_AHEAD_STEPS_OF_READING = 5, 2
 
 # A function of the known states by value; it returns its result, or the set of values whose states it needs.
-Search = Callable[[Mapping[float, "State"]], Any]
+SearchT = TypeVar("SearchT")
+Search = Callable[[Mapping[float, "State"]], SearchT | set[float]]
 
 
 class State(NamedTuple):
@@ -354,14 +355,14 @@ class _Search:
         rounded = iter(self.states([self.number.read(text) for text in texts]) if texts else ())
         return tuple(_crossing(low, high, next(rounded), next(rounded)) for low, high in narrow)
 
-    def _searched(self, searches: Sequence[Search]) -> list[Any]:
+    def _searched(self, searches: Sequence[Search[SearchT]]) -> list[SearchT]:
         """Results of searches that take their steps together."""
         known: dict[float, State] = {}
         while True:
             results = [search(known) for search in searches]
             needed = {value for result in results if isinstance(result, set) for value in result} - known.keys()
             if not needed:
-                return results
+                return [result for result in results if not isinstance(result, set)]
             values = sorted(needed)
             known.update(zip(values, self.states(values), strict=True))
 

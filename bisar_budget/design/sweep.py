@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from datetime import date
 from functools import cached_property, lru_cache
 from hashlib import sha256
-from typing import Any
 
 import numpy as np
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.judged_rows import IN_UNIT
-from bisar_budget.design.cases import Cases, words_of
+from bisar_budget.design.cases import Cases, Values, words_of
 from bisar_budget.design.table import (
     GEOMETRY,
     REASON,
@@ -40,7 +39,7 @@ _MANY = 8  # parts, from which it is worth to start processes
 _PART_CASES = 8192  # of a part; their arrays stay in a processor's cache
 _FEW = 64  # cases of a part if each case is read
 
-Block = tuple[int, int, Mapping[str, Any]]  # first case, the one after the last, values of each key
+Block = tuple[int, int, Mapping[str, Values]]  # first case, the one after the last, values of each key
 
 # Fields of a row that a column may have, with descriptions.
 _FIELDS = {

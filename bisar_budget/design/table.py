@@ -14,6 +14,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bisar_budget.analysis.analysis import Analysis, by_nodes
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
@@ -104,7 +105,7 @@ def breaking(target: str) -> frozenset[str]:
 
 def _verdict(
     judged: JudgedMission, by_id: Mapping[str, Judged], row_id: str | None, breaks: Container[str]
-) -> dict[str, Any]:
+) -> dict[str, ArrayLike]:
     """Columns of the verdict in each case: status of the mission or of a row, and the binding row.
 
     The binding row is the judged row with the highest utilization, and the first of several rows that are equal but
@@ -297,7 +298,7 @@ class Table:
             and not is_held(self.mission, number.key, is_stated=number.value is not None)
         }
 
-    def watched(self, values: Mapping[str, Any], progress: Progress = unseen) -> dict[str, Values]:
+    def watched(self, values: Mapping[str, Values], progress: Progress = unseen) -> dict[str, Values]:
         """Check cases, and report progress: early, and then seldom, because each report costs time."""
         cases = len(next(iter(values.values())))
         ends = (
@@ -315,7 +316,7 @@ class Table:
             progress(stop, cases)
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
-    def part(self, start: int, stop: int, values: Mapping[str, Any]) -> Part:
+    def part(self, start: int, stop: int, values: Mapping[str, Values]) -> Part:
         """Check cases `start` to `stop`, with values (stop - start,)."""
         columns = self._columns(values, stop - start)
         if self.question.choices:
@@ -327,7 +328,7 @@ class Table:
             self._fill(columns)
         return Part(start, stop, columns)
 
-    def reads(self, values: Mapping[str, Any]) -> int:
+    def reads(self, values: Mapping[str, Values]) -> int:
         """Number of cases that have to be read one by one."""
         cases = len(next(iter(values.values())))
         columns = self._columns(values, cases)
@@ -339,7 +340,7 @@ class Table:
             )
         return cases - int(self._arrays(columns, cases)[0].size)
 
-    def _columns(self, values: Mapping[str, Any], cases: int) -> dict[str, Values]:
+    def _columns(self, values: Mapping[str, Values], cases: int) -> dict[str, Values]:
         """Columns of some cases: their values, and empty columns for the results."""
         columns: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
         columns |= {number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers}
@@ -418,7 +419,7 @@ class Table:
         indices, mission = np.flatnonzero(is_direct), self.mission
         for number in self.numbers:
             if number.reader is FACTOR:
-                mission = scaled(mission, number.key, found[number.key][indices])
+                mission = scaled(mission, number.key, np.asarray(found[number.key], dtype=float)[indices])
             elif number.key not in self.to_read:
                 mission = with_number(mission, number.key, found[number.key][indices])
         geometries = mission.geometry

@@ -6,12 +6,13 @@ How they come into it, where they cannot, which cases then are missions, and how
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import units
+from bisar_budget.arrays import PerCase, PerCaseFlag
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.geometry import STILL, BistaticGeometry, norm
 from bisar_budget.image_plane import MIN_SINE, spans_ground
@@ -39,7 +40,7 @@ from bisar_budget.mission.platforms import (
 )
 from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, least_elevations
 from bisar_budget.mission.quantities import QuestionError
-from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
+from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, SectionValue, Triple
 from bisar_budget.mission.vibrations import Spectrum
 
 # ---------------------------------------------------------------- keys for arrays, and cases that are missions
@@ -102,7 +103,7 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
     """
     is_safe = _has_possible_figures(mission, cases)
     half = np.asarray(mission.collection.aperture_time) / 2
-    still: Any = True
+    still: PerCaseFlag = True
     for name, paths in zip(PLATFORMS, geometries.both, strict=True):
         platform = getattr(mission.platforms, name)
         is_safe &= (paths.slant_range > SAFE) & (np.asarray(paths.position[2]) - paths.sinks(half) >= 0)
@@ -133,7 +134,8 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
     is_safe = np.ones(cases, dtype=bool)
     sync = mission.synchronization
     if sync is not None and sync.is_holdover:
-        is_safe &= np.asarray(sync.age) > SAFE * least_age(sync.averaging, mission.collection.aperture_time)
+        averaging = 0.0 if sync.averaging is None else sync.averaging
+        is_safe &= np.asarray(sync.age) > SAFE * least_age(averaging, mission.collection.aperture_time)
     split = mission.allocation.split
     for shares in split if isinstance(split, MetricSplits) else (split,):
         if isinstance(shares, Shares):
@@ -168,7 +170,7 @@ _ACCEPTED = (
 )
 
 
-def scaled(mission: Mission, key: str, factor: Any) -> Mission:
+def scaled(mission: Mission, key: str, factor: PerCase) -> Mission:
     """The mission with every error below a key multiplied: amplitudes and sigmas, also of parts of the catalogue.
 
     Frequencies, correlation times and correlations stay. The factor may be an array (cases,).
@@ -187,7 +189,9 @@ def scaled(mission: Mission, key: str, factor: Any) -> Mission:
     return cast(Mission, changed)
 
 
-def _below(value: Any, reader: Reader, parts: Sequence[str], factor: Any, key: str) -> tuple[Any, int]:
+def _below(
+    value: SectionValue, reader: Reader[object], parts: Sequence[str], factor: PerCase, key: str
+) -> tuple[SectionValue, int]:
     """A value with the errors at a path below it scaled, and the number of errors that are not zero."""
     if not parts:
         name = parts_of(key)[-1]
@@ -207,7 +211,7 @@ def _below(value: Any, reader: Reader, parts: Sequence[str], factor: Any, key: s
     raise QuestionError(f"{key}: the mission has no {child}; {_ACCEPTED}")
 
 
-def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[Any, int]:
+def _scaled(value: SectionValue, reader: Reader[object], factor: PerCase, is_clock: bool) -> tuple[SectionValue, int]:
     """A value with all errors below it scaled, and the number of errors that are not zero."""
     reader = _form(reader, value)
     if value is None:
@@ -237,7 +241,7 @@ def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[An
     return value, 0
 
 
-def _form(reader: Reader, value: Any) -> Reader:
+def _form(reader: Reader[object], value: object) -> Reader[object]:
     """The form of a reader that read a value."""
     if isinstance(reader, OneOf):
         kind = Triple if isinstance(value, tuple) and not hasattr(value, "_fields") else Quantity

@@ -12,7 +12,7 @@ error. Derived here; exact ranges in 36 phases check it (`tests/effects/test_slo
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -111,9 +111,8 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
                 of_axes = tone.of_range(value)[None]
             else:
                 x, y, z = (track / exact.ranges[platform_index] for track in exact.tracks[platform_index])
-                axes, sizes = [(x, y, z)], (value,)
-                if isinstance(value, tuple):
-                    axes, sizes = getattr(geometry, name).frame(error.frame), value
+                sizes: Sequence[float] = (value,) if not isinstance(value, tuple) else value
+                axes = [(x, y, z)] if not isinstance(value, tuple) else getattr(geometry, name).frame(error.frame)
                 of_axes = np.array([tone.of(axis, size) for axis, size in zip(axes, sizes, strict=True)])
             declared, of_metre = TonePhases(*np.moveaxis(of_axes, 1, 0)), TonePhases(*tone.of_range(1.0)[:, None])
             row_subject = subject(name, "vibration", "sinusoidal", entry=index)

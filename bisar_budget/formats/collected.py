@@ -14,7 +14,6 @@ import json
 import math
 from dataclasses import dataclass, replace
 from textwrap import wrap
-from typing import Any
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable
 from bisar_budget.formats.containers import Element
 from bisar_budget.geometry import FRAME_AXES, STRAIGHT, Axes, PlatformState, Vector, cross, dot, norm, unit
+from bisar_budget.json_types import JsonDocument, JsonObject
 from bisar_budget.paths.accuracy import with_rate
 from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes
 from bisar_budget.paths.flight import Fitted, least_squares, path_of, powers_of
@@ -472,9 +472,9 @@ _BENDS = (
 )
 
 
-def mission_tree(imported: Imported) -> dict[str, Any]:
+def mission_tree(imported: Imported) -> JsonObject:
     """Return the keys of a mission with their values as a person writes them, without comments."""
-    tree: dict[str, Any] = {
+    tree: JsonDocument = {
         "schema_version": 1,
         "name": imported.name,
         "radar": {
@@ -551,9 +551,9 @@ def _fit(track: Fitted) -> str:
     return f"{words}: what is left is faster than a mission states" if is_faster else words
 
 
-def _platform(imported: Imported, track: Fitted, error: DeclaredMotionError | None) -> dict[str, Any]:
+def _platform(imported: Imported, track: Fitted, error: DeclaredMotionError | None) -> JsonObject:
     state = track.state
-    platform: dict[str, Any] = {
+    platform: JsonObject = {
         "position": _triple(state.position, "m", 6),
         "velocity": _triple(state.velocity, "m/s", 9),
     }
@@ -566,9 +566,9 @@ def _platform(imported: Imported, track: Fitted, error: DeclaredMotionError | No
     return platform
 
 
-def _error(imported: Imported, error: DeclaredMotionError) -> dict[str, Any]:
+def _error(imported: Imported, error: DeclaredMotionError) -> JsonObject:
     units = {"position": "m", "velocity": "m/s"}
-    tree: dict[str, Any] = {"frame": error.frame}
+    tree: JsonObject = {"frame": error.frame}
     sigmas = {
         kind: _triple(value, units[kind]) for kind in _MOTION_KINDS if (value := getattr(error, kind)) is not None
     }
@@ -602,7 +602,7 @@ def _triple(vector: Vector, unit: str, decimals: int | None = None) -> list[str]
     return [f"{'0' if text in ('', '-0') else text} {unit}" for text in trimmed]
 
 
-def _write(lines: list[str], tree: dict[str, Any], path: tuple[str, ...], notes: dict[tuple[str, ...], str]) -> None:
+def _write(lines: list[str], tree: JsonObject, path: tuple[str, ...], notes: dict[tuple[str, ...], str]) -> None:
     indent = "  " * len(path)
     for key, value in tree.items():
         key_path = (*path, key)

@@ -11,15 +11,18 @@ import io
 import math
 import os
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import __version__
 from bisar_budget.analysis.analysis import Analysis, Case
+from bisar_budget.arrays import Records
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
@@ -30,10 +33,14 @@ from bisar_budget.paths.accuracy import block_turned, with_rate
 from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import Instant, parse_instant
 from bisar_budget.simulator.collection import PointCollection
-from bisar_budget.simulator.phase_history import Errors, Flight
+from bisar_budget.simulator.phase_history import Errors, Flight, ReceiverNoise
 from bisar_budget.simulator.point import SimulationError, declared_errors, pulses_for
 from bisar_budget.simulator.realisations import has_unset_clocks
 from bisar_budget.simulator.targets import Targets
+
+if TYPE_CHECKING:
+    from lxml.etree import _Element, _ElementTree
+
 
 NAMESPACE = "http://api.nsgreg.nga.mil/schema/cphd/1.1.0"
 DEFAULT_SCENE = Geodetic(0.0, 0.0, 0.0)  # of a scene without coordinates in its mission
@@ -114,7 +121,10 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     flown = collection.flight(errors, slow_time, np.random.default_rng(settings.seed))
     scatterers, amplitudes = _scene(mission, targets, plan)
     rng = np.random.default_rng(settings.seed)
-    noise = {"noise_power": 10 ** (settings.noise / 10) if settings.noise is not None else 0.0, "rng": rng}
+    noise: ReceiverNoise = {
+        "noise_power": 10 ** (settings.noise / 10) if settings.noise is not None else 0.0,
+        "rng": rng,
+    }
     history = flown.record(scatterers, amplitudes, slow_time, frequency, **noise)
     remarks = []
     axes = mission.scene.axes
@@ -188,7 +198,7 @@ def _scene(mission: Mission, targets: Targets, plan: _Plan) -> tuple[Floats, NDA
 
 def _vectors(
     mission: Mission, slow_time: Floats, flown: Flight, smooth: Flight, axes: SceneAxes, plan: _Plan
-) -> tuple[NDArray[Any], float]:
+) -> tuple[Records, float]:
     """Parameters of each vector, and the time of the file at the middle of the aperture. [s]
 
     A pulse is at the scene centre at its slow time. It left the transmitter R_t/c earlier and is received R_r/c
@@ -198,7 +208,7 @@ def _vectors(
     dtype = np.dtype(
         [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR_WORDS]
     )
-    vectors: NDArray[Any] = np.zeros(slow_time.size, dtype)
+    vectors: Records = np.zeros(slow_time.size, dtype)
     ranges = []
     doppler = np.zeros(slow_time.size)
     sides = (
@@ -234,7 +244,7 @@ def _vectors(
 
 
 # ---------------------------------------------------------------------- XML
-_Leaves = dict[str, Any]  # text or number by the path of its element, in the order of the file
+_Leaves = dict[str, object]  # text or number by the path of its element, in the order of the file
 
 
 def _document(
@@ -242,14 +252,14 @@ def _document(
     targets: Targets,
     plan: _Plan,
     axes: SceneAxes,
-    vectors: NDArray[Any],
+    vectors: Records,
     start: Instant,
     offset: float,
     remarks: list[str],
-) -> Any:
+) -> "_ElementTree":
     """XML of the file as an lxml tree, with the reference geometry that sarkit computes from the vectors."""
-    etree: Any = import_module("lxml.etree")
-    skcphd: Any = import_module("sarkit.cphd")
+    etree = import_module("lxml.etree")
+    skcphd = import_module("sarkit.cphd")
     low, high = float(vectors["FX1"][0]), float(vectors["FX2"][0])
     leaves: _Leaves = {
         "CollectionID/CollectorName": "receiver, simulated",
@@ -314,7 +324,7 @@ def _document(
     return tree
 
 
-def _grow(etree: Any, root: Any, leaves: _Leaves) -> None:
+def _grow(etree: ModuleType, root: "_Element", leaves: _Leaves) -> None:
     """Add elements below the root. A step of a path may have an attribute; a polynomial has only its constant."""
     elements = {"": root}
     for path, value in leaves.items():
@@ -370,8 +380,8 @@ def _scene_coordinates(plan: _Plan, axes: SceneAxes) -> _Leaves:
     return {f"SceneCoordinates/{path}": value for path, value in leaves.items()}
 
 
-def _layout(vectors: NDArray[Any]) -> _Leaves:
-    fields: Any = vectors.dtype.fields
+def _layout(vectors: Records) -> _Leaves:
+    fields: Mapping[str, Any] = vectors.dtype.fields or {}
     leaves: _Leaves = {}
     for name, size in _VECTOR_WORDS:
         form = "X=F8;Y=F8;Z=F8;" if size == 3 else "I8" if name == "SIGNAL" else "F8"
@@ -488,9 +498,9 @@ def _pos_vel_err(path: str, covariance: Floats, frame: str) -> _Leaves:
     return leaves
 
 
-def _file(tree: Any, vectors: NDArray[Any], signal: NDArray[Any]) -> bytes:
+def _file(tree: "_ElementTree", vectors: Records, signal: NDArray[np.generic]) -> bytes:
     """A CPHD file by sarkit's writer."""
-    skcphd: Any = import_module("sarkit.cphd")
+    skcphd = import_module("sarkit.cphd")
     with tempfile.TemporaryFile() as stream:  # the writer needs a real file
         with skcphd.Writer(stream, skcphd.Metadata(xmltree=tree)) as writer:
             writer.write_pvp(_CHANNEL, vectors)

@@ -6,11 +6,11 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bisar_budget.arrays import Records
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable, shown
 from bisar_budget.formats.collected import (
@@ -124,18 +124,18 @@ def _cphd(container: Container, channel: str | None) -> Imported:
     )  # fmt: skip
 
 
-def _dtype(xml: Element, block: str) -> np.dtype[Any]:
+def _dtype(xml: Element, block: str) -> np.dtype[np.void]:
     """NumPy type of the parameters of a vector, or of a transmitted pulse, as the XML describes them."""
-    module: Any = import_module("sarkit.cphd" if xml.tag == "CPHD" else "sarkit.crsd")
+    module = import_module("sarkit.cphd" if xml.tag == "CPHD" else "sarkit.crsd")
     reads = module.get_ppp_dtype if block == "PPP" else module.get_pvp_dtype
     try:
-        dtype: np.dtype[Any] = reads(xml.node.getroottree())
+        dtype: np.dtype[np.void] = reads(xml.node.getroottree())
     except (AttributeError, IndexError, KeyError, SyntaxError, TypeError, ValueError) as error:
         raise xml.fault(f"describes no parameters ({shown(str(error))})", block) from None
     return dtype
 
 
-def _fields(xml: Element, vectors: NDArray[Any], block: str, *names: str) -> list[Floats]:
+def _fields(xml: Element, vectors: Records, block: str, *names: str) -> list[Floats]:
     columns = []
     for name in names:
         if name not in (vectors.dtype.names or ()):
@@ -149,7 +149,7 @@ def _fields(xml: Element, vectors: NDArray[Any], block: str, *names: str) -> lis
     return columns
 
 
-def _pulses_of_cphd(container: Container, vectors: NDArray[Any], parameters: Element) -> tuple[_Pulses, Vector]:
+def _pulses_of_cphd(container: Container, vectors: Records, parameters: Element) -> tuple[_Pulses, Vector]:
     names = ("TxTime", "TxPos", "RcvTime", "RcvPos", "SRPPos")
     sent, transmitter, received, receiver, points = _fields(container.xml, vectors, "PVP", *names)
     reference = parameters.whole("RefVectorIndex")
@@ -279,7 +279,7 @@ def _crsd(container: Container, channel: str | None) -> Imported:
 
 
 def _pulses_of_crsd(
-    container: Container, vectors: NDArray[Any], transmit_vectors: NDArray[Any], point: Vector, parameters: Element
+    container: Container, vectors: Records, transmit_vectors: Records, point: Vector, parameters: Element
 ) -> _Pulses:
     """Pulses with the time at which the echo of the scene point is received.
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, ParamSpec, TypeVar, cast
 
 from bisar_budget import __version__
 from bisar_budget.budget.check import (
@@ -44,6 +44,8 @@ _MANY_DRAWS = 1_000_000  # from which the time is estimated
 _TRIAL_DRAWS = 1 << 12  # of the first trial for this estimate
 DAY_OF_RUN = "the day of the run"
 _CALLER = "the caller"
+Arguments = ParamSpec("Arguments")
+Answer = TypeVar("Answer")
 _OPTION = "--sweep"
 
 
@@ -96,7 +98,7 @@ def check(
     monte_carlo: int | None = None,
     seed: int | None = None,
     verify: bool = False,
-    sweep: Mapping[str, Any] | None = None,
+    sweep: Mapping[str, object] | None = None,
     outside: Outside | None = None,
 ) -> "CheckResult":
     """Check a mission against its requirements.
@@ -274,7 +276,7 @@ def with_images(missions: Sequence[CheckedMission], today: dt.date, *, is_illust
 
 # ---------------------------------------------------------------------- studies
 def with_studies(
-    missions: Sequence[CheckedMission], asked: Sequence[str] | Mapping[str, Any], model: str | None, today: dt.date
+    missions: Sequence[CheckedMission], asked: Sequence[str] | Mapping[str, object], model: str | None, today: dt.date
 ) -> list[CheckedMission]:
     """Missions with a study: the results of a sweep of each usable mission.
 
@@ -324,15 +326,17 @@ def with_studies(
     return [each._replace(study=next(next_study)) if isinstance(each, MissionFindings) else each for each in missions]
 
 
-def _of(mission: Mission, ask: Callable[..., Any], *arguments: Any) -> Any:
+def _of(
+    mission: Mission, ask: Callable[Arguments, Answer], *arguments: Arguments.args, **options: Arguments.kwargs
+) -> Answer:
     """Answer of a function about a mission; the message of a `QuestionError` begins with the mission's file."""
     try:
-        return ask(*arguments)
+        return ask(*arguments, **options)
     except QuestionError as error:
         raise QuestionError(f"{mission.file}: {error}") from None
 
 
-def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, Any]) -> "Cases":
+def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, object]) -> "Cases":
     """Cases of a study: several values of each key, at most `MAX_CASES` cases."""
     from bisar_budget.design.cases import grid
     from bisar_budget.front.missions import grid_of

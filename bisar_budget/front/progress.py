@@ -8,12 +8,16 @@ from importlib import import_module
 from importlib.util import find_spec
 from threading import RLock
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bisar_budget.faults import printable
 from bisar_budget.memory import OF_TABLES
 
 if TYPE_CHECKING:
+    from typing import NoReturn
+
+    from tqdm import tqdm
+
     from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.workers import Progress
 
@@ -30,7 +34,7 @@ SAYING: ContextVar[Callable[[str], None]] = ContextVar("SAYING", default=lambda 
 @contextmanager
 def watched(label: str) -> "Iterator[Progress]":
     """Yield a function that takes the progress of long work, and shows a bar with the remaining time to a watcher."""
-    began, bars = monotonic(), list[Any]()
+    began, bars = monotonic(), list["tqdm[NoReturn]"]()
 
     def progress(done: int, total: int) -> None:
         if not bars:
@@ -55,7 +59,7 @@ def _is_notebook() -> bool:
     return hasattr(shell, "kernel")
 
 
-def _bar(label: str, total: int, is_notebook: bool) -> Any:
+def _bar(label: str, total: int, is_notebook: bool) -> "tqdm[NoReturn]":
     """A bar of tqdm, for a notebook or a terminal."""
     has_widgets = is_notebook and find_spec("ipywidgets") is not None
     kind = import_module("tqdm.notebook").tqdm_notebook if has_widgets else import_module("tqdm").tqdm

@@ -49,7 +49,7 @@ def _judged(
 
 def sweep(
     mission: Mission,
-    values: "Mapping[str, Any] | str | os.PathLike[str] | Cases",
+    values: "Mapping[str, object] | str | os.PathLike[str] | Cases",
     *,
     paired: bool = False,
     columns: str | Sequence[str] = (),
@@ -92,7 +92,7 @@ def solve(
     mission: Mission,
     key: str,
     *,
-    between: tuple[Any, Any] | str | None = None,
+    between: tuple[object, object] | str | None = None,
     scale: bool = False,
     row: str | None = None,
     target: str = "fail",
@@ -253,8 +253,8 @@ def passes(
     start: str | dt.date | None = None,
     *,
     days: float = 3.0,
-    min_elevation: Any = "20 deg",
-    squint: Any = "0 deg",
+    min_elevation: object = "20 deg",
+    squint: object = "0 deg",
     platform: str | None = None,
     model: str | None = None,
     date: str | dt.date | None = None,
@@ -303,7 +303,7 @@ def passes(
     return PassesResult(found_passes._replace(overrides=influences), loaded, model)
 
 
-def angle_of(option: str, value: Any, least: float) -> float:
+def angle_of(option: str, value: object, least: float) -> float:
     """Angle of an option, from `least` [deg] to less than 90 deg. [rad]
 
     Raises

@@ -7,14 +7,13 @@ interpreted, so every check works as for a file. `KEY=null` takes the key out. T
 from collections.abc import Iterator, Sequence
 from difflib import SequenceMatcher, get_close_matches
 from functools import cache
-from typing import Any
 
 import yaml
 
 from bisar_budget.faults import Changed, InvalidValueError, KeyPath, Problem, SetNumber, SetValue, shown
 from bisar_budget.mission.model import MISSION
 from bisar_budget.mission.readers import INVALID, ListOf, OneOf, Reader, Section, did_you_mean, is_place
-from bisar_budget.mission.tree import MAX_BYTES, NULLS, Tree
+from bisar_budget.mission.tree import MAX_BYTES, NULLS, Content, Tree
 
 _ACCEPTED = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
 _MAX_KEY_CHARACTERS = 500  # a path of the schema has a tenth
@@ -77,7 +76,7 @@ def takes_out(change: SetValue) -> bool:
 def _take_out(tree: Tree, change: SetValue) -> None:
     """Take a key out of the tree. A known key that the file does not have is no fault; an unknown key is."""
     parts = parts_of(change.key)
-    container: Any = tree.root
+    container: Content = tree.root
     path: KeyPath = ()
     while True:
         name, remaining = next_name(container, parts, has_dotted_keys=path in _WITH_DOTTED_KEYS)
@@ -108,7 +107,7 @@ def _take_out(tree: Tree, change: SetValue) -> None:
 def _apply(tree: Tree, change: SetValue) -> None:
     """Put a value at its path, and make the sections that are missing on the way."""
     parts = parts_of(change.key)
-    container: Any = tree.root
+    container: Content = tree.root
     path: KeyPath = ()
     first_new: KeyPath | None = None
     while True:
@@ -141,7 +140,7 @@ def _apply(tree: Tree, change: SetValue) -> None:
 
 
 def next_name(
-    container: Any, parts: tuple[str, ...], has_dotted_keys: bool = False
+    container: Content, parts: tuple[str, ...], has_dotted_keys: bool = False
 ) -> tuple[str | int | None, tuple[str, ...]]:
     """The next key or index of a path within a container, and the parts behind it; None if there is none.
 
@@ -160,7 +159,7 @@ def next_name(
     return parts[0], parts[1:]
 
 
-def _put(container: Any, name: str | int, value: Any) -> None:
+def _put(container: Content, name: str | int, value: object) -> None:
     """Set a value in a mapping or a list; the index behind the last entry appends."""
     if isinstance(container, list) and name == len(container):
         container.append(value)
@@ -168,7 +167,7 @@ def _put(container: Any, name: str | int, value: Any) -> None:
         container[name] = value
 
 
-def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
+def _value(tree: Tree, change: SetValue, path: KeyPath) -> Content:
     """The value of an option, read as a value of the file; faults name the option. A number stays as it is."""
     if isinstance(change, SetNumber):
         return change.value
@@ -208,7 +207,7 @@ def all_keys() -> tuple[str, ...]:
     return tuple(dict.fromkeys(_below(MISSION, "")))
 
 
-def _below(reader: Reader, path: str) -> Iterator[str]:
+def _below(reader: Reader[object], path: str) -> Iterator[str]:
     """Paths of all keys below a path."""
     if isinstance(reader, OneOf):
         for form in reader.forms:

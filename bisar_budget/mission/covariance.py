@@ -6,21 +6,24 @@ correlation matrix has no units, so a tolerance means the same for metres and fo
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from bisar_budget import units
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import FRAME_AXES, Vector
+from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.mission.readers import (
     INVALID,
+    Invalid,
     Key,
     Quantity,
     Reader,
     Report,
     Section,
     Triple,
+    are_valid,
     either,
     read_part,
 )
@@ -81,7 +84,9 @@ def _problems(correlation: _Matrix) -> Iterator[Problem]:
         )
 
 
-def _rows(value: Any, readers: Sequence[Sequence[Reader]], path: KeyPath, report: Report, otherwise: str) -> Any:
+def _rows(
+    value: object, readers: Sequence[Sequence[Reader[float]]], path: KeyPath, report: Report, otherwise: str
+) -> list[tuple[float, ...]] | Invalid:
     """Read a 6 x 6 matrix as six lists; `INVALID` after a report."""
     if not isinstance(value, list) or len(value) != SIZE:
         given = f", {len(value)} given" if isinstance(value, list) else ""
@@ -95,13 +100,16 @@ def _rows(value: Any, readers: Sequence[Sequence[Reader]], path: KeyPath, report
     if broken:
         return INVALID
     rows = [
-        [
-            read_part(reader, item, (*path, i, j), report)
-            for j, (item, reader) in enumerate(zip(row, of_row, strict=True))
-        ]
+        tuple(
+            [
+                read_part(reader, item, (*path, i, j), report)
+                for j, (item, reader) in enumerate(zip(row, of_row, strict=True))
+            ]
+        )
         for i, (row, of_row) in enumerate(zip(value, readers, strict=True))
     ]
-    return INVALID if any(item is INVALID for row in rows for item in row) else rows
+    valid_rows = [row for row in rows if are_valid(row)]
+    return valid_rows if len(valid_rows) == SIZE else INVALID
 
 
 def _report_all(faults: Sequence[Problem], path: KeyPath, report: Report) -> bool:
@@ -134,10 +142,10 @@ _BLOCKS = [
 _ELEMENTS = [[_BLOCKS[(i > 2) + (j > 2)] for j in range(SIZE)] for i in range(SIZE)]
 
 
-class _MatrixReader(Reader):
+class _MatrixReader(Reader[Covariance]):
     """The 6 x 6 matrix: m², m²/s and m²/s², position before velocity, each in the order of the frame's axes."""
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> Covariance | Invalid:
         """Read the elements, and check that they are a covariance."""
         rows = _rows(value, _ELEMENTS, path, report, "a mapping with position, velocity and correlation")
         if rows is INVALID:
@@ -157,7 +165,7 @@ class _MatrixReader(Reader):
             INVALID if _report_all(faults, path, report) else Covariance(tuple(sigmas), correlation, is_matrix=True)
         )
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: array of six arrays of six."""
         return _matrix_schema([[element.schema(definitions) for element in row] for row in _ELEMENTS])
 
@@ -177,8 +185,8 @@ def _excesses(rows: Sequence[Sequence[float]], sigmas: Sequence[float]) -> Itera
                 yield Problem(problem, accepted, at=(i, j))
 
 
-def _matrix_schema(elements: Sequence[Sequence[dict[str, Any]]]) -> dict[str, Any]:
-    def six(items: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _matrix_schema(elements: Sequence[Sequence[JsonObject]]) -> JsonObject:
+    def six(items: Sequence[JsonObject]) -> JsonObject:
         return {"type": "array", "items": items, "minItems": SIZE, "maxItems": SIZE}
 
     return six([six(row) for row in elements])
@@ -189,12 +197,12 @@ class _Correlations(NamedTuple):
     pairs: tuple[str, ...] = ()
 
 
-class _CorrelationReader(Reader):
+class _CorrelationReader(Reader[_Correlations]):
     """Correlations of named pairs of errors, zero for other pairs; or the 6 x 6 matrix with a diagonal of 1."""
 
     _NUMBER = Quantity(units.RATIO, ge=-1, le=1)
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> _Correlations | Invalid:
         """Read pairs or a matrix."""
         read = self._pairs(value, path, report) if isinstance(value, dict) else self._matrix(value, path, report)
         if read is INVALID:
@@ -202,7 +210,7 @@ class _CorrelationReader(Reader):
         faults = list(_problems(read.matrix))
         return INVALID if _report_all(faults, path, report) else read
 
-    def _matrix(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def _matrix(self, value: object, path: KeyPath, report: Report) -> _Correlations | Invalid:
         readers = [[self._NUMBER] * SIZE] * SIZE
         rows = _rows(value, readers, path, report, "pairs such as position.x-velocity.x: 0.3")
         if rows is INVALID:
@@ -213,7 +221,7 @@ class _CorrelationReader(Reader):
         faults += _asymmetries(rows, [1.0] * SIZE)
         return INVALID if _report_all(faults, path, report) else _Correlations(_symmetric(rows))
 
-    def _pairs(self, value: dict[str, Any], path: KeyPath, report: Report) -> Any:
+    def _pairs(self, value: dict[str, object], path: KeyPath, report: Report) -> _Correlations | Invalid:
         rows = [[float(i == j) for j in range(SIZE)] for i in range(SIZE)]
         named: dict[frozenset[int | None], str] = {}
         is_valid = True
@@ -236,11 +244,11 @@ class _CorrelationReader(Reader):
             is_valid = False
         return _Correlations(tuple(map(tuple, rows)), tuple(named.values())) if is_valid else INVALID
 
-    def below(self, part: str) -> Reader | None:
+    def below(self, part: str) -> Reader[object] | None:
         """Reader of the correlation of a pair."""
         return self._NUMBER if "-" in part else None
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: object of pairs, or array of six arrays of six."""
         number = self._NUMBER.schema(definitions)
         name = rf"(?:{'|'.join(KINDS)})\.(?:{'|'.join(_AXIS)})"
@@ -276,11 +284,11 @@ class Sigmas(NamedTuple):
     ] = _Correlations(_symmetric([[0.0] * SIZE] * SIZE))
 
 
-class _SigmasReader(Section):
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+class _SigmasReader(Section[Sigmas | Covariance]):
+    def read(self, value: object, path: KeyPath, report: Report) -> Covariance | Invalid:
         """Read the section as a covariance."""
         sigmas_section = super().read(value, path, report)
-        if sigmas_section is INVALID:
+        if not isinstance(sigmas_section, Sigmas):
             return INVALID
         sigmas = (*sigmas_section.position, *sigmas_section.velocity)
         return Covariance(

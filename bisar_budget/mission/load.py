@@ -7,11 +7,11 @@ import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import BinaryIO, cast
+from typing import BinaryIO
 
 from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, file_fault, sentences
 from bisar_budget.mission.model import MISSION, Mission, PartFile, flies_on_earth, names_files, names_parts
-from bisar_budget.mission.readers import INVALID
+from bisar_budget.mission.readers import INVALID, Invalid
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
 from bisar_budget.resources import UnreadableError, held, special_file, standard_input
 
@@ -121,7 +121,7 @@ def mission_of(
             apply_changes(tree, changes)
     if model is not None and isinstance(tree.root.get("allocation"), dict):
         tree.root["allocation"]["model"] = model
-    mission = INVALID
+    mission: Mission | Invalid = INVALID
     parts: dict[str, PartFile] = {}
     with suppress(UnusableError):
         mission = MISSION.read(tree.root, (), tree.report)
@@ -150,13 +150,13 @@ def mission_of(
             from bisar_budget.mission.parts import finder_of, with_parts
 
             mission = with_parts(mission, _recording(find or finder_of(folder), parts), tree.report)
-    if tree.faults:
+    if tree.faults or mission is INVALID:
         ordered = tuple([_with_hint(fault) for fault in tree.in_order()])
         if changes:
             ordered = tuple([_with_changes(fault, changes) for fault in ordered])
         raise MissionError(file, ordered)
     as_bytes = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
-    finished = cast(Mission, mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes)))
+    finished = mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes))
     finished = finished._replace(parts=tuple(parts.values()))
     return finished if model is None else finished._replace(allocation=finished.allocation._replace(model=model))
 

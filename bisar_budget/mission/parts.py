@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from bisar_budget.faults import (
     Fault,
@@ -22,6 +22,7 @@ from bisar_budget.faults import (
     shown,
 )
 from bisar_budget.geometry import Vector
+from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.mission.instruments import (
     FORMS,
     IMU_KINDS,
@@ -52,11 +53,14 @@ from bisar_budget.mission.readers import (
     INVALID,
     VELOCITY,
     Choice,
+    Invalid,
     Key,
     ListOf,
     Reference,
     Report,
     Section,
+    SectionValue,
+    SectionValues,
     Text,
     TextMap,
     Triple,
@@ -103,7 +107,7 @@ class ImuPart(NamedTuple):
     says: Annotated[str | None, _SAYS] = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require a figure that is not zero."""
         yield from _without_figure(values, IMU_KINDS)
 
@@ -121,7 +125,7 @@ class GnssPart(NamedTuple):
     says: Annotated[str | None, _SAYS] = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require a figure that is not zero, and check the noise as in a mission."""
         yield from MotionError.problems({"random": values.get("random", ())})
         yield from _without_figure(values, _GNSS_KINDS)
@@ -142,7 +146,7 @@ class OscillatorPart(NamedTuple):
     says: Annotated[str | None, _SAYS] = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Check the part as an oscillator of a mission, and require noise that is not zero."""
         yield from Oscillator.problems({**values, "sensor": None}, or_else="")
         if any(values.get(form) is not None for form in FORMS):
@@ -150,7 +154,7 @@ class OscillatorPart(NamedTuple):
 
 
 Part = ImuPart | GnssPart | OscillatorPart
-SECTIONS: dict[str, Section] = {
+SECTIONS: dict[str, Section[Part]] = {
     "imu": Section(ImuPart),
     "gnss": Section(GnssPart),
     "oscillator": Section(OscillatorPart),
@@ -196,7 +200,7 @@ class Entry:
 
     file: str
     part: Part
-    written: Mapping[str, Any]
+    written: Mapping[str, object]
 
     @property
     def id(self) -> str:
@@ -221,7 +225,7 @@ def entries(places: Sequence[str]) -> Iterator[Entry]:
     yield from sorted(read, key=lambda entry: (list(SECTIONS).index(entry.part.kind), entry.id))
 
 
-def figure_text(value: Any) -> str:
+def figure_text(value: object) -> str:
     """A figure as the file of its part writes it, in one line."""
     if isinstance(value, dict):
         return ", ".join(f"{key}: {figure_text(item)}" for key, item in value.items())
@@ -282,19 +286,19 @@ def _standard_input() -> bytes:
 @lru_cache(maxsize=64)  # a thousand missions name the same parts
 def _entry(file: str, data: bytes) -> Entry:
     """Read a part; parts that were read before come from the cache."""
-    part: Any = INVALID
+    part: Part | Invalid = INVALID
     try:
         tree = read_tree(data, file, "part")
     except MissionError as error:
         raise PartError.of(file, error.faults) from None
     with suppress(UnusableError):
         part = _part_of(tree)
-    if tree.faults:
+    if tree.faults or part is INVALID:
         raise PartError.of(file, tree.in_order())
     return Entry(file, part, tree.root)
 
 
-def _part_of(tree: Tree) -> Any:
+def _part_of(tree: Tree) -> Part | Invalid:
     """The part of a file; `INVALID` after a report.
 
     A file without a valid kind is read as the kind with most of its figures, so that all faults are reported at once.
@@ -314,7 +318,7 @@ def _part_of(tree: Tree) -> Any:
     return part
 
 
-def _no_kind(root: Mapping[str, Any], likely: str) -> Problem:
+def _no_kind(root: Mapping[str, object], likely: str) -> Problem:
     """The problem with a missing or unknown kind; `likely` is the kind that the figures belong to, or empty."""
     hint = did_you_mean(root.get("kind", ""), tuple(SECTIONS))
     if likely:
@@ -325,13 +329,13 @@ def _no_kind(root: Mapping[str, Any], likely: str) -> Problem:
     return Problem(f"must be one of {', '.join(SECTIONS)}{missing}", hint=hint)
 
 
-def _without_figure(values: Mapping[str, Any], figures: Sequence[str]) -> Iterator[Problem]:
+def _without_figure(values: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
     """A problem if all figures are missing or zero; none if `values` lacks a figure because it was reported."""
     if values.keys() >= set(figures) and not any(_is_not_zero(values[figure]) for figure in figures):
         yield Problem("states no figure", f"accepted: one of {', '.join(figures)} that is not zero")
 
 
-def _without_source(root: Mapping[str, Any], figures: Sequence[str]) -> Iterator[Problem]:
+def _without_source(root: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
     """A problem if sources are given by figure and a figure of the file, valid or not, has none."""
     source = root.get("source")
     if not isinstance(source, dict):
@@ -345,7 +349,7 @@ def _without_source(root: Mapping[str, Any], figures: Sequence[str]) -> Iterator
         )
 
 
-def _is_not_zero(figure: Any) -> bool:
+def _is_not_zero(figure: object) -> bool:
     """Whether a figure is stated and not zero: no sensor is without error."""
     if isinstance(figure, GaussMarkov):
         return _is_not_zero(figure.sigma)
@@ -435,7 +439,7 @@ def _file_of(name: str, beside: str, files: Files) -> str:
     raise PartError("is no part of the catalogue", hint=sentences("`bisar-budget sensors` lists them", near))
 
 
-def with_parts(mission: Mission, find: Find, report: Report) -> Any:
+def with_parts(mission: Mission, find: Find, report: Report) -> Mission | Invalid:
     """The mission with the figures of its parts; `INVALID` after a report. `find` raises `PartError`."""
     is_valid, taken = True, list[TakenFigure]()
     platforms = mission.platforms
@@ -452,7 +456,7 @@ def with_parts(mission: Mission, find: Find, report: Report) -> Any:
     return mission._replace(platforms=platforms, taken=tuple(taken)) if is_valid else INVALID
 
 
-def report_parts(root: Any, find: Find, report: Report) -> None:
+def report_parts(root: Mapping[str, object], find: Find, report: Report) -> None:
     """Report problems with the parts of a file that is no mission for other reasons.
 
     A valid section is checked together with its parts as in a mission. For an invalid section only the names of its
@@ -470,7 +474,7 @@ def report_parts(root: Any, find: Find, report: Report) -> None:
             _with_sensor(Oscillator(**oscillator), (*path, "oscillator"), find, report, [])
 
 
-def _stand_in(section: Section, value: Any) -> dict[str, Any]:
+def _stand_in(section: Section[object], value: object) -> SectionValues:
     """Values of a section if all of them are valid, else only the names of its parts."""
     values = section.each(value)
     if INVALID not in values.values():
@@ -480,7 +484,7 @@ def _stand_in(section: Section, value: Any) -> dict[str, Any]:
 
 def _parts_of(
     names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequence[str], find: Find, report: Report
-) -> Any:
+) -> dict[str, Entry] | Invalid:
     """Entries of parts by their names; `INVALID` after a report."""
     is_list = isinstance(names, tuple)
     entry_by_name: dict[str, Entry] = {}
@@ -506,7 +510,9 @@ def _parts_of(
     return entry_by_name if is_valid else INVALID
 
 
-def _with_sensors(error: MotionError, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]) -> Any:
+def _with_sensors(
+    error: MotionError, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]
+) -> MotionError | Invalid:
     """A motion error with figures of parts in place of missing figures; `INVALID` after a report.
 
     Figures taken from parts are appended to `taken`. A figure of the file overrides the same figure of a part, and
@@ -564,7 +570,9 @@ def _own_key(error: MotionError, stating: MotionError | Imu, figure: str) -> str
     return f"motion_error.imu.{figure}" if isinstance(stating, Imu) else f"motion_error.{figure}"
 
 
-def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]) -> Any:
+def _with_sensor(
+    oscillator: Oscillator, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]
+) -> Oscillator | Invalid:
     """An oscillator with the figures of its part; `INVALID` after a report.
 
     Figures taken from the part are appended to `taken`. A figure of the file overrides the same figure of the part,
@@ -578,10 +586,11 @@ def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Repo
     if entries is INVALID:
         return INVALID
     entry = entries[oscillator.sensor]
-    part, written, overridden, of_parts = entry.part, entry.figures, [], []
+    part: SectionValue = entry.part
+    written, overridden, of_parts = entry.figures, [], []
     own_form = next((form for form in FORMS if getattr(oscillator, form) is not None), None)
     (form,) = [form for form in FORMS if getattr(part, form) is not None]
-    figures: dict[str, Any] = {}
+    figures: dict[str, SectionValue] = {}
     if own_form is None:
         figures = {form: getattr(part, form), "source": evidence(part, form)}
     else:
@@ -620,12 +629,12 @@ def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Repo
 
 
 # ---------------------------------------------------------------------- JSON Schema of a part
-_NOT_EMPTY: dict[str, Any] = {"not": {"const": []}}  # an empty list states no figure
+_NOT_EMPTY: JsonObject = {"not": {"const": []}}  # an empty list states no figure
 
 
-def part_schema() -> dict[str, Any]:
+def part_schema() -> JsonObject:
     """JSON Schema of the file of a part, with one alternative for each kind; quantities as in `mission_schema`."""
-    definitions: dict[str, Any] = {}
+    definitions: Definitions = {}
     kinds = []
     for kind, section in SECTIONS.items():
         kinds.append(section.schema(definitions))
@@ -642,7 +651,7 @@ def part_schema() -> dict[str, Any]:
     }
 
 
-def _rules(figures: Sequence[str]) -> dict[str, Any]:
+def _rules(figures: Sequence[str]) -> JsonObject:
     """Schema rules between the figures of a part: at least one is stated, and each has a source.
 
     An oscillator has exactly one form of noise, and a mask has its frequency. The rules do not see figures that are

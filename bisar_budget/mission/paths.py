@@ -3,13 +3,14 @@
 import hashlib
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from bisar_budget.arrays import Booleans
 from bisar_budget.faults import KeyPath, Problem, printable
 from bisar_budget.geometry import STRAIGHT, PlatformState, UndefinedFrameError
 from bisar_budget.mission.covariance import KINDS, Covariance
@@ -30,7 +31,7 @@ from bisar_budget.mission.platforms import (
     without_image,
 )
 from bisar_budget.mission.propagation import too_low
-from bisar_budget.mission.readers import INVALID, Report
+from bisar_budget.mission.readers import INVALID, Invalid, Report, SectionValues
 from bisar_budget.paths import earth
 from bisar_budget.paths.accuracy import (
     StatedAccuracy,
@@ -121,14 +122,14 @@ def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
         yield "earth_orientation.file", mission.earth_orientation.file
 
 
-def report_files(root: Any, read: Beside, report: Report) -> None:
+def report_files(root: Mapping[str, object], read: Beside, report: Report) -> None:
     """Report orbits and logs that cannot be read, for a file that is no mission for other reasons.
 
     Their content is not checked here, because a path depends on the scene, time and aperture of a valid mission.
     `root` is the content of the mission file.
     """
     platforms, orientation = root.get("platforms"), root.get("earth_orientation")
-    files: dict[KeyPath, Any] = {}
+    files: dict[KeyPath, object] = {}
     for name in Platforms._fields:
         platform = platforms.get(name) if isinstance(platforms, dict) else None
         for key, section in (("orbit", ORBIT), ("trajectory", TRAJECTORY)):
@@ -143,7 +144,7 @@ def report_files(root: Any, read: Beside, report: Report) -> None:
                 report(path, _file_problem(file, error))
 
 
-def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
+def with_paths(mission: Mission, read: Beside, report: Report) -> Mission | Invalid:
     """The mission with the paths of its platforms; `INVALID` after a report. `read` may raise `PathFileError`."""
     axes, platforms, is_valid = mission.scene.axes, mission.platforms, True
     if (orientation_problem := _unusable_orientation(mission, read)) is not None:
@@ -498,7 +499,7 @@ def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]
     Along an axis of which the log states none, the largest of the others counts. The usual one counts for fixes of
     which the log does not state all sigmas.
     """
-    unstated: Any = np.ones(log.times[near].shape, dtype=bool)
+    unstated: Booleans = np.ones(log.times[near].shape, dtype=bool)
     if log.sigmas is not None:
         sigmas = np.nan_to_num(log.sigmas[near])
         largest = filled_sigmas(sigmas.max(axis=0))
@@ -549,7 +550,7 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
                 replaced = Overridden(kind, key, stated.words, f"[{', '.join(figure)}]")
                 error = error._replace(overridden=(*error.overridden, replaced))
         elif error.distribution == "normal":
-            figures: Any = {kind: covering_sigmas(block)}
+            figures: SectionValues = {kind: covering_sigmas(block)}
             error = error._replace(**figures, of_parts=(*error.of_parts, (kind, stated.words)))
     return error
 

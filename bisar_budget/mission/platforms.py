@@ -3,11 +3,12 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
 from bisar_budget import units
+from bisar_budget.arrays import Booleans, Floats, PerCase
 from bisar_budget.constants import LEAST_FALLING_HEIGHT
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.geometry import (
@@ -21,6 +22,7 @@ from bisar_budget.geometry import (
     state_from_angles,
 )
 from bisar_budget.image_plane import degeneracy
+from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.mission.covariance import COVARIANCE, Covariance, misplaced_axes
 from bisar_budget.mission.instruments import (
     IMU,
@@ -49,12 +51,14 @@ from bisar_budget.mission.readers import (
     SPEED,
     VELOCITY,
     Choice,
+    Invalid,
     Key,
     Quantity,
     Reader,
     Reference,
     Report,
     Section,
+    SectionValues,
     Source,
     Text,
     TextList,
@@ -66,7 +70,7 @@ from bisar_budget.mission.readers import (
 )
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.paths.accuracy import Matrix, PathNoise, StatedAccuracy
-from bisar_budget.paths.instant import SCALES, parse_instant
+from bisar_budget.paths.instant import SCALES, Instant, parse_instant
 
 if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
@@ -136,7 +140,7 @@ class MotionError(NamedTuple):
     overridden: tuple[Overridden, ...] = ()
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Check that a covariance is alone, fits its frame and is normal, and that names of errors are distinct."""
         yield from _names_twice(values.get("random", ()))
         covariance: Covariance | None = values.get("covariance")
@@ -213,7 +217,7 @@ class CommonMotionError(NamedTuple):
         return bool(self.random) or any(figure is not None for figure in figures)
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Check that names of errors are distinct."""
         yield from _names_twice(values.get("random", ()))
 
@@ -223,20 +227,20 @@ _FILE = Reference()
 _TALKER = "[A-Z]{2}"
 
 
-class _Lines(Reader):
+class _Lines(Reader[tuple[str, ...]]):
     """The two lines of an element set."""
 
     is_word = True
     accepted = "[line 1, line 2]"
 
-    def read(self, value: Any, path: tuple[Any, ...], report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> tuple[str, ...] | Invalid:
         """Read both lines."""
         if not isinstance(value, list) or len(value) != 2 or not all(isinstance(line, str) for line in value):
             report(path, Problem("must be the name of a file, or the two lines of an element set"))
             return INVALID
         return tuple(value)
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: array of two lines."""
         return {"type": "array", "items": Reference().schema(definitions), "minItems": 2, "maxItems": 2}
 
@@ -269,7 +273,7 @@ class OrbitSource(NamedTuple):
         return tuple(key for key in OrbitSource._fields if key not in ("object", "planned"))
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require exactly one format."""
         formats = OrbitSource.any_of()
         stated = [key for key in formats if values.get(key) is not None]
@@ -278,13 +282,13 @@ class OrbitSource(NamedTuple):
             yield Problem(problem, f"accepted: one of {', '.join(formats)}")
 
 
-class _Instant(Reader):
+class _Instant(Reader[Instant]):
     """An instant of UTC."""
 
     is_word = True
     accepted = "2026-06-01T05:20:31.250Z and the like"
 
-    def leaf(self, value: Any) -> Any:
+    def leaf(self, value: object) -> Instant:
         """Read 2026-06-01T05:20:31.250Z, or with an offset from UTC."""
         instant = parse_instant(value) if isinstance(value, str) else None
         if instant is None:
@@ -294,7 +298,7 @@ class _Instant(Reader):
             raise InvalidValueError(problem, f"accepted: {self.accepted}", hint)
         return instant
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: date and time."""
         return date_schema(r"^\s*\d{4}-\d\d-\d\d[T ]")
 
@@ -304,13 +308,13 @@ class _Talker(Text):
 
     is_word = True
 
-    def leaf(self, value: Any) -> str:
+    def leaf(self, value: object) -> str:
         """Refuse a text that is no talker."""
         if not isinstance(value, str) or not re.fullmatch(_TALKER, value, re.ASCII):
             raise InvalidValueError("must be two capital letters", "accepted: GN, GP and the like")
         return value
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: two capital letters."""
         return {"type": "string", "pattern": f"^{_TALKER}$"}
 
@@ -538,7 +542,7 @@ class Platform(NamedTuple):
     path: FlownPath | None = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require one complete geometry, above the ground and away from the scene centre."""
         wrong = [key for key in _PATH_KEYS if key not in values]  # stated with an invalid value
         given = [key for key in _PATH_KEYS if key in wrong or values[key] is not None]
@@ -688,7 +692,7 @@ def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
             yield Problem(f"of the {name}: {undefined}", "accepted: scene", at=("common_motion_error", "frame"))
 
 
-def has_body_axes(state: PlatformState, half: Any, margin: float = 1.0) -> Any:
+def has_body_axes(state: PlatformState, half: PerCase, margin: float = 1.0) -> Booleans:
     """Whether a velocity keeps a direction on the ground within apertures of half-length `half` (cases,) [s].
 
     True for a platform that does not move, whose direction does not matter.
@@ -732,9 +736,10 @@ def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: floa
             )
 
 
-def least_baseline(apart: PlatformState, half: Any) -> Any:
+def least_baseline(apart: PlatformState, half: PerCase) -> Floats:
     """Least distance of the platforms over an aperture of half-length `half` [s]. [m]"""
-    return norm(apart.place(half * _APERTURE_TIMES)).min(axis=0)
+    least: Floats = np.asarray(norm(apart.place(half * _APERTURE_TIMES))).min(axis=0)
+    return least
 
 
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:

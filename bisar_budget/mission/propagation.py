@@ -1,16 +1,17 @@
 """Delays in the air that remain after correction, on the leg of each platform. Values are SI, 1 sigma."""
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from bisar_budget import units
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.constants import EARTH_RADIUS
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import PlatformState, Vectors
 from bisar_budget.mission.platforms import Platforms
-from bisar_budget.mission.readers import Key, Quantity, Section, Source
+from bisar_budget.mission.readers import Key, Quantity, Section, SectionValues, Source
 
 DELAYS = ("zenith_delay", "zenith_electron_content")
 _TIME = "correlation_time"
@@ -37,7 +38,7 @@ class LegDelay(NamedTuple):
     source: Source = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Reject a leg without a delay."""
         if not values.keys() >= {*DELAYS, _TIME} or any(values[delay] is not None for delay in DELAYS):
             return
@@ -77,7 +78,7 @@ class Propagation(NamedTuple):
     source: Source = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Reject delays of both legs together with delays of one leg, no delay, and a time without a delay."""
         if not values.keys() >= {*DELAYS, _TIME, *Platforms._fields}:
             return
@@ -108,7 +109,7 @@ class Propagation(NamedTuple):
         """Whether the delays are stated once, for the same air over both legs."""
         return self.transmitter is None and self.receiver is None
 
-    def content(self, platform: str) -> Any:
+    def content(self, platform: str) -> float | None:
         """Electron content at the zenith for the leg of a platform; None if the file states none. [1/m²]"""
         leg = self.leg(platform)
         return None if leg is None else leg.zenith_electron_content
@@ -136,27 +137,30 @@ class Propagation(NamedTuple):
 PROPAGATION = Section(Propagation)
 
 
-def height_of(position: Vectors) -> Any:
+def height_of(position: Vectors) -> PerCase:
     """Height of positions (…) above the sphere of the Earth's mean radius that touches the scene. [m]"""
     x, y, z = position
-    return np.sqrt(x * x + y * y + (z + EARTH_RADIUS) ** 2) - EARTH_RADIUS
+    distance: PerCase = np.sqrt(x * x + y * y + (z + EARTH_RADIUS) ** 2)
+    return distance - EARTH_RADIUS
 
 
-def elevation_deg(position: Vectors) -> Any:
+def elevation_deg(position: Vectors) -> Floats:
     """Elevation of positions (…) seen from the scene centre. [deg]"""
     x, y, z = position
-    return np.degrees(np.arctan2(z, np.hypot(x, y)))
+    elevation: Floats = np.degrees(np.arctan2(z, np.hypot(x, y)))
+    return elevation
 
 
-def least_elevation_deg(path: PlatformState, aperture_time_s: Any) -> Any:
+def least_elevation_deg(path: PlatformState, aperture_time_s: PerCase) -> Floats:
     """Least elevation of a platform over the aperture, seen from the scene centre. [deg]"""
     half = np.asarray(aperture_time_s, dtype=float) / 2
-    return elevation_deg(path.place(_APERTURE_TIMES * half)).min(axis=0)
+    least: Floats = elevation_deg(path.place(_APERTURE_TIMES * half)).min(axis=0)
+    return least
 
 
 def least_elevations(
-    propagation: Propagation, paths: Mapping[str, PlatformState], aperture_time_s: Any
-) -> Iterator[tuple[str, str, Any]]:
+    propagation: Propagation, paths: Mapping[str, PlatformState], aperture_time_s: PerCase
+) -> Iterator[tuple[str, str, Floats]]:
     """Platform, figure and least elevation over the aperture [deg], for each stated delay of a leg."""
     for name, path in paths.items():
         leg = propagation.leg(name)

@@ -8,12 +8,15 @@ import math
 import numbers
 from collections.abc import Callable, Mapping, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 
 from bisar_budget import units
+from bisar_budget.arrays import PerCase
 from bisar_budget.faults import Fault, InvalidValueError, Problem, SetValue, fault_words, printable, shown
+from bisar_budget.geometry import Vector
+from bisar_budget.json_types import JsonObject
 from bisar_budget.mission.changes import (
     ACCEPTED_ERRORS,
     apply_changes,
@@ -37,15 +40,18 @@ from bisar_budget.mission.readers import (
     Quantity,
     Reader,
     Section,
+    SectionValue,
     TextList,
     Triple,
 )
-from bisar_budget.mission.tree import Tree, read_tree
+from bisar_budget.mission.tree import Content, Tree, read_tree
 from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.units import Dimension, parse_quantity
 
 DIGITS = 8  # of values in answers: both sides of a crossing stay within 1e-6
 _DECADE_RATIO = 10.0
+Measured = Any
+"""A quantity of astropy or pint, which need not be installed, or its magnitude: a number or an array."""
 FACTOR = Quantity(units.RATIO, gt=0, ge=1e-12, le=1e12)
 
 
@@ -121,7 +127,7 @@ class Choices(NamedTuple):
     """
 
     key: str
-    reader: Reader
+    reader: Reader[object]
     value: str | None
     unit: str = ""
     scale: tuple[float, float] = (1.0, 1.0)
@@ -130,15 +136,15 @@ class Choices(NamedTuple):
 Varied = Number | Choices
 
 
-def tree_of(mission: Mission) -> dict[str, Any]:
+def tree_of(mission: Mission) -> JsonObject:
     """Content of a mission's file, changed by the mission's options: texts, lists and mappings."""
     tree = read_tree(mission.data or b"", mission.file)
     apply_changes(tree, mission.changes)
-    root: dict[str, Any] = tree.root
+    root: JsonObject = tree.root
     return root
 
 
-def number_of(tree: dict[str, Any], key: str, of_all: str = "", *, is_for_each: bool = False) -> Number:
+def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool = False) -> Number:
     """The number that a key names; a scalar that holds for each of three axes counts as a number.
 
     Parameters
@@ -176,7 +182,7 @@ def number_of(tree: dict[str, Any], key: str, of_all: str = "", *, is_for_each: 
     return as_number(key, reader, value)
 
 
-def choices_of(tree: dict[str, Any], key: str, text: str) -> Choices | None:
+def choices_of(tree: JsonObject, key: str, text: str) -> Choices | None:
     """The key if a word can be its value; None for a key with a number, or with anything else.
 
     `text` is the new value: for shares of a budget the rule, for parts a list. Raises `QuestionError` if the key does
@@ -195,7 +201,7 @@ def choices_of(tree: dict[str, Any], key: str, text: str) -> Choices | None:
     return Choices(key, reader, value if isinstance(value, str) else None)
 
 
-def as_number(key: str, reader: Quantity, value: Any) -> Number:
+def as_number(key: str, reader: Quantity, value: object) -> Number:
     """A number with the unit of its texts; `value` is the file's value, None if it has none."""
     dimension = reader.dimension
     number = parse_quantity(value, dimension) if isinstance(value, str) else value if type(value) is float else None
@@ -206,10 +212,10 @@ def as_number(key: str, reader: Quantity, value: Any) -> Number:
     return Number(key, reader, number, unit if unit in dimension.scales else "")
 
 
-def _reader_and_value(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
+def _reader_and_value(tree: JsonObject, key: str) -> tuple[Reader[object], Content]:
     """Reader of a key, which may be one of several forms, and the file's value, None if it has none."""
-    reader: Reader = MISSION
-    value: Any = tree
+    reader: Reader[object] = MISSION
+    value: Content = tree
     parts = parts_of(key)
     while parts:
         reader = form_of(reader, value)
@@ -234,7 +240,7 @@ def _reader_and_value(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
     return reader, value
 
 
-def form_of(reader: Reader, value: Any) -> Reader:
+def form_of(reader: Reader[object], value: object) -> Reader[object]:
     """The form of a reader that reads a value."""
     while isinstance(reader, OneOf):
         reader = reader.pick(value)
@@ -308,7 +314,7 @@ def range_of(number: Number, between: str | None) -> Range:
 
 # ---------------------------------------------------------------- numbers of a mission
 # Sections that a file may omit, and keys whose scalar holds for each of three axes.
-_SECTIONS: Mapping[str, Callable[[], Any]] = {
+_SECTIONS: Mapping[str, Callable[[], object]] = {
     "imu": Imu,
     "lever_arm": LeverArm,
     "common_motion_error": CommonMotionError,
@@ -324,13 +330,13 @@ _CURVES: Mapping[str, Dimension] = {
 }
 
 
-def with_number(mission: Mission, key: str, number: Any) -> Mission:
+def with_number(mission: Mission, key: str, number: SectionValue) -> Mission:
     """The mission with a number, or an array over cases, as the value of a key."""
     changed_mission: Mission = _with_value(mission, parts_of(key), number)
     return changed_mission
 
 
-def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
+def _with_value(value: SectionValue, parts: Sequence[str], number: SectionValue) -> SectionValue:
     """A value with a number at a path below it; at a triple the number goes into all three axes."""
     if not parts:
         return (number, number, number) if isinstance(value, tuple) else number
@@ -351,7 +357,7 @@ def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
     return value._replace(**{name: _with_value(below, remaining, number)})
 
 
-def _with_point(curve: Any, name: str, point: str, number: Any) -> Any:
+def _with_point(curve: SectionValue, name: str, point: str, number: SectionValue) -> SectionValue:
     """A curve with another ordinate at the point that a text names."""
     if isinstance(curve, Spectrum):
         return curve._replace(points=_with_point(curve.points, name, point, number))
@@ -359,7 +365,7 @@ def _with_point(curve: Any, name: str, point: str, number: Any) -> Any:
     return tuple((at, number if at == here else ordinate) for at, ordinate in curve)
 
 
-def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> Covariance:
+def _with_element(covariance: Covariance, parts: Sequence[str], number: SectionValue) -> Covariance:
     """A covariance with another sigma of one axis or of all axes, or with another correlation of a pair."""
     kind, *remaining = parts
     if kind in KINDS:
@@ -375,7 +381,7 @@ def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> 
     return covariance._replace(correlation=tuple(rows))
 
 
-def value_at(mission: Mission, key: str) -> Any:
+def value_at(mission: Mission, key: str) -> SectionValue:
     """The value of a key in a mission, in SI: a number, a tuple of three numbers, or None.
 
     The value of a covariance is the sigma. A figure that comes from a part is the part's figure.
@@ -383,7 +389,7 @@ def value_at(mission: Mission, key: str) -> Any:
     return _value_below(mission, parts_of(key))
 
 
-def _value_below(value: Any, parts: Sequence[str]) -> Any:
+def _value_below(value: SectionValue, parts: Sequence[str]) -> SectionValue:
     """The value at a path below a value; None if there is none."""
     if not parts or value is None:
         return value
@@ -399,14 +405,14 @@ def _value_below(value: Any, parts: Sequence[str]) -> Any:
     return _value_below(getattr(value, POWERS.get(name, name)), remaining)
 
 
-def _point(curve: Any, name: str, point: str) -> Any:
+def _point(curve: SectionValue, name: str, point: str) -> PerCase | None:
     """Ordinate of a curve at the point that a text names; None if the curve has no such point."""
     points = curve.points if isinstance(curve, Spectrum) else curve or ()
     here = parse_quantity(point, _CURVES[name])
     return next((ordinate for at, ordinate in points if at == here), None)
 
 
-def _element(covariance: Covariance, parts: Sequence[str]) -> Any:
+def _element(covariance: Covariance, parts: Sequence[str]) -> float | Vector | None:
     """Sigma of an axis, or the three sigmas, of a covariance; None for a correlation."""
     kind, *axis = parts
     if kind not in KINDS:
@@ -438,25 +444,28 @@ def with_specifications(mission: Mission, tree: Tree) -> Mission:
     return mission._replace(specifications=read)
 
 
-def largest_at(mission: Mission, number: Number) -> Any:
+def largest_at(mission: Mission, number: Number) -> PerCase | None:
     """The size that a mission states for an error, the largest of three axes; None if it states none.
 
     The level of a spectrum that states none is 0 dB.
     """
-    value = value_at(mission, number.key)
+    value: Vector | PerCase | None = value_at(mission, number.key)
     if value is None and parts_of(number.key)[-1] in ("level", "spectrum_level"):
         *section, _ = parts_of(number.key)
         owner = _value_below(mission, section)
         has_curve = owner is not None and (section[-1] == "oscillator" or owner.spectrum is not None)
         return 0.0 if has_curve else None
-    if number.is_level or value is None:
+    if value is None:
+        return None
+    if number.is_level and not isinstance(value, tuple):
         return value
     sizes = [np.abs(size) for size in (value if isinstance(value, tuple) else (value,))]
-    return functools.reduce(np.maximum, sizes)
+    largest: PerCase = functools.reduce(np.maximum, sizes)
+    return largest
 
 
 # ---------------------------------------------------------------- values that a caller gives
-def changed(mission: Mission, values: Mapping[str, Any]) -> Mission:
+def changed(mission: Mission, values: Mapping[str, object]) -> Mission:
     """A mission with values that replace values of the file or are added to them, as with `--set`.
 
     Parameters
@@ -477,7 +486,7 @@ def changed(mission: Mission, values: Mapping[str, Any]) -> Mission:
     return parse_mission(mission.data, mission.file, changes=(*mission.changes, *changes))
 
 
-def _si_of(tree: dict[str, Any], key: str) -> str:
+def _si_of(tree: JsonObject, key: str) -> str:
     """SI unit of a key's numbers; empty if the key has no number with a unit."""
     for number_key in (key, f"{key}.0"):
         try:
@@ -487,7 +496,7 @@ def _si_of(tree: dict[str, Any], key: str) -> str:
     return ""
 
 
-def text_of(si: str, value: Any) -> str:
+def text_of(si: str, value: object) -> str:
     """Text in a mission file for a text, number, quantity, list of them, or None; numbers are in the SI unit.
 
     Raises
@@ -514,19 +523,19 @@ def text_of(si: str, value: Any) -> str:
 
 
 # Quantities of other packages are recognised by their attributes, so that no such package has to be installed.
-def is_quantity(value: Any) -> bool:
+def is_quantity(value: object) -> TypeGuard[Measured]:
     """Whether a value is a quantity of astropy, which has `to_value`, or of pint, which has a magnitude."""
     return hasattr(value, "to_value") or (hasattr(value, "magnitude") and hasattr(value, "units"))
 
 
-def magnitude(value: Any, unit: str) -> Any:
+def magnitude(value: Measured, unit: str) -> Measured:
     """The number or array of a quantity in a unit."""
     if hasattr(value, "to_value"):
         return value.to_value(unit)
     return value.to(unit.replace("^", "**") or "dimensionless").magnitude
 
 
-def _unit_of(value: Any) -> str:
+def _unit_of(value: Measured) -> str:
     """The unit of a quantity, as a mission file writes it."""
     unit = str(value.unit) if hasattr(value, "to_value") else f"{value.units:~}"
     return unit.replace("**", "^").replace(" ", "")

@@ -5,11 +5,12 @@ Earth-fixed axes: x through Greenwich on the equator, z through the north pole. 
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.arrays import PerCase
 from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
 from bisar_budget.geometry import Axes, Vector, cross, dot, unit
 
@@ -118,7 +119,7 @@ def free_fall(position: Vector, velocity: Vector, axes: SceneAxes | None) -> Vec
     )
 
 
-def earth_fixed_places(latitude: Any, longitude: Any, height: Any) -> Floats:
+def earth_fixed_places(latitude: PerCase, longitude: PerCase, height: PerCase) -> Floats:
     """Earth-fixed coordinates (..., 3) [m] of geodetic places, each (...), [rad], [rad], [m]."""
     sine, cosine = np.sin(latitude), np.cos(latitude)
     _, normal = curvature_radii(sine)
@@ -138,13 +139,13 @@ def _vector(coordinates: Floats) -> Vector:
     return (x, y, z)
 
 
-def curvature_radii(sine: Any) -> tuple[Any, Any]:
+def curvature_radii(sine: PerCase) -> tuple[PerCase, PerCase]:
     """Radii of curvature along the meridian and across it, by the sine of the latitude. [m]"""
     across = EQUATORIAL_RADIUS_M / np.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
     return across**3 * (1 - _ECCENTRICITY_SQUARED) / EQUATORIAL_RADIUS_M**2, across
 
 
-def geodetic_places(points: Floats) -> tuple[Any, Any, Any]:
+def geodetic_places(points: Floats) -> tuple[Floats, Floats, Floats]:
     """Latitude and longitude [rad] and height [m] of Earth-fixed coordinates (..., 3), each (...).
 
     Bowring's iteration, on the reduced latitude; for places more than a few kilometres from the Earth's centre.
@@ -175,7 +176,7 @@ def geodetic(point: Vector) -> Geodetic:
     return Geodetic(latitude, longitude, height)
 
 
-def _directions(latitude: Any, longitude: Any) -> Floats:
+def _directions(latitude: PerCase, longitude: PerCase) -> Floats:
     """East, north and up (3, ..., 3) at places, each (...)."""
     sine, cosine, zero = np.sin(latitude), np.cos(latitude), np.zeros_like(longitude)
     sine_l, cosine_l = np.sin(longitude), np.cos(longitude)
@@ -185,13 +186,18 @@ def _directions(latitude: Any, longitude: Any) -> Floats:
     return np.stack([np.stack(direction, axis=-1) for direction in (east, north, up)])
 
 
+def axes_at_places(latitude: Floats, longitude: Floats) -> Floats:
+    """East, north and up at places, each (n,): (3, 3, n), by axis, Earth-fixed component and place."""
+    return np.ascontiguousarray(np.moveaxis(_directions(latitude, longitude), -1, 1))
+
+
 def axes_at(place: Geodetic) -> SceneAxes:
     """East, north and up at a place, or at those of many cases."""
     east, north, up = map(_vector, _directions(*np.broadcast_arrays(place.latitude, place.longitude)))
     return SceneAxes(earth_fixed(place), (east, north, up))
 
 
-def flown(place: Geodetic, heading: float, speed: float, climb: float, times_s: Any) -> Floats:
+def flown(place: Geodetic, heading: float, speed: float, climb: float, times_s: PerCase) -> Floats:
     """Earth-fixed places (..., 3) after flights along the geodesic, at a height that `climb` changes. [m]
 
     Parameters

@@ -20,7 +20,6 @@ from calendar import isleap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 from bisar_budget.extras import install_command
 from bisar_budget.faults import shown
@@ -429,7 +428,7 @@ class _Message:
     """Keywords and values of a message, the fault of its form, and whether it must have all mandatory keywords."""
 
     where: str
-    leaves: Mapping[str, Any]
+    leaves: Mapping[str, object]
     problem: str = ""
     is_complete: bool = False  # by the standard; JSON and CSV of CelesTrak leave out keywords with one possible value
 
@@ -551,7 +550,7 @@ _COVARIANCE_KEYWORD = re.compile(r"C[XYZ](_DOT)?_[XYZ](_DOT)?", re.ASCII)
 
 
 def _covariance(
-    record: Mapping[str, Any], epoch: Instant, orientation: Orientation, location: str
+    record: Mapping[str, object], epoch: Instant, orientation: Orientation, location: str
 ) -> EpochCovariance | None:
     """The covariance that a message states at the epoch of its elements; None for a message without covariance."""
     elements = {key: str(value).strip() for key, value in record.items() if _COVARIANCE_KEYWORD.fullmatch(key)}
@@ -562,14 +561,14 @@ def _covariance(
     return read_covariance(block, tai(epoch), "TEME", orientation, location)
 
 
-def _value(record: Mapping[str, Any], key: str, location: str) -> Any:
+def _value(record: Mapping[str, object], key: str, location: str) -> object:
     value = record.get(key)
     if value is None or value == "":
         raise PathFileError(f"{location}: has no {key}")
     return value
 
 
-def _from_message(record: Mapping[str, Any], location: str) -> Elements:
+def _from_message(record: Mapping[str, object], location: str) -> Elements:
     for key, accepted in _ACCEPTED_VALUES.items():
         value = record.get(key)
         if value not in (None, "") and str(value).strip().upper() not in accepted:

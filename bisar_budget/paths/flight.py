@@ -10,7 +10,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
@@ -911,7 +911,9 @@ def least_squares(normalised_times: Floats, positions: Floats, order: int) -> tu
     return coefficients, positions - basis @ coefficients
 
 
-def powers_of(coefficients: Floats, half_s: float, convert: Callable[..., Any] = legendre.leg2poly) -> Floats:
+def powers_of(
+    coefficients: Floats, half_s: float, convert: Callable[[Floats], NDArray[np.floating]] = legendre.leg2poly
+) -> Floats:
     """Coefficients (order + 1, 3) of τ⁰, τ¹, … of a series over -`half_s` … `half_s`. [m], [m/s], …
 
     `convert` turns coefficients of the series into coefficients of powers; omitted: from a Legendre series.

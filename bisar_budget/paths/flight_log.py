@@ -21,7 +21,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Any, NamedTuple, NoReturn
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, fault_words, shown
 from bisar_budget.paths.accuracy_columns import ACCEPTED, BESIDE, UNCLEAR, meaning_of
-from bisar_budget.paths.earth import Floats, Geodetic, axes_at, earth_fixed_places, geodetic_places
+from bisar_budget.paths.earth import Floats, axes_at_places, earth_fixed_places, geodetic_places
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, GPS_EPOCH_DAY, SCALES, WEEK_S, Instant, parse_instant
 from bisar_budget.paths.log_places import (
@@ -399,8 +399,7 @@ def _level_axes(fixed: Floats, header: _Header, places: Floats) -> Floats:
         latitude, longitude = places[:2]
     else:
         latitude, longitude, _ = geodetic_places(places.T)
-    where: Any = (latitude, longitude, np.zeros_like(latitude))
-    axes: Floats = np.moveaxis(np.array(axes_at(Geodetic(*where)).axes), -1, 0)
+    axes: Floats = np.moveaxis(axes_at_places(latitude, longitude), -1, 0)
     squares: Floats = np.einsum("nij,nj->ni", axes**2, fixed**2)
     return np.sqrt(squares)
 

@@ -4,11 +4,12 @@ import re
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from bisar_budget.arrays import Booleans
 from bisar_budget.paths.earth import Floats, earth_fixed_places
 from bisar_budget.paths.flight import NO_MATRIX, LeftOut, Log, PathFileError
 from bisar_budget.paths.instant import SCALES, TAI_LESS, UNIX_EPOCH_DAY, Instant, tai_less_utc, utc
@@ -80,7 +81,12 @@ class LogRecords:
     """
 
     def __init__(
-        self, name: str, count: int, lines: Any = None, broken: Mapping[int, str] = _NO_FAULTS, lost: int = 0
+        self,
+        name: str,
+        count: int,
+        lines: ArrayLike | None = None,
+        broken: Mapping[int, str] = _NO_FAULTS,
+        lost: int = 0,
     ) -> None:
         self.name, self._is_in_lines = name, lines is not None
         self._numbers: NDArray[np.int64] = np.arange(1, count + 1) if lines is None else np.asarray(lines)
@@ -107,7 +113,7 @@ class LogRecords:
         """The record in a sentence."""
         return f"{'line' if self._is_in_lines else 'record'} {self._numbers[index]}"
 
-    def leave_out(self, is_unusable: Any, reason: Callable[[int], str]) -> None:
+    def leave_out(self, is_unusable: Booleans | np.bool_, reason: Callable[[int], str]) -> None:
         """Leave out records (count,) that cannot be used; `reason` gives the reason for the record of an index."""
         indices = np.flatnonzero(is_unusable & self.is_usable)
         if indices.size:

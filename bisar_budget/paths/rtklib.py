@@ -16,12 +16,12 @@ import math
 import re
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bisar_budget.faults import shown
-from bisar_budget.paths.earth import Floats, Geodetic, axes_at, geodetic_places
+from bisar_budget.paths.earth import Floats, axes_at_places, geodetic_places
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, GPS_EPOCH_DAY, WEEK_S, Instant, parse_instant
 from bisar_budget.paths.log_places import (
@@ -285,8 +285,7 @@ def _sigmas(
         if column in header.indices:
             roots = np.nan_to_num(np.clip(table[:, header.indices[column]], -_MAX_SIGMA_M, _MAX_SIGMA_M))
             covariance[:, i, j] = covariance[:, j, i] = roots * np.abs(roots)
-    points: Any = (latitude, longitude, np.zeros_like(latitude))
-    axes: Floats = np.moveaxis(np.array(axes_at(Geodetic(*points)).axes), -1, 0)
+    axes: Floats = np.moveaxis(axes_at_places(latitude, longitude), -1, 0)
     squares = np.einsum("nij,njk,nik->ni", axes, covariance, axes)
     local_sigmas: Floats = np.sqrt(np.maximum(squares, 0.0))
     return local_sigmas

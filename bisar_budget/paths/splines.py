@@ -9,9 +9,9 @@ number of coefficients. For motion by finite forces it does: even acceleration t
 of variance h³ in pieces of length h. Noise of a receiver that wanders (Gauss-Markov) leaves h.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,7 +124,7 @@ class SplineFit:
         )
 
 
-def _vector(values: Any) -> Vector:
+def _vector(values: Iterable[float]) -> Vector:
     x, y, z = (float(value) for value in values)
     return (x, y, z)
 

@@ -8,9 +8,11 @@ checks a mission writes its piece and need not keep its findings. A format with 
 
 from collections.abc import Mapping, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 
 
@@ -81,7 +83,7 @@ class Style(NamedTuple):
         return f"\x1b[{sgr}m{text}\x1b[0m" if self.color else text
 
 
-def _module(format_name: str) -> Any:
+def _module(format_name: str) -> "ModuleType":
     """Module of a format, imported at its first use, so that other formats need not wait for it."""
     return import_module(f"bisar_budget.report.{FORMATS[format_name].module}")
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from math import prod
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,9 @@ from bisar_budget.mission.quantities import Number
 from bisar_budget.report.words.sentences import spreadsheet_text
 
 if TYPE_CHECKING:
+    from dask.array import Array as DaskArray
+    from netCDF4 import Dataset as NetcdfFile
+    from pyarrow import Array
     from xarray import Dataset
 
 
@@ -147,7 +151,7 @@ def write_parquet(described: Described, parts: Iterable[Part], path: str) -> Non
             writer.write_table(table, row_group_size=table.num_rows)
 
 
-def _array(pa: Any, column: Column, values: Values) -> Any:
+def _array(pa: ModuleType, column: Column, values: Values) -> "Array":
     if column.is_text:
         return pa.array(values, pa.string(), mask=values == "").dictionary_encode()
     return pa.array(values, pa.float64(), from_pandas=True)  # NaN is null
@@ -210,7 +214,7 @@ def _hold_to_room(path: str) -> None:
         os.fsync(file.fileno())
 
 
-def _dimensions(file: Any, described: Described) -> list[Column]:
+def _dimensions(file: "NetcdfFile", described: Described) -> list[Column]:
     """Create the dimensions. Returns the columns with a value for each case."""
     cases = described.cases
     if not cases.is_grid:
@@ -234,13 +238,13 @@ def _attributes(column: Column) -> Mapping[str, str]:
 class _Variable:
     """One column of a file. Texts are stored as the numbers of their meanings."""
 
-    def __init__(self, file: Any, column: Column, names: tuple[str, ...]) -> None:
+    def __init__(self, file: "NetcdfFile", column: Column, names: tuple[str, ...]) -> None:
         self.column = column
         self.is_free = column.is_text and column.name.rpartition(".")[2] == "reason"
         meanings = list(STATUS) if column.name == "status" else [""]
         self.codes = {meaning: code for code, meaning in enumerate(meanings)}
         kind = str if self.is_free else "i4" if column.is_text else "f8"
-        fill = {"fill_value": np.nan} if kind == "f8" else {}
+        fill: Mapping[str, Any] = {"fill_value": np.nan} if kind == "f8" else {}
         self.variable = file.createVariable(column.name, kind, names, **fill)
         self.variable.setncatts(_attributes(column))
 
@@ -328,7 +332,7 @@ def _missing(name: str, library: str) -> str:
     return f"{name} needs {library}, which is not installed; {install_command('tables')} brings it"
 
 
-def dataset(described: Described, values_by_column: Mapping[str, Any]) -> "Dataset":
+def dataset(described: Described, values_by_column: "Mapping[str, Values | DaskArray]") -> "Dataset":
     """Columns of a sweep as a dataset.
 
     Parameters

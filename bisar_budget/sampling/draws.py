@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -192,9 +192,9 @@ class Sums:
 
     def clear(self) -> None:
         """Begin another block."""
-        every: list[Mapping[Any, Floats]] = [self.phases, self.totals, self.motion, self.tags, self.clock, self.alone]
-        for kept in every:
-            for sums in kept.values():
+        by_name = (self.motion, self.tags, self.clock, self.alone)
+        for kept in (self.phases.values(), self.totals.values(), *(each.values() for each in by_name)):
+            for sums in kept:
                 sums.fill(0.0)
         self._exact.clear()
 
@@ -270,7 +270,9 @@ class Sums:
         motion = _sum(self.motion, owners, np.broadcast_to(0.0, (2, 3, 3, self.size)))
         tags = _sum(self.tags, owners, np.broadcast_to(0.0, (2, self.size)))
         clock = _sum(self.clock, owners, np.broadcast_to(0.0, (4, self.size)))
-        shifts: list[Any] = [powers @ shift.swapaxes(0, 1) if shift.any() else STILL for shift in motion]
+        shifts: list[Floats | Sequence[Floats]] = [
+            powers @ shift.swapaxes(0, 1) if shift.any() else STILL for shift in motion
+        ]
         for platform, path in enumerate(self.paths):
             if path.fall is not None and motion[platform].any():
                 of_units = path.fall.motions(path, self.exact.half, self.exact.sampling.places)[..., 0]

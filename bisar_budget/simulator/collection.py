@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from bisar_budget.simulator.phase_history import (
     Flight,
     Floats,
     PhaseHistory,
+    ReceiverNoise,
     cell_centres,
     direct_path_error,
     direct_path_ways,
@@ -328,7 +329,7 @@ class PointCollection:
         amplitudes: Complexes,
         slow_time: Floats,
         frequencies: int,
-        **noise: Any,
+        **noise: Unpack[ReceiverNoise],
     ) -> PhaseHistory:
         """Phase history of scatterers (n, 3) at `frequencies` frequencies over the band, under the window."""
         frequency = self.radar.center_frequency + cell_centres(self.radar.bandwidth, frequencies)

@@ -7,7 +7,7 @@ Frame: scene centre at the origin, x east, y north, z up. SI units.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,13 @@ class PathSinusoid(NamedTuple):
     frequency: float
     phase: float = 0.0
     axis: Vector | None = None
+
+
+class ReceiverNoise(TypedDict, total=False):
+    """Noise of a receiver, as `phase_history` takes it."""
+
+    noise_power: float
+    rng: np.random.Generator | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +211,12 @@ class Flight:
         return total + SPEED_OF_LIGHT * self.seen
 
     def record(
-        self, scatterers: Floats, amplitudes: Complexes, slow_time: Floats, frequency: Floats, **noise: Any
+        self,
+        scatterers: Floats,
+        amplitudes: Complexes,
+        slow_time: Floats,
+        frequency: Floats,
+        **noise: Unpack[ReceiverNoise],
     ) -> "PhaseHistory":
         """The phase history of scatterers as the receiver records it at these slow times: `phase_history`."""
         return phase_history(

@@ -37,6 +37,7 @@ from bisar_budget.simulator.phase_history import (
     PathError,
     PathSinusoid,
     PhaseHistory,
+    ReceiverNoise,
     cell_centres,
     look_sum,
 )
@@ -267,7 +268,7 @@ def simulate_point(
 
     def history(flight: Flight, scatterer_places: Floats) -> PhaseHistory:
         scatterers, power = np.c_[scatterer_places, np.zeros(len(scatterer_places))], settings.noise
-        noise = {"noise_power": 0.0 if power is None else 10 ** (power / 10), "rng": rng}
+        noise: ReceiverNoise = {"noise_power": 0.0 if power is None else 10 ** (power / 10), "rng": rng}
         return collection.record(flight, scatterers, amplitudes.astype(complex), slow_time, plan.frequencies, **noise)
 
     done_work = 0

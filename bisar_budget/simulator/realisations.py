@@ -6,7 +6,7 @@ recursion, phase noise is a sum of tones, and synchronisation joins samples of i
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -522,11 +522,14 @@ def _phasors(turns: float, count: int) -> Complexes:
     return phasors[1 : count + 1]
 
 
-def _folded(values: NDArray[Any], count: int) -> NDArray[Any]:
+Summed = TypeVar("Summed", np.float64, np.complex128)
+
+
+def _folded(values: NDArray[Summed], count: int) -> NDArray[Summed]:
     """Sums of the tones 1, 2 … that are equal at `count` moments of their period, (count,)."""
     padded = np.zeros(-(-(values.size + 1) // count) * count, values.dtype)
     padded[1 : values.size + 1] = values
-    folded: NDArray[Any] = padded.reshape(-1, count).sum(axis=0)
+    folded: NDArray[Summed] = padded.reshape(-1, count).sum(axis=0)
     return folded
 
 

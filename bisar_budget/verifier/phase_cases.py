@@ -1,7 +1,6 @@
 """Verdicts on the limits of quadratic and cubic phase, with and without autofocus, and of the location."""
 
 import math
-from typing import Any
 
 from bisar_budget.analysis.allocation import ROOM, range_walk_cap
 from bisar_budget.effects.declared import CUBIC
@@ -18,7 +17,7 @@ from bisar_budget.simulator.phase_history import Errors, NoGroundPointError, Pat
 from bisar_budget.simulator.point import sinusoids_of
 from bisar_budget.verifier import reasons
 from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading
-from bisar_budget.verifier.study import Responses, Sizes, Study
+from bisar_budget.verifier.study import Responses, Sizes, Study, VerdictFields
 
 TOLERANCE_FRACTION = 0.05  # of the budget, within which a limit is confirmed
 INSIDE_FRACTION, BEYOND_FACTOR = 0.9, 1.1  # of the limit; between these sizes the phase must grow with the error
@@ -185,7 +184,7 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
     return blank._replace(boundary_autofocus=phase, **fields, verdict=fields["verdict_autofocus"], reason=reason)
 
 
-def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool = True) -> dict[str, Any]:
+def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool = True) -> VerdictFields:
     """Refocus the image at the limit with autofocus, and compare the remaining phase with the plain budget.
 
     The phase hidden by the band and by turns is included if `holds_hidden`. It is not when only the pull-in range is
@@ -231,7 +230,7 @@ def _read_focused(study: Study, focused: Responses) -> ApertureReading:
     return study.read(large, is_focused=True)
 
 
-def predicted(effect: ExactEffect) -> dict[str, Any]:
+def predicted(effect: ExactEffect) -> VerdictFields:
     """Fields of a verdict that exact ranges fill."""
     return {
         "predicted_qpe_rad": abs(effect.quadratic),
@@ -321,9 +320,9 @@ def _through_the_limit(
     return verdict, reasons.phase_does_not_grow([(phase, position) for phase, position in sizes if phase is not None])
 
 
-def _of_response(study: Study, images: Responses, reading: ApertureReading) -> dict[str, Any]:
+def _of_response(study: Study, images: Responses, reading: ApertureReading) -> VerdictFields:
     """Measures of the response, without those that a long smear or a bent patch makes undefined."""
-    chip, reference, measures = images.chip, images.reference, dict[str, Any]()
+    chip, reference, measures = images.chip, images.reference, VerdictFields()
     try:
         shift = study.shift(images, reading)
         measures["measured_displacement_m"] = images.effect.moved(shift.displacement)

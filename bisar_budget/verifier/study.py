@@ -68,6 +68,10 @@ class Responses(NamedTuple):
     reference: Chip
 
 
+VerdictFields = dict[str, Any]
+"""Fields of a verdict by name."""
+
+
 class Study:
     """One mission, with the analysis and the collection that its rows share."""
 

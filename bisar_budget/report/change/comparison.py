@@ -4,17 +4,19 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bisar_budget.constants import GATING_MODELS, UTILIZATION_TOLERANCE
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission, Requirements, Waiver
 from bisar_budget.mission.parts import figure_text
+from bisar_budget.mission.readers import SectionValue
 from bisar_budget.report.change.fallen_effects import SUMS, fallen_effects
 from bisar_budget.report.change.lost_doubts import lost_doubts
 from bisar_budget.report.words.sentences import dotted, percent
@@ -80,9 +82,9 @@ def _set_values(mission: Mission) -> Iterator[tuple[KeyPath, str]]:
         yield changed.get(".".join(parts), parts), change.text
 
 
-def _value(mission: Mission, path: KeyPath) -> Any:
+def _value(mission: Mission, path: KeyPath) -> SectionValue:
     """The value at a path; None if the mission has no such attribute."""
-    value: Any = mission
+    value: SectionValue = mission
     for key in path:
         if isinstance(value, Mapping):
             value = value.get(key)
@@ -166,7 +168,7 @@ def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loos
     yield from _sources(before, after)
 
 
-def loosened_settings(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Loosened]:
+def loosened_settings(before: Mapping[str, object], after: Mapping[str, object]) -> Iterator[Loosened]:
     """Settings of a project that are looser than before: `strict` removed, or `exit-zero` added."""
     for key, strict_value in (("strict", True), ("exit-zero", False)):
         old, new = (values.get(key, False) for values in (before, after))
@@ -257,7 +259,7 @@ def _waived_rows(before: MissionFindings, after: MissionFindings) -> Iterator[Lo
     """Rows and requirements that are waived and were not."""
     named_ids = {waiver.id for waiver in _waivers(before.analysed().mission, after.analysed().mission)}
     for collection in ("rows", "requirements"):
-        old: Mapping[str, Any] = {item.id: item for item in getattr(before, collection)}
+        old: Mapping[str, Row | JudgedRequirement] = {item.id: item for item in getattr(before, collection)}
         for item in getattr(after, collection):
             old_status = old[item.id].status if item.id in old else "none"
             if item.status == "waived" != old_status and item.id not in named_ids:

@@ -9,11 +9,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from operator import itemgetter
 from textwrap import wrap
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.arrays import NumbersOrWords
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.status import STATUS
 from bisar_budget.findings.trade import Axis, Trade
@@ -423,7 +424,7 @@ def _in_cells(canvas: svg.Canvas, trade: Trade, columns: Sequence[float], lines:
 
 
 def _names(
-    canvas: svg.Canvas, rows: NDArray[Any], plane: _Plane, columns: Sequence[float], lines: Sequence[float]
+    canvas: svg.Canvas, rows: NumbersOrWords, plane: _Plane, columns: Sequence[float], lines: Sequence[float]
 ) -> list[svg.LegendLine]:
     """Write the name of its row in each region: level, upright in a tall region, or as a letter.
 

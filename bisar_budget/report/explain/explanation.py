@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -43,6 +42,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import name_of_error
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
+from bisar_budget.mission.readers import SectionValue
 from bisar_budget.mission.vibrations import AcceleratedSinusoid
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Floats
@@ -518,7 +518,7 @@ def _dispersion(analysis: Analysis, findings: MissionFindings, row: Row) -> Iter
         path, propagation = getattr(mission.geometry, name), mission.propagation
         if propagation is None:
             continue
-        content = propagation.content(name) * findings.coverage_factor
+        content = (propagation.content(name) or 0.0) * findings.coverage_factor
         values = {
             "K": ELECTRON_DELAY_M3_PER_S2 * content * float(leg_factor(CONTENT, path.position, path.position)),
             "c": SPEED_OF_LIGHT,
@@ -641,7 +641,7 @@ def not_judged(findings: MissionFindings, row: Row) -> Iterator[Step]:
 
 def _air_that_changes(reason: Note) -> Step:
     """Step of constant delays in the air: their effect as if they changed, and its share of the allowable."""
-    values: Sequence[Any] = reason.values
+    values: Sequence[SectionValue] = reason.values
     _, correlation_time, key, size, use, _ = values
     unit = {"islr": "dB", LOCATION: "m"}.get(key, "rad")
     title = f"The declared delays of the air, as if they changed in {with_unit(correlation_time, 's')}"
