@@ -29,9 +29,38 @@ from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import load_mission, parse_mission
 from tests.yaml_text import yaml_text
 
-# Shared machines: how long an example takes says nothing.
-settings.register_profile("shared", deadline=None)
-settings.load_profile("shared")
+# Shared machines: how long an example takes says nothing. `-m thorough` loads the second profile (see `examples`).
+_DEFAULT_EXAMPLES, _THOROUGH_EXAMPLES = 20, 100
+settings.register_profile("default", deadline=None, max_examples=_DEFAULT_EXAMPLES)
+settings.register_profile("thorough", deadline=None, max_examples=_THOROUGH_EXAMPLES)
+settings.load_profile("default")
+
+
+def examples(count: int, default: int | None = None, **options: Any) -> settings:
+    """Settings of a Hypothesis test with a number of examples of its own.
+
+    Parameters
+    ----------
+    count : int
+        Examples of `-m thorough`.
+    default : int, optional
+        Examples of every other run; without it a fifth of `count`, at least 10.
+    **options
+        Other settings.
+    """
+    fewer = min(count, max(10, count // 5) if default is None else default)
+    is_thorough = settings().max_examples == _THOROUGH_EXAMPLES
+    return settings(max_examples=count if is_thorough else fewer, deadline=None, **options)
+
+
+def seeds(count: int, default: int, *found: int) -> list[Any]:
+    """Seeds 0 to `count` − 1 as parameters: the first ones, and those that once found a defect, in every run.
+
+    The others are marked `thorough`.
+    """
+    always = {*range(default), *found}
+    return [seed if seed in always else pytest.param(seed, marks=pytest.mark.thorough) for seed in range(count)]
+
 
 # Files that take longest; begun last, one core would wait for them. The first waits more than it computes.
 _FIRST = (
@@ -41,10 +70,32 @@ _FIRST = (
 )
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files that take longest; all else stays in its order."""
+def pytest_configure(config: pytest.Config) -> None:
+    """Give Hypothesis as many examples as are asked for, before test modules are imported."""
+    if _is_thorough(config):
+        settings.load_profile("thorough")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out tests that are marked `thorough` unless they are asked for, and begin with what takes longest.
+
+    Tests by Hypothesis have more examples in a thorough run, so they belong to it too.
+    """
+    for item in items:
+        if _is_thorough(config) and getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
+            item.add_marker("thorough")
+    left_out = [item for item in items if item.get_closest_marker("thorough") and not _is_thorough(config)]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if not item.get_closest_marker("thorough")]
     place = {name: number for number, name in enumerate(_FIRST)}
     items.sort(key=lambda item: place.get(item.path.name, len(place)))
+
+
+def _is_thorough(config: pytest.Config) -> bool:
+    """Whether `-m` names the marker."""
+    return "thorough" in (config.getoption("markexpr") or "")
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

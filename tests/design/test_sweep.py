@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, given
 from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
@@ -23,7 +23,7 @@ from bisar_budget.mission.model import flies_on_earth
 from bisar_budget.mission.quantities import QuestionError, number_of, tree_of
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.ranges.limit_search import LIMIT_FRACTION
-from tests.conftest import ROOT, mission_text, row
+from tests.conftest import ROOT, examples, mission_text, row
 from tests.families import FAMILIES
 from tests.families import mission_text as of_family
 from tests.fuzz import case
@@ -170,7 +170,7 @@ _RULES = {
 }
 
 
-@settings(max_examples=12, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])  # a case takes long
+@examples(12, default=5, phases=[Phase.explicit, Phase.reuse, Phase.generate])  # a case takes long
 @given(data=st.data(), family=st.sampled_from(FAMILIES), seed=st.integers(0, 300))
 def test_every_case_is_that_of_check(data, family, seed) -> None:
     """Random missions, rules and keys: arrays, exact ranges among them, and what they leave to `check`."""
