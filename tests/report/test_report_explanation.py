@@ -135,8 +135,16 @@ def sums(text: str) -> list[tuple[str, str, float]]:
     return found
 
 
-@pytest.mark.parametrize("model", ["published", "full", "strictest"])
-@pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.stem)
+# The strictest model has the steps of both others; alone each of them explains some missions of every kind.
+@pytest.mark.parametrize(
+    ("path", "model"),
+    [
+        pytest.param(path, model, marks=() if model == "strictest" or number % 3 == turn else pytest.mark.thorough)
+        for number, path in enumerate(MISSIONS)
+        for turn, model in enumerate(("published", "full", "strictest"))
+    ],
+    ids=lambda value: value if isinstance(value, str) else value.stem,
+)
 def test_every_row_can_be_repeated_by_hand(path, model: str) -> None:
     repeat_by_hand(load_mission(str(path), model))
 
