@@ -98,20 +98,19 @@ def _is_thorough(config: pytest.Config) -> bool:
     return "thorough" in (config.getoption("markexpr") or "")
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int | None:
+    """One process more than cores: some tests wait for a browser, a scheduler or a command."""
+    return None if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ else (os.cpu_count() or 1) + 1
+
+
+_is_patched = False  # whether the test of now may put something into the package
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """A test that puts something into the package finds it in its findings."""
-    _forget(item)
-
-
-def pytest_runtest_teardown(item: pytest.Item) -> None:
-    """And no other test does."""
-    _forget(item)
-
-
-def _forget(item: pytest.Item) -> None:
-    if "monkeypatch" in getattr(item, "fixturenames", ()):
-        _findings_of.cache_clear()
-        _found_in.cache_clear()
+    """A test that puts something into the package finds it in its findings, and no other test does."""
+    global _is_patched
+    _is_patched = "monkeypatch" in getattr(item, "fixturenames", ())
 
 
 _approx = pytest.approx
@@ -191,22 +190,24 @@ def mission_text(**changes: Any) -> str:
 
 def findings(**changes: Any) -> MissionFindings:
     """Check the base mission with changes."""
-    return _findings_of(mission_text(**changes))
+    check = _findings_of.__wrapped__ if _is_patched else _findings_of
+    return check(mission_text(**changes))
 
 
 def found_in(path: Path, model: str | None = None) -> MissionFindings:
     """Check a mission file of the repository."""
     assert path.is_relative_to(ROOT)  # what is there stays as it is
-    return _found_in(path, model)
+    check = _found_in.__wrapped__ if _is_patched else _found_in
+    return check(path, model)
 
 
-# Findings cannot be changed, and many tests ask for the same ones.
+# Findings cannot be changed, and many tests ask for the same ones: all examples by each of three models.
 @lru_cache(maxsize=64)
 def _findings_of(text: str) -> MissionFindings:
     return check_mission(parse_mission(text, "mission.yaml"), TODAY)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=160)
 def _found_in(path: Path, model: str | None) -> MissionFindings:
     return check_mission(load_mission(str(path), model), TODAY)
 
