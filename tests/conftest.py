@@ -4,7 +4,7 @@ import copy
 import math
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import date
 from functools import lru_cache
 from inspect import signature
@@ -60,6 +60,23 @@ def seeds(count: int, default: int, *found: int) -> list[Any]:
     """
     always = {*range(default), *found}
     return [seed if seed in always else pytest.param(seed, marks=pytest.mark.thorough) for seed in range(count)]
+
+
+def by_turns(items: Sequence[Any], ways: Sequence[Any], *always: Any) -> list[Any]:
+    """Pairs of parameters: each item in one of the ways by turns, or in all of them if it is one of `always`.
+
+    The other pairs are marked `thorough`.
+    """
+    return [
+        pytest.param(item, way, marks=() if item in always or number % len(ways) == turn else pytest.mark.thorough)
+        for number, item in enumerate(items)
+        for turn, way in enumerate(ways)
+    ]
+
+
+def name_of(value: Any) -> str | None:
+    """Id of a parameter: the name of a file without its ending, or pytest's own."""
+    return value.stem if isinstance(value, Path) else None
 
 
 # Files that take longest; begun last, one core would wait for them. The first waits more than it computes.

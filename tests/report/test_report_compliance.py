@@ -41,7 +41,7 @@ from bisar_budget.report.compliance.document import (
 from bisar_budget.report.compliance.summary import compliance
 from bisar_budget.report.words.sentences import sentence
 from bisar_budget.sampling.probability import monte_carlo
-from tests.conftest import COMPLIES, ROOT, examples, findings, found_in, mission_text
+from tests.conftest import COMPLIES, ROOT, by_turns, examples, findings, found_in, mission_text, name_of
 from tests.page import Element, read_page
 
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
@@ -157,9 +157,11 @@ def illustrated() -> MissionFindings:
     return found._replace(verdicts=(VERDICT,), image_evidence=(evidence,))
 
 
+EXAMPLES = sorted((ROOT / "specs" / "missions").glob("*.yaml"))
+
+
 class TestView:
-    @pytest.mark.parametrize("model", ["published", "full", "strictest"])
-    @pytest.mark.parametrize("path", sorted((ROOT / "specs" / "missions").glob("*.yaml")), ids=lambda path: path.stem)
+    @pytest.mark.parametrize(("path", "model"), by_turns(EXAMPLES, ("published", "full", "strictest")), ids=name_of)
     def test_every_row_stands_once_with_its_numbers(self, path: Path, model: str) -> None:
         found = found_in(path, model)
         document = compliance(report(found), FULL)

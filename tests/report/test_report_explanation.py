@@ -12,7 +12,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.theory import render
-from tests.conftest import ROOT, TODAY, findings, mission_text
+from tests.conftest import ROOT, TODAY, by_turns, findings, mission_text, name_of
 from tests.effects.test_random_errors import MISSION as SENSORS
 from tests.effects.test_random_errors import OSCILLATORS
 from tests.report.test_text_width import too_long
@@ -135,16 +135,7 @@ def sums(text: str) -> list[tuple[str, str, float]]:
     return found
 
 
-# The strictest model has the steps of both others; alone each of them explains some missions of every kind.
-@pytest.mark.parametrize(
-    ("path", "model"),
-    [
-        pytest.param(path, model, marks=() if model == "strictest" or number % 3 == turn else pytest.mark.thorough)
-        for number, path in enumerate(MISSIONS)
-        for turn, model in enumerate(("published", "full", "strictest"))
-    ],
-    ids=lambda value: value if isinstance(value, str) else value.stem,
-)
+@pytest.mark.parametrize(("path", "model"), by_turns(MISSIONS, ("published", "full", "strictest")), ids=name_of)
 def test_every_row_can_be_repeated_by_hand(path, model: str) -> None:
     repeat_by_hand(load_mission(str(path), model))
 
