@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.constants import SPEED_OF_LIGHT
@@ -13,6 +13,7 @@ from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.simulator.far_field import far_field_filter, polar_format
 from bisar_budget.simulator.image_formation import backprojection, ground_grid, matched_filter
 from bisar_budget.simulator.phase_history import PathError, look_sum
+from tests.conftest import examples
 from tests.simulate.conftest import Collection, collection, measured_phase
 
 pytestmark = pytest.mark.extras
@@ -59,7 +60,7 @@ class TestFarFieldFilter:
         assert far_field_filter(history, np.array([x, y, z])) == pytest.approx(total / 6, abs=1e-6)
 
     @given(x=st.floats(-3, 3), y=st.floats(-3, 3), squint=st.floats(-60, 60))
-    @settings(max_examples=12, deadline=None)
+    @examples(12)
     def test_near_the_scene_centre_it_is_the_matched_filter(self, x, y, squint) -> None:
         """What (5) drops is at most |x|²/2R on each leg; that phase bounds the difference."""
         c = collection(squint, pulses=16, frequencies=8)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from bisar_budget.constants import SPEED_OF_LIGHT
@@ -15,7 +15,7 @@ from bisar_budget.simulator.collection import PointCollection
 from bisar_budget.simulator.phase_history import Errors, PathError, cell_centres, superposed
 from bisar_budget.verifier.aperture_reading import _distance, _squares, measured_shift, read_aperture
 from bisar_budget.verifier.limits import verify_mission
-from tests.conftest import mission_text
+from tests.conftest import examples, mission_text
 from tests.simulate.conftest import collection
 
 pytestmark = pytest.mark.extras
@@ -72,7 +72,7 @@ triple = st.tuples(component, component, component)
     clock=component,
     who=st.sampled_from(["transmitter", "receiver"]),
 )
-@settings(max_examples=15, deadline=None)
+@examples(15)
 def test_measured_phases_are_those_of_exact_ranges(
     squint, receiver_squint, velocity, acceleration, clock, who
 ) -> None:
