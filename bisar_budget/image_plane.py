@@ -67,6 +67,11 @@ class Sampling:
     fit: Floats
 
     @cached_property
+    def centred(self) -> Floats:
+        """Takes a history to its distances from its mean, and to its mean, (samples + 1, samples)."""
+        return np.concatenate((np.eye(self.places.size) - self.fit[0], self.fit[:1]))
+
+    @cached_property
     def to_ends(self) -> Floats:
         """Weights (2, samples) that carry a smooth history from the samples to both ends of the aperture."""
         return self.weights_at(np.array((-1.0, 1.0)))
