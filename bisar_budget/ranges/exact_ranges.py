@@ -28,7 +28,7 @@ single case serves any number of lanes.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -164,7 +164,7 @@ class TimeTags:
         case = self.case.take(lanes)
         return replace(self, case=case) if (case >= 0).any() else None
 
-    def put(self, platform: int, tag_s: Floats, along: Sequence[Floats], *, is_rate: bool = False) -> list[Any]:
+    def put(self, platform: int, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> list[Any]:
         """Insert a platform's shift by time tags (nodes, lanes) [m], or its rate per second, into other motions."""
         tagged = np.flatnonzero(self.case >= 0)
         (times,), tag_s = _take_cases([self.times], self.case[tagged]), tag_s[:, tagged]
@@ -186,85 +186,65 @@ class Lanes:
         The case of each error.
     at_nodes : (nodes, lanes)
         Position error, or for a clock the range error [m/unit], or for a time tag its sign.
-    moves : two of float or (lanes,)
+    moves : (2, lanes)
         1 where the transmitter, or the receiver, moves, else 0.
-    direction : Vectors
-        Direction of the motion: floats, (lanes,), or (nodes, lanes) for a direction that turns. For a small time tag
-        the velocity. [m/s]
+    directions : (2, 3, nodes, lanes)
+        Directions in which a unit of each error moves transmitter and receiver; zero for a platform that does not
+        move. For a small time tag the velocity. [m/s] One node if no direction turns, one lane if all lanes share it.
     order : int or (lanes,)
         Power of slow time with which a position error grows; -1 for a clock. An error of velocity turns Doppler.
-    of_receiver : Vectors, optional
-        Direction of the receiver's motion if it differs.
     tags : TimeTags, optional
         Paths of the lanes that are time tags, if any lane is.
     """
 
     case: Indices
     at_nodes: Floats
-    moves: tuple[Any, Any] = (0.0, 0.0)
-    direction: Vectors = (0.0, 0.0, 0.0)
+    moves: Floats
+    directions: Floats
     order: Any = -1
-    of_receiver: Vectors | None = None
     tags: TimeTags | None = None
-
-    @property
-    def directions(self) -> tuple[Vectors, Vectors]:
-        """Directions in which errors move transmitter and receiver."""
-        return self.direction, self.direction if self.of_receiver is None else self.of_receiver
 
     @property
     def turns(self) -> bool:
         """Whether any direction turns within the aperture."""
-        return any(np.ndim(component) > 1 for direction in self.directions for component in direction)
+        return bool(self.directions.shape[2] > 1)
 
     @property
     def platforms(self) -> list[int]:
         """Platforms that any of the lanes moves."""
-        return [platform for platform in (0, 1) if np.any(self.moves[platform])]
+        return [platform for platform in (0, 1) if self.moves[platform].any()]
 
     def of(self, lanes: Indices) -> "Lanes":
         """Some of the lanes."""
-        u, v, x, y, z, order, *of_receiver_axes = (
-            component.take(lanes, axis=-1) if isinstance(component, np.ndarray) else component
-            for component in (*self.moves, *self.direction, self.order, *(self.of_receiver or ()))
-        )
-        of_receiver = (of_receiver_axes[0], of_receiver_axes[1], of_receiver_axes[2]) if of_receiver_axes else None
-        tags = self.tags and self.tags.of(lanes)
-        at_nodes = self.at_nodes.take(lanes, axis=1)
-        return Lanes(self.case.take(lanes), at_nodes, (u, v), (x, y, z), order, of_receiver, tags)
+        moves, directions, order = _take([self.moves, self.directions, np.atleast_1d(self.order)], lanes)
+        tags, at_nodes = self.tags and self.tags.of(lanes), self.at_nodes.take(lanes, axis=1)
+        return Lanes(self.case.take(lanes), at_nodes, moves, directions, order, tags)
 
     def there(self, case: Indices) -> "Lanes":
         """The lanes, one per case, for a new choice of cases: errors of `ExactRanges.at`."""
         return replace(self.of(case), case=np.arange(case.size))
 
-    def shifts(self, size: Any) -> list[Any]:
-        """Shift of each platform at the nodes by errors of given sizes. [m]"""
-        along = [self.at_nodes * (size * component) for component in self.direction]
-        both = [along, along]
-        if self.of_receiver is not None:
-            both[1] = [self.at_nodes * (size * component) for component in self.of_receiver]
-        if self.tags is not None:
-            both = [
-                self.tags.put(platform, self.at_nodes * size, along_platform)
-                for platform, along_platform in enumerate(both)
-            ]
-        return [_weighted(shift, weight) for shift, weight in zip(both, self.moves, strict=True)]
+    def shifts(self, size: Any) -> Floats:
+        """Shift of each platform at the nodes by errors of given sizes, (2, 3, nodes, lanes). [m]"""
+        course = self.at_nodes * size
+        shifts: Floats = self.directions * course
+        return shifts if self.tags is None else self._tagged(self.tags, course, shifts)
 
-    def ways(self, size: Any) -> tuple[Sequence[Any], Sequence[Any]]:
+    def ways(self, size: Any) -> Floats:
         """Directions in which larger errors move transmitter and receiver; for time tags they turn with the paths."""
         if self.tags is None:
             return self.directions
-        of_transmitter, of_receiver = (
-            self.tags.put(platform, self.at_nodes * size, direction, is_rate=True)
-            for platform, direction in enumerate(self.directions)
-        )
-        return of_transmitter, of_receiver
+        return self._tagged(self.tags, self.at_nodes * size, self.directions, is_rate=True)
 
-    def clock(self, size: Any) -> Any:
+    def _tagged(self, tags: TimeTags, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> Floats:
+        """Shifts or directions of both platforms, with those of the time tags in their place."""
+        both = np.array([tags.put(platform, tag_s, along[platform], is_rate=is_rate) for platform in (0, 1)])
+        return np.asarray(both * self.moves[:, None, None])
+
+    def clock(self, size: Any) -> Floats:
         """Range error at the nodes by clock errors of given sizes. [m]"""
-        transmitter, receiver = self.moves
-        is_clock = 1.0 - np.maximum(transmitter, receiver)
-        return self.at_nodes * (size * is_clock) if np.any(is_clock) else np.zeros_like(self.at_nodes)
+        is_clock = 1.0 - self.moves.max(axis=0)
+        return np.asarray(self.at_nodes * (size * is_clock))
 
 
 class SmallErrors(NamedTuple):
@@ -285,21 +265,14 @@ class SmallErrors(NamedTuple):
     def of(cls, errors: Sequence[Lanes]) -> "SmallErrors":
         """Small errors from lanes, one `Lanes` per error, whose lanes are the cases."""
         courses: dict[Any, Floats] = {}
-        components = [
-            component
-            for lanes_of_error in errors
-            for direction in lanes_of_error.directions
-            for component in direction
-        ]
-        cases = max((np.shape(component)[-1] for component in components if np.ndim(component)), default=1)
+        cases = max((lanes.directions.shape[-1] for lanes in errors), default=1)
         ways, turning = np.zeros((len(errors), 7, cases)), dict[int, Floats]()
         for index, (lanes, way) in enumerate(zip(errors, ways, strict=True), 1):
             courses[lanes.order if lanes.platforms else -index] = lanes.at_nodes
             if lanes.turns:
                 way = turning[index - 1] = np.zeros((7, len(lanes.at_nodes), cases))
-            for platform in lanes.platforms:
-                for axis, component in enumerate(lanes.directions[platform]):
-                    way[3 * platform + axis] = component * lanes.at_nodes if lanes.turns else component
+            by_axis = lanes.directions.reshape(6, -1, lanes.directions.shape[-1])
+            way[:6] = by_axis * lanes.at_nodes if lanes.turns else by_axis[:, 0]
             way[6] = not lanes.platforms
         names = list(courses)
         course = [
@@ -451,6 +424,12 @@ class ExactRanges:
         return np.array([p[axis] / R + q[axis] / S for axis in (0, 1)])
 
     @cached_property
+    def _both(self) -> tuple[Floats, Floats]:
+        """Positions of both platforms at the nodes, (2, 3, nodes, n), and their ranges, (2, nodes, n). [m]"""
+        tracks = np.array([np.broadcast_arrays(*track) for track in self.tracks])
+        return tracks, np.array(np.broadcast_arrays(*self.ranges))
+
+    @cached_property
     def sine(self) -> Floats:
         """Sine of the angle between the directions that band and turn resolve at the centre."""
         return self.matrix.sine
@@ -520,8 +499,10 @@ class ExactRanges:
 
     def clock_course(self, terms: Sequence[Any]) -> Floats:
         """Range error at the nodes of a clock error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³, by its terms. [m]"""
-        seconds = sum(term * self.times**power for power, term in enumerate(terms) if np.any(term))
-        return np.asarray(SPEED_OF_LIGHT * seconds + np.zeros_like(self.times))
+        seconds = np.zeros_like(self.times)
+        for term in reversed(terms):
+            seconds = seconds * self.times + term
+        return SPEED_OF_LIGHT * seconds
 
     def along(self, platform: int, direction: Vectors) -> Floats:
         """Change of a platform's range at the nodes per metre along a direction: −u·d, or −(u − b)·d if heard."""
@@ -532,7 +513,8 @@ class ExactRanges:
         """Range error at the nodes by a small unit of errors, one per case, or all of a single case. [m/unit]"""
         moved = lanes.clock(1.0)
         for platform in lanes.platforms:
-            moved = moved + lanes.moves[platform] * self.along(platform, lanes.directions[platform]) * lanes.at_nodes
+            x, y, z = lanes.directions[platform]
+            moved = moved + self.along(platform, (x, y, z)) * lanes.at_nodes
         return np.asarray(moved)
 
     def quadratics_of(self, errors: SmallErrors) -> Floats:
@@ -651,7 +633,7 @@ class ExactRanges:
         growth, _, _ = _grown(measured, np.array((east, north)), room[_MEASURED_ARRAY_COUNT:])
         return np.asarray(clock - growth[0] - growth[1])
 
-    def _heard(self, shifts: Sequence[Any], case: Indices) -> Floats:
+    def _heard(self, shifts: Iterable[Any], case: Indices) -> Floats:
         """The c·t̃ at the nodes by shifts of the platforms if the direct path is the clock. [m]"""
         a, b, c = (of_transmitter - of_receiver for of_transmitter, of_receiver in zip(*shifts, strict=True))
         x, y, z, baseline = _take_cases([*self._between, self.baselines], case)
@@ -664,44 +646,31 @@ class ExactRanges:
         It is the motion of the least of V: by the second derivative of V, and by the change of its slope with the
         error.
         """
-        course, ways = lanes.at_nodes, lanes.ways(size)
-        east, north = point
-        shifts, remaining, change = lanes.shifts(size), lanes.clock(size), lanes.clock(1.0)
-        looks, distances = np.empty((2, 2, *course.shape)), np.empty((2, *course.shape))
-        turns = np.zeros((2, *course.shape))
-        for platform, (track, weight, shift, (x, y, z)) in enumerate(
-            zip(self.tracks, lanes.moves, shifts, ways, strict=True)
-        ):
-            *true, true_range = _take_cases([*track, self.ranges[platform]], lanes.case)
-            a, b, c = (first + moved for first, moved in zip(true, shift, strict=True))
-            a, b = a - east, b - north
-            R = np.sqrt(a * a + b * b + c * c)
-            a, b, c = a / R, b / R, c / R
-            looks[0, platform], looks[1, platform], distances[platform] = a, b, R
-            remaining = remaining + (true_range - R)
-            if np.any(weight):
-                step = weight * course
-                along = a * x + b * y + c * z
-                change = change - step * along
-                turns[0] += step * (x - a * along) / R
-                turns[1] += step * (y - b * along) / R
+        course, ways, shifts = lanes.at_nodes, lanes.ways(size), lanes.shifts(size)
+        tracks, true_ranges = _take_cases(self._both, lanes.case)
+        vectors = tracks + shifts
+        vectors[:, :2] -= np.array(point)[:, None]
+        distances = np.sqrt(np.einsum("panc,panc->pnc", vectors, vectors))
+        vectors /= distances[:, None]
+        looks = vectors[:, :2]
+        along = np.einsum("panc,panc->pnc", vectors, ways)
+        turns = (course / distances[:, None] * (ways[:, :2] - along[:, None] * looks)).sum(axis=0)
+        remaining = lanes.clock(size) + (true_ranges - distances).sum(axis=0)
+        change = lanes.clock(1.0) - course * along.sum(axis=0)
         if self.has_direct_path:
-            ahead, back = lanes.moves
-            x, y, z = (ahead * first - back * second for first, second in zip(*ways, strict=True))
-            a, b, c, true_range = _take_cases([*self._between, self.baselines], lanes.case)
-            a, b, c = (between + first - second for between, first, second in zip((a, b, c), *shifts, strict=True))
-            apart = np.sqrt(a * a + b * b + c * c)
-            remaining = remaining + (apart - true_range)
-            change = change + np.where(apart > 0, course * (a * x + b * y + c * z) / apart, 0.0)
+            *between, baseline = _take_cases([*self._between, self.baselines], lanes.case)
+            vector, way = between + shifts[0] - shifts[1], ways[0] - ways[1]
+            apart = norm(tuple(vector))
+            remaining += apart - baseline
+            change += np.where(apart > 0, course * dot(tuple(vector), tuple(way)) / apart, 0.0)
         (weights,) = _take_cases([self.product_weights], lanes.case)
-        view = _GroundView(
-            np.array((remaining, *looks.sum(axis=1))), looks, distances, self.sampling.centred, weights
-        )
+        seen = np.array((remaining, *looks.sum(axis=0)))
+        view = _GroundView(seen, looks.swapaxes(0, 1), distances, self.sampling.centred, weights)
         east, north = view.step(view.products(change) + (view.node_weights * turns).sum(axis=1))
         return east, north
 
     def settled(
-        self, clock: Floats, shifts: Sequence[Any], near: Any, case: Indices, *, is_at_fold: bool = False
+        self, clock: Floats, shifts: Iterable[Any], near: Any, case: Indices, *, is_at_fold: bool = False
     ) -> ImagePoints:
         """Newton's method for the least of V, or `is_at_fold` a descent.
 
@@ -729,7 +698,7 @@ class ExactRanges:
         """Work arrays for a number of lanes, allocated once because allocation takes longer than filling them."""
         return np.empty((_ARRAY_COUNT, 2, self.fit.shape[1], lanes))
 
-    def _measured(self, clock: Floats, shifts: Sequence[Any], case: Indices, room: Floats) -> tuple[Floats, Floats]:
+    def _measured(self, clock: Floats, shifts: Iterable[Any], case: Indices, room: Floats) -> tuple[Floats, Floats]:
         """Parts of errors that `_grown` takes: the clock error, and five arrays (2, nodes, lanes), in `room`.
 
         If d is added to a platform's vector r, its range R grows by p/(R + √(R² + p)), with p = d·(2r + d). This form
@@ -964,13 +933,6 @@ def _unresolved(
 
 def _unless_rounding(value: Floats, seen: Floats) -> Floats:
     return np.where(np.abs(value) <= ROUNDING * seen, 0.0, value)
-
-
-def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:
-    """Shift of a platform, multiplied by the weight with which lanes move the platform."""
-    if np.ndim(weight):
-        return [weight * component for component in along]
-    return along if weight else STILL
 
 
 def _grown(measured: Floats, point: Floats, room: Floats) -> tuple[Floats, Floats, Floats]:
