@@ -191,7 +191,7 @@ class Lanes:
     directions : (2, 3, nodes, lanes)
         Directions in which a unit of each error moves transmitter and receiver; zero for a platform that does not
         move. For a small time tag the velocity. [m/s] One node if no direction turns, one lane if all lanes share it.
-    order : int or (lanes,)
+    order : (lanes,)
         Power of slow time with which a position error grows; -1 for a clock. An error of velocity turns Doppler.
     tags : TimeTags, optional
         Paths of the lanes that are time tags, if any lane is.
@@ -201,7 +201,7 @@ class Lanes:
     at_nodes: Floats
     moves: Floats
     directions: Floats
-    order: Any = -1
+    order: Any
     tags: TimeTags | None = None
 
     @property
@@ -216,7 +216,7 @@ class Lanes:
 
     def of(self, lanes: Indices) -> "Lanes":
         """Some of the lanes."""
-        moves, directions, order = _take([self.moves, self.directions, np.atleast_1d(self.order)], lanes)
+        moves, directions, order = _take([self.moves, self.directions, self.order], lanes)
         tags, at_nodes = self.tags and self.tags.of(lanes), self.at_nodes.take(lanes, axis=1)
         return Lanes(self.case.take(lanes), at_nodes, moves, directions, order, tags)
 
@@ -264,22 +264,18 @@ class SmallErrors(NamedTuple):
     @classmethod
     def of(cls, errors: Sequence[Lanes]) -> "SmallErrors":
         """Small errors from lanes, one `Lanes` per error, whose lanes are the cases."""
-        courses: dict[Any, Floats] = {}
+        keys = [int(lanes.order[0]) if lanes.platforms else -index for index, lanes in enumerate(errors, 1)]
+        courses = dict(zip(keys, (lanes.at_nodes for lanes in errors), strict=True))
         cases = max((lanes.directions.shape[-1] for lanes in errors), default=1)
         ways, turning = np.zeros((len(errors), 7, cases)), dict[int, Floats]()
-        for index, (lanes, way) in enumerate(zip(errors, ways, strict=True), 1):
-            courses[lanes.order if lanes.platforms else -index] = lanes.at_nodes
+        for index, (lanes, way) in enumerate(zip(errors, ways, strict=True)):
             if lanes.turns:
-                way = turning[index - 1] = np.zeros((7, len(lanes.at_nodes), cases))
+                way = turning[index] = np.zeros((7, len(lanes.at_nodes), cases))
             by_axis = lanes.directions.reshape(6, -1, lanes.directions.shape[-1])
             way[:6] = by_axis * lanes.at_nodes if lanes.turns else by_axis[:, 0]
             way[6] = not lanes.platforms
-        names = list(courses)
-        course = [
-            names.index(lanes_of_error.order if lanes_of_error.platforms else -index)
-            for index, lanes_of_error in enumerate(errors, 1)
-        ]
-        return cls(np.array(list(courses.values())), np.array(course), ways, turning)
+        course = np.array([list(courses).index(key) for key in keys])
+        return cls(np.array(list(courses.values())), course, ways, turning)
 
     def there(self, case: Indices) -> "SmallErrors":
         """The same errors for a new choice of cases, like `Lanes.there`."""
@@ -679,8 +675,9 @@ class ExactRanges:
         """
         lanes = clock.shape[1]
         size = max(1, min(lanes, SETTINGS.samples_at_once // self.fit.shape[1]))
-        points = ImagePoints(np.zeros(lanes, dtype=bool), *(np.full(lanes, math.nan) for _ in range(7)))
-        start = np.array([np.broadcast_to(values, lanes) for values in near], dtype=float)
+        points = ImagePoints(np.zeros(lanes, dtype=bool), *np.full((7, lanes), math.nan))
+        start = np.empty((2, lanes))
+        start[0], start[1] = near
         with np.errstate(all="ignore"):
             room = self._room(size)
             for first in range(0, lanes, size):
