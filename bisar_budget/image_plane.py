@@ -27,6 +27,7 @@ Floats = NDArray[np.float64]
 # it changes phases by less than 1e-6 of themselves up to a path of 0.5, and by less than 1e-4 beyond.
 NODES = ((0.1, 6), (0.5, 10), (1.0, 16), (2.0, 32), (math.inf, 64))
 FEWEST_NODES = NODES[0][1]
+FINEST_NODES = 128  # nodes that resolve phases up to some 100 rad
 OF_ENDS = 16  # polynomials that follow a line of sight around a full circle to 1e-6
 # Paths in pieces turn faster than their length suggests. With 1.5 nodes per piece, phases change by less than 1e-4 of
 # themselves.
@@ -67,11 +68,21 @@ class Sampling:
     fit: Floats
 
     @cached_property
+    def centred(self) -> Floats:
+        """Takes a history to its distances from its mean, and to its mean, (samples + 1, samples)."""
+        return np.concatenate((np.eye(self.places.size) - self.fit[0], self.fit[:1]))
+
+    @cached_property
     def to_ends(self) -> Floats:
         """Weights (2, samples) that carry a smooth history from the samples to both ends of the aperture."""
-        return self.weights_at(np.array((-1.0, 1.0)))
+        return self._weights_at(np.array((-1.0, 1.0)))
 
-    def weights_at(self, slow_times: Floats) -> Floats:
+    @cached_property
+    def to_finest(self) -> Floats:
+        """Weights (FINEST_NODES, samples) that carry a smooth history from the samples to the finest nodes."""
+        return self._weights_at(nodes(FINEST_NODES).places)
+
+    def _weights_at(self, slow_times: Floats) -> Floats:
         """Weights (times, samples) that carry a smooth history from the samples to other slow times over −1 … 1."""
         degree = min(self.places.size, OF_ENDS) - 1
         polynomials = np.polynomial.legendre.legvander(self.places, degree)

@@ -573,22 +573,25 @@ class DeclaredErrors:
 
     def lanes(self, *errors: ErrorSource, signs: Sequence[float] = (1.0,)) -> Lanes:
         """Lanes of unit errors, ordered by error, then sign, then case."""
-        moved = [error.platforms for error in errors]
         orders = [self._order(error) for error in errors]
         courses = np.array([self._course(error, order) for error, order in zip(errors, orders, strict=True)])
         at_nodes = np.moveaxis(courses[:, None] * np.array(signs)[:, None, None], 2, 0)
-        moves: list[list[Any]] = [[float(platform in platforms) for platforms in moved] for platform in (0, 1)]
-        u, v, order = (self._of_each(values, len(signs)) for values in (*moves, orders))
-        x, y, z = (self._of_each([error.way_of(0)[axis] for error in errors], len(signs)) for axis in (0, 1, 2))
-        of_receiver = None
-        if any(error.way_of(1) is not error.way_of(0) for error in errors):
-            ways = [[error.way_of(1)[axis] for error in errors] for axis in (0, 1, 2)]
-            of_receiver = tuple(self._of_each(along, len(signs)) for along in ways)
+        moves = np.array([[[platform in error.platforms] for error in errors] for platform in (0, 1)], dtype=float)
+        order, moves, directions = (
+            self._of_lanes(values, len(signs)) for values in (np.array(orders)[:, None], moves, _directions(errors))
+        )
         case, tags = np.tile(self.each, len(errors) * len(signs)), None
         if any(error.is_time_tag for error in errors):
             is_tag = np.repeat([error.is_time_tag for error in errors], self.cases * len(signs))
             tags = TimeTags(self.geometries.both, self.exact.times, np.where(is_tag, case, -1))
-        return Lanes(case, at_nodes.reshape(len(at_nodes), -1), (u, v), (x, y, z), order, of_receiver, tags)
+        return Lanes(case, at_nodes.reshape(len(at_nodes), -1), moves, directions, order, tags)
+
+    def _of_lanes(self, values: Any, signs: int) -> Any:
+        """Values of errors (..., errors, cases) for their lanes, (..., lanes); one lane if all lanes share them."""
+        *more, errors, cases = values.shape
+        if errors == cases == 1:
+            return values[..., 0]
+        return np.broadcast_to(values[..., None, :], (*more, errors, signs, self.cases)).reshape(*more, -1)
 
     def edge_of(self, error: ErrorSource) -> Any:
         """Position error at the aperture's edge by a unit of an error, the larger of both platforms; 0 by a clock."""
@@ -630,16 +633,6 @@ class DeclaredErrors:
             return exact.clock_course(error.clock)
         # A pure phase error: a quadratic that displaces nothing.
         return np.asarray(((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
-
-    def _of_each(self, values: Sequence[Any], signs: int) -> Any:
-        """One value of each error for its lanes, or the value that all share; turning directions at each node."""
-        if any(np.ndim(value) > 1 for value in values):
-            count = self.exact.fit.shape[1]
-            turning = np.stack([np.broadcast_to(value, (count, self.cases)) for value in values], axis=1)
-            return np.repeat(turning[:, :, None], signs, axis=2).reshape(count, -1)
-        if any(isinstance(value, np.ndarray) for value in values):
-            return np.repeat([self.array(value) for value in values], signs, axis=0).reshape(-1)
-        return values[0] if len(set(values)) == 1 else np.repeat(values, signs * self.cases)
 
     def block_of(self, error: ErrorSource) -> tuple[ErrorBlock, int]:
         """The block that contains an error, and the error's index in the block."""
@@ -683,6 +676,19 @@ class DeclaredErrors:
         if degrees < MIN_GRADIENT_ANGLE_DEG:
             return phrases.no_displacement(degrees)
         return phrases.no_displacement_across(plain(np.hypot(*self.geometries.range_gradient), case))
+
+
+def _directions(errors: Sequence[ErrorSource]) -> Floats:
+    """Directions in which units of errors move both platforms, as in `Lanes`, (2, 3, nodes, errors, cases)."""
+    moving = [(index, platform) for index, error in enumerate(errors) for platform in error.platforms]
+    ways = [errors[index].way_of(platform) for index, platform in moving]
+    shapes = [(1, *np.shape(component))[-2:] for way in ways for component in way if np.ndim(component)]
+    count, cases = (max(lengths) for lengths in zip((1, 1), *shapes, strict=True))
+    directions = np.zeros((2, 3, count, len(errors), cases))
+    for (index, platform), way in zip(moving, ways, strict=True):
+        for axis, component in enumerate(way):
+            directions[platform, axis, :, index] = component
+    return directions
 
 
 class Model:

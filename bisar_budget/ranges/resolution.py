@@ -98,9 +98,9 @@ def _slopes(geometry: BistaticGeometry, half: Floats, some: Any, count: int) -> 
 
 def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, Floats]:
     """Peak to first null, and full width at half power, by slopes (nodes, cases) of the range per metre. [m]"""
-    frequencies, of_band = np.polynomial.legendre.leggauss(_BAND_NODE_COUNT)
-    wavenumbers = k * (1 + np.multiply.outer(frequencies, relative_band / 2))
-    mean = np.multiply.outer(of_band / 2, nodes(len(slopes)).fit[0])[..., None]
+    band = nodes(_BAND_NODE_COUNT)
+    wavenumbers = k * (1 + np.multiply.outer(band.places, relative_band / 2))
+    mean = np.multiply.outer(band.fit[0], nodes(len(slopes)).fit[0])[..., None]
     rates = wavenumbers[:, None] * slopes  # change of phase by a metre [rad/m]
     rates -= (mean * rates).sum(axis=(0, 1))
     unit = math.sqrt(_HALF_POWER) / np.sqrt((mean * rates**2).sum(axis=(0, 1)))

@@ -203,6 +203,7 @@ def test_a_point_that_meets_a_platform_has_no_image(part: float, is_found: bool)
         platforms = {"transmitter": still, "receiver": {**moving, "motion_error": {"velocity": 0.01}}}
         analysis = Analysis(parse_mission(mission_text(platforms=platforms)))
         ones = np.ones((len(analysis.exact.times), 1))
-        lanes = Lanes(np.zeros(1, dtype=int), ones, moves=(1.0, 0.0), direction=position, order=0)
+        directions = np.array((position, (0.0, 0.0, 0.0)))[..., None, None]
+        lanes = Lanes(np.zeros(1, dtype=int), ones, np.array(((1.0,), (0.0,))), directions, np.zeros(1, dtype=int))
         found = analysis.exact.phases(lanes, np.array([-part]), (0.0, 0.0))
         assert found.is_settled[0] == is_found
