@@ -34,7 +34,7 @@ class FilesHeld:
     def __init__(self) -> None:
         self.known: dict[tuple[str, int], bytes | UnreadableError] = {}
         self.hashes: dict[tuple[str, int], bytes] = {}
-        self.room = _MOST_HELD
+        self.room = _MAX_HELD_BYTES
 
     def content(self, file: str, most: int, read: Callable[[], bytes]) -> bytes:
         """Content of a file as first read, at most `most` + 1 bytes; `read` gives the content of an unread file."""
@@ -61,7 +61,7 @@ class FilesHeld:
         return data
 
 
-_MOST_HELD = 64 << 20  # bytes
+_MAX_HELD_BYTES = 64 << 20
 _held: FilesHeld | None = None  # None outside of a command: a caller of functions reads the current files
 
 

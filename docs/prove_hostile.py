@@ -62,7 +62,7 @@ from tests.recorded import record
 PAGE = Path(__file__).with_name("hostile.md")
 PATHS = ROOT / "specs" / "missions" / "paths"  # orbits that missions name
 COMMAND = [sys.executable, "-m", "bisar_budget"]
-solve.PLACES, solve.PLACES_OF_CIRCLE = 17, 37  # of a range: the search is the same, and sooner done
+solve.RANGE_SAMPLES, solve.CIRCLE_SAMPLES = 17, 37  # of a range: the search is the same, and sooner done
 HANG_S = 300  # of processor time; the slowest that is right is a question of 200 checks of half a second
 ORIGINAL, OWN_PROCESS = 16, 200  # one file in so many
 LARGEST = 16 * MAX_BYTES  # of a report of one file

@@ -23,7 +23,7 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.scene_random import RandomPhases
-from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.constants import UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.combined import combined, combined_phase, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.random_effect import RandomError
@@ -35,25 +35,73 @@ from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Indices, Lanes
 from bisar_budget.ranges.point_paths import ROWS, PointPaths
 from bisar_budget.units import format_quantity
 
-RIM_POINTS = 16
-WIDE = 0.1  # of the nearest slant range; beyond, twice as many
-LIKE_A_COSINE = 1e-4  # as near to the crest of a cosine; its azimuth is then right to a degree
-ROUGH = 0.1  # by so much, of itself, a crest through points of the rim may be off
-CLIMBS = 5  # until then, each in a quarter of the arc before
-NARROW = 10.0  # of a place's clearances; below, it is looked at whatever its difference
-NEAREST_M = 1.0  # of a platform to a place; nearer, no image
-FARTHEST = 0.5  # of the nearest slant range: the search for a radius ends there
-PRECISION = 1e-3  # of the radius
-ALIKE = 5e-3  # of the total: so near to it, large errors need no search of their own
-TURNS = 2  # of the azimuth along which it is searched; then it is the whole circle's
-PROBES = 3
-FLOOR_RAD, SHARE = 1e-4, 3e-4  # of the largest difference: what one error may differ by and be taken as small
-FINEST = 1e-3  # rad, of the azimuth of a largest difference: a cosine loses half its square
-MAY_FOLD = 0.7  # of what gradients span without an error: with less left of it a point may have no image nearby
-AT_ONCE, TOGETHER = 512, 1024  # cases, and large errors at places: arrays of more do not stay in a cache
 
-_BOUND = 1 + UTILIZATION_TOLERANCE
-_ARC = math.pi / RIM_POINTS
+@dataclass(frozen=True)
+class SceneSettings:
+    """Tunings of the searches around the scene centre.
+
+    Attributes
+    ----------
+    rim_points : int
+        Number of even points of a circle.
+    wide_fraction : float
+        Radius, as a fraction of the nearest slant range, above which a circle has twice as many points.
+    nearest_m : float
+        Distance between a platform and a ground point below which there is no image. [m]
+    crest_fraction : float
+        Difference between a height and the predicted crest of a cosine that ends a climb, as a fraction of the crest.
+        The azimuth is then right to a degree.
+    crest_error_fraction : float
+        Error of a crest that is predicted from points of a rim, as a fraction of the crest.
+    max_climb_rounds : int
+        Largest number of rounds of a climb, each in a quarter of the arc before.
+    narrow_clearance_ratio : float
+        Clearance below which the points around it are searched, whatever their difference.
+    max_radius_fraction : float
+        Radius at which the search for a radius ends, as a fraction of the nearest slant range.
+    radius_fraction : float
+        Error of a radius, as a fraction of it.
+    similar_size_fraction : float
+        Difference between a size and the total below which large errors need no search, as a fraction of the total.
+    max_azimuth_rounds : int
+        Number of worst azimuths along which a radius is searched before the whole circle is.
+    probe_count : int
+        Number of azimuths at which a large error is compared with a small one.
+    small_phase_rad, small_phase_fraction : float
+        Difference of one error that is taken as small: up to this phase [rad], or this fraction of the largest
+        difference.
+    azimuth_rad : float
+        Error of the azimuth of a largest difference; a cosine loses half its square. [rad]
+    folding_fraction : float
+        Area that gradients span, as a fraction of their area without an error, below which a point may have no image.
+    cases_per_block, lanes_per_block : int
+        Number of cases, and of large errors at ground points, whose arrays stay in a cache.
+    """
+
+    rim_points: int = 16
+    wide_fraction: float = 0.1
+    nearest_m: float = 1.0
+    crest_fraction: float = 1e-4
+    crest_error_fraction: float = 0.1
+    max_climb_rounds: int = 5
+    narrow_clearance_ratio: float = 10.0
+    max_radius_fraction: float = 0.5
+    radius_fraction: float = 1e-3
+    similar_size_fraction: float = 5e-3
+    max_azimuth_rounds: int = 2
+    probe_count: int = 3
+    small_phase_rad: float = 1e-4
+    small_phase_fraction: float = 3e-4
+    azimuth_rad: float = 1e-3
+    folding_fraction: float = 0.7
+    cases_per_block: int = 512
+    lanes_per_block: int = 1024
+
+
+_SCENE = SceneSettings()
+
+_LIMIT_FACTOR = 1 + UTILIZATION_TOLERANCE_FRACTION
+_ARC = math.pi / _SCENE.rim_points
 _SIDES = np.array([[-1.0], [1.0]])
 HeightAt = Callable[[Floats, Indices], Floats]  # heights at azimuths, of some climbers
 SizeAt = Callable[[Floats, Indices], Floats]  # sizes at radii, of some cases
@@ -168,7 +216,7 @@ class ScenePhases:
             phases = np.concatenate((small, phases))
         way = np.copysign(1.0, there.matrix.turned_from(self.exact.matrix, of))
         clearance = way * there.sine / MIN_SINE
-        is_nowhere = (there.nearest < NEAREST_M) | ~np.isfinite(phases.sum(axis=0) + clearance)
+        is_nowhere = (there.nearest < _SCENE.nearest_m) | ~np.isfinite(phases.sum(axis=0) + clearance)
         if is_nowhere.any():
             phases, clearance = np.where(is_nowhere, centre, phases), np.where(is_nowhere, 0.0, clearance)
         return ScenePlaces(phases, self.together(phases - centre, of), clearance)
@@ -202,8 +250,8 @@ class ScenePhases:
         small = self.there(there, of).phases - self.centre.take(of, axis=1)
         found, turns = small.copy(), np.full(of.shape, math.inf)
         error, place = np.nonzero(exact)
-        for start in range(0, error.size, TOGETHER):
-            some = slice(start, start + TOGETHER)
+        for start in range(0, error.size, _SCENE.lanes_per_block):
+            some = slice(start, start + _SCENE.lanes_per_block)
             self._exactly(there, of, error[some], place[some], (found, turns))
         return small, found, turns
 
@@ -256,7 +304,7 @@ class ScenePhases:
     # ------------------------------------------------------------------ circles
     def points(self, radius: Floats, of: Indices) -> Indices:
         """Number of even points that circles need."""
-        return np.where(radius <= WIDE * self.nearest[of], RIM_POINTS, 2 * RIM_POINTS)
+        return np.where(radius <= _SCENE.wide_fraction * self.nearest[of], _SCENE.rim_points, 2 * _SCENE.rim_points)
 
     def rims(self, radius: Floats, of: Indices) -> Rims:
         """Evaluate circles that need the same number of points, evenly and around their worst point.
@@ -300,15 +348,15 @@ def _tops(heights: Floats, look: Callable[[Floats, Indices], Floats]) -> tuple[H
 
     Heights are clearances, less than nothing, and sizes, as `look` has them at azimuths of circles. Arrived at are
     tops of the clearances and of the sizes, (points, circles) each; minus infinity where none climbed. Left out are
-    clearances that do not seem to come below `NARROW`, and sizes that seem to stay below the
+    clearances that do not seem to come below `narrow_clearance_ratio`, and sizes that seem to stay below the
     highest by more than a crest may be off; a valley that is milder at the points may be the deeper between them.
     """
     arc = 2 * math.pi / heights.shape[1]
     before, after = np.roll(heights, 1, axis=1), np.roll(heights, -1, axis=1)
     _, crests = _crest(before, after, heights, arc)
-    most = crests[1] + ROUGH * np.abs(crests[1])
+    most = crests[1] + _SCENE.crest_error_fraction * np.abs(crests[1])
     is_start = heights >= np.maximum(before, after)
-    is_start[0] &= crests[0] > -NARROW
+    is_start[0] &= crests[0] > -_SCENE.narrow_clearance_ratio
     is_start[1] &= (most >= heights[1].max(axis=0)) & (heights[0] < -1).all(axis=0)
     kind, point, circle = np.nonzero(is_start)
     top = _climbed(
@@ -335,14 +383,14 @@ def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, 
     found there, that is looked for again in a quarter of the arc.
     """
     found, here, some = Heights(*map(np.array, start)), start, np.arange(start.height.size)
-    for _ in range(CLIMBS):
+    for _ in range(_SCENE.max_climb_rounds):
         if not some.size:
             break
         offset, crests = _crest(*sides, here.height, arc)
         azimuth = here.azimuth + offset
         there = Heights(height_at(azimuth, some), azimuth)
         found.put(some, found.of(some).with_others(there))
-        going = ~(np.abs(there.height - crests) <= LIKE_A_COSINE * np.abs(crests))
+        going = ~(np.abs(there.height - crests) <= _SCENE.crest_fraction * np.abs(crests))
         some, here = some[going], here.of(going).with_others(there.of(going))
         if some.size:
             arc /= 4
@@ -383,12 +431,18 @@ class _Climb:
 
     def _bent(self) -> Truths:
         """Which of the large errors differ otherwise than small ones do: seen at three places, two harmonics show."""
-        thirds = self.rims.azimuth + 2 * math.pi * np.arange(PROBES)[:, None] / PROBES
-        radius, of, large = np.tile(self.radius, PROBES), np.tile(self.of, PROBES), np.tile(self.large, PROBES)
+        thirds = self.rims.azimuth + 2 * math.pi * np.arange(_SCENE.probe_count)[:, None] / _SCENE.probe_count
+        radius, of, large = (
+            np.tile(self.radius, _SCENE.probe_count),
+            np.tile(self.of, _SCENE.probe_count),
+            np.tile(self.large, _SCENE.probe_count),
+        )
         small, exact, _ = self.phases.around(radius, thirds.reshape(-1), of, large)
-        floor = np.tile(np.maximum(FLOOR_RAD, SHARE * self.rims.difference), PROBES)
+        floor = np.tile(
+            np.maximum(_SCENE.small_phase_rad, _SCENE.small_phase_fraction * self.rims.difference), _SCENE.probe_count
+        )
         is_bent = large & ~(np.abs(exact - small) <= floor)
-        return np.asarray(is_bent.reshape(len(large), PROBES, -1).any(axis=1))
+        return np.asarray(is_bent.reshape(len(large), _SCENE.probe_count, -1).any(axis=1))
 
     def _look(self, some: Indices, azimuths: Floats) -> Heights:
         """The largest of differences at azimuths (n, some); the least turns are kept in mind."""
@@ -405,17 +459,21 @@ class _Climb:
         Where gradients become parallel the image ends, on an arc that may lie between the places that are looked at:
         it is also sought where they are nearest to parallel.
         """
-        even = np.broadcast_to(2 * _ARC * np.arange(RIM_POINTS)[:, None], (RIM_POINTS, some.size))
+        even = np.broadcast_to(2 * _ARC * np.arange(_SCENE.rim_points)[:, None], (_SCENE.rim_points, some.size))
         top = self._look(some, np.concatenate((self.rims.azimuth[some][None], even)))
         arc = np.full(some.size, _ARC)
-        while (going := np.flatnonzero((arc > FINEST) & np.isfinite(top.height))).size:
+        while (going := np.flatnonzero((arc > _SCENE.azimuth_rad) & np.isfinite(top.height))).size:
             before = top.of(going)
             side = self._look(some[going], before.azimuth + arc[going] * _SIDES)
             is_higher = side.height > before.height
             top.put(going, side.where(is_higher, before))
             arc[going] = np.where(is_higher, arc[going], arc[going] / 4)
         arc, low = np.full(some.size, _ARC), self.lowest.of(some)
-        while (going := np.flatnonzero((arc > FINEST) & np.isfinite(top.height) & (low.height > -MAY_FOLD))).size:
+        while (
+            going := np.flatnonzero(
+                (arc > _SCENE.azimuth_rad) & np.isfinite(top.height) & (low.height > -_SCENE.folding_fraction)
+            )
+        ).size:
             before = low.of(going)
             top.put(going, top.of(going).with_others(self._look(some[going], arc[going] * _SIDES - before.azimuth)))
             seen = self.lowest.of(some[going])
@@ -502,10 +560,10 @@ def scene_edges(
     rim, largest = (Heights(np.full(errors.cases, math.inf), np.zeros(errors.cases)) for _ in range(2))
     found = SceneEdges(phases, radius, rim, largest, names, np.array(limit), np.zeros((len(held), errors.cases)))
     counts = phases.points(radius, errors.each)
-    for count in (RIM_POINTS, 2 * RIM_POINTS):
+    for count in (_SCENE.rim_points, 2 * _SCENE.rim_points):
         cases = np.flatnonzero(counts == count)
-        for start in range(0, cases.size, AT_ONCE):
-            _evaluate(found, members, cases[start : start + AT_ONCE])
+        for start in range(0, cases.size, _SCENE.cases_per_block):
+            _evaluate(found, members, cases[start : start + _SCENE.cases_per_block])
     return found
 
 
@@ -531,7 +589,7 @@ def _largest(phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> He
 
 def _over_at_the_edge(found: SceneEdges, members: Sequence[Sequence[int]], of: Indices, rims: Rims) -> Floats:
     """Phases at the edge of what is inside its limit at the centre and over it there, else 0, (names, of). [rad]"""
-    phases, limit = found.phases, found.limit[:, of] * _BOUND
+    phases, limit = found.phases, found.limit[:, of] * _LIMIT_FACTOR
     more = phases.more[:, of]
 
     def held(at_places: Floats) -> Floats:
@@ -562,7 +620,7 @@ class Corrections:
 
     def __init__(self, edges: SceneEdges, total: Any) -> None:
         self.edges, self.phases, self.total = edges, edges.phases, edges.phases.errors.array(total)
-        self.farthest = np.maximum(FARTHEST * self.phases.nearest, edges.radius)
+        self.farthest = np.maximum(_SCENE.max_radius_fraction * self.phases.nearest, edges.radius)
 
     @cached_property
     def served(self) -> Floats:
@@ -573,8 +631,8 @@ class Corrections:
         found = np.full(self.total.shape, math.nan)
         cases = np.flatnonzero(np.isfinite(self.edges.rim.height) & np.isfinite(self.edges.difference))
         with np.errstate(all="ignore"):
-            for start in range(0, cases.size, AT_ONCE):
-                of = cases[start : start + AT_ONCE]
+            for start in range(0, cases.size, _SCENE.cases_per_block):
+                of = cases[start : start + _SCENE.cases_per_block]
                 found[of] = self._served(of)
         return found
 
@@ -590,7 +648,7 @@ class Corrections:
             return self._crests(radius, of[places], of_small=False).height
 
         size[some] = largest(high[some], some)
-        some = some[np.abs(size[some] - total[some]) > ALIKE * total[some]]
+        some = some[np.abs(size[some] - total[some]) > _SCENE.similar_size_fraction * total[some]]
         self._grow(largest, of, some, low, below, high, size)
         over = some[size[some] > total[some]]
         found[some] = math.inf
@@ -610,7 +668,7 @@ class Corrections:
             there = self.phases.places(radius, azimuth[places], of[places])
             return np.where(there.has_image, there.size, math.inf)
 
-        for _ in range(TURNS):
+        for _ in range(_SCENE.max_azimuth_rounds):
             if not some.size:
                 return found
             low, inside = np.zeros(of.size), np.zeros(of.size)
@@ -618,7 +676,7 @@ class Corrections:
             over = some[size[some] > total[some]]
             high[over] = where(along, total, over, (low, inside), (high, size))
             around = self._crests(high[some], of[some])
-            is_inside = around.height <= total[some] * (1 + PRECISION)
+            is_inside = around.height <= total[some] * (1 + _SCENE.radius_fraction)
             done = some[is_inside]
             found[done] = np.where(size[done] <= total[done], math.inf, high[done])
             size[some], azimuth[some] = around
@@ -677,13 +735,13 @@ def where(
         Between these.
     """
     (low, below), (high, above) = ([part[some].copy() for part in pair] for pair in (inside, outside))
-    slack = total[some] * PRECISION / 2
+    slack = total[some] * _SCENE.radius_fraction / 2
     goal = total[some] - slack
     below, above = below - goal, above - goal
     side = np.zeros(some.size)  # of the goal, on which the last one was
     going = np.flatnonzero(below <= 0)  # others are as near as asked for
     while True:
-        going = going[high[going] - low[going] > PRECISION * high[going]]
+        going = going[high[going] - low[going] > _SCENE.radius_fraction * high[going]]
         if not going.size:
             return low
         share = np.where(np.isinf(above[going]), 0.5, below[going] / (below[going] - above[going]))
@@ -727,7 +785,9 @@ class SceneEdge(NamedTuple):
         radius, nowhere = float(edges.radius[case]), (math.nan, 0.0, None)
         if math.isinf(size):
             reason = phrases.no_image_at_the_edge(math.degrees(rim), _degeneracy(mission, at(radius, rim)))
-            return cls(radius, *nowhere, FARTHEST * float(edges.phases.nearest[case]), reason, NOTHING)
+            return cls(
+                radius, *nowhere, _SCENE.max_radius_fraction * float(edges.phases.nearest[case]), reason, NOTHING
+            )
         searched = float(corrections.farthest[case])
         if math.isinf(difference):
             return cls(radius, *nowhere, searched, phrases.no_image(), NOTHING)
@@ -761,7 +821,7 @@ def _degeneracy(mission: Mission, place: GroundVector) -> str:
         for state in (geometry.transmitter, geometry.receiver)
     )
     there = BistaticGeometry(transmitter=transmitter, receiver=receiver)
-    if min(there.transmitter.slant_range, there.receiver.slant_range) < NEAREST_M:
-        return phrases.platform_at_the_edge(NEAREST_M)
+    if min(there.transmitter.slant_range, there.receiver.slant_range) < _SCENE.nearest_m:
+        return phrases.platform_at_the_edge(_SCENE.nearest_m)
     reason = degeneracy(there, mission.radar, mission.collection.aperture_time)
     return reason or phrases.gradients_become_parallel()

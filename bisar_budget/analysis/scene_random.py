@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.constants import ROUNDING
+from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.air_delays import (
     group_at_nodes,
     legs_of,
@@ -35,7 +35,14 @@ from bisar_budget.effects.air_delays import (
 )
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS, Subject
-from bisar_budget.effects.random_effect import FEWEST_NODES, MOST_NODES, Moves, RandomError, SensorCases, factor
+from bisar_budget.effects.random_effect import (
+    FEWEST_EFFECT_NODES,
+    MOST_EFFECT_NODES,
+    Moves,
+    RandomError,
+    SensorCases,
+    factor,
+)
 from bisar_budget.effects.vibration import slow_moves
 from bisar_budget.geometry import Vectors
 from bisar_budget.image_plane import nodes
@@ -94,7 +101,7 @@ class _Moving(NamedTuple):
             found = found + np.einsum("anp,mnp->amp", along, courses)
             seen = seen + np.einsum("anp,mnp->amp", np.abs(along), np.abs(courses))
         # What is left of terms that cancel exactly is rounding.
-        phase = np.where(np.abs(found) > ROUNDING * seen, found, 0.0) * _of(self.size, of)
+        phase = np.where(np.abs(found) > VECTOR_ROUNDING_FRACTION * seen, found, 0.0) * _of(self.size, of)
         return np.asarray(phase.reshape(-1, of.size))
 
 
@@ -174,7 +181,7 @@ def _at_random(
         elif kind == "propagation":
             places = tuple(map(PLATFORMS.index, legs_of(what.owner)))
             middles = [errors.exact.positions[place] for place in places]
-            count = min(MOST_NODES, max(FEWEST_NODES, errors.exact.fit.shape[1]))
+            count = min(MOST_EFFECT_NODES, max(FEWEST_EFFECT_NODES, errors.exact.fit.shape[1]))
             between = _between(count, errors.exact.fit.shape[1])
             courses = zenith_courses(errors.mission, what.owner, 2 * errors.exact.half, count)
             courses = np.einsum("nm,fmc->fnc", between, courses)

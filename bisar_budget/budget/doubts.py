@@ -23,7 +23,7 @@ from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, Subject
 from bisar_budget.effects.navigation_errors import residual_subject
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, norm, unit
-from bisar_budget.mission.covariance import KINDS
+from bisar_budget.mission.covariance import MOTION_KINDS
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath, LogNoise, MotionError, Platform
 from bisar_budget.paths.accuracy import StatedAccuracy
@@ -72,7 +72,7 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
             key = f"platforms.{name}.motion_error.position"
             note = phrases.input_in_doubt(path.doubt_m, path.doubt_of, declared, key)
             doubts.append(InputDoubt(name, path.doubt_m, declared or 0.0, note))
-        for kind in KINDS:
+        for kind in MOTION_KINDS:
             doubts += [
                 _stated_doubt(platform, name, kind, stated)
                 for stated in path.stated
@@ -93,7 +93,7 @@ def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Tru
     for name in PLATFORMS:
         path: FlownPath | None = getattr(mission.platforms, name).path
         if path is not None:
-            for kind in KINDS:
+            for kind in MOTION_KINDS:
                 doubts = [strays(mission, name), is_coarse(mission, name)] if kind == "position" else []
                 doubts += [states_more(mission, name, kind, stated) for stated in path.stated]
                 doubted[name, kind] = np.any([np.broadcast_to(doubt, (cases,)) for doubt in (False, *doubts)], axis=0)
@@ -179,7 +179,7 @@ def _stated_covariance(stated: StatedAccuracy, kind: str) -> Floats | None:
     """Covariance (..., 3, 3) of a kind of error along the scene's axes; None if the source does not state it."""
     if stated.covariance is None:
         return None
-    first = 3 * KINDS.index(kind)
+    first = 3 * MOTION_KINDS.index(kind)
     if len(stated.covariance) <= first:
         return None
     rows = [row[first : first + 3] for row in stated.covariance[first : first + 3]]

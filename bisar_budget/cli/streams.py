@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MISSION_SUFFIXES = (".yaml", ".yml")
 PICTURE_SUFFIXES = (".svg", ".png", ".pdf")
 _TEMPORARY = (".bisar-budget.", ".tmp")  # first and last letters of the name of a temporary folder
-EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
+BROKEN_EXIT_CODE, USAGE_EXIT_CODE, DEFECT_EXIT_CODE, INTERRUPTED_EXIT_CODE = 1, 2, 3, 130
 
 
 def expand(patterns: Iterable[str]) -> list[str]:
@@ -62,7 +62,7 @@ def read_all(reads: "Iterable[Callable[[], Mission]]") -> "list[Mission]":
             is_usable = False
             say_faults(error.file, error.faults)
     if not is_usable:
-        sys.exit(EXIT_USAGE)
+        sys.exit(USAGE_EXIT_CODE)
     return found
 
 
@@ -220,7 +220,7 @@ def complain(message: str) -> None:
 def fail(message: str) -> NoReturn:
     """Write an error about the usage of the command, and exit with 2."""
     complain(f"Error: {printable(message)}")
-    sys.exit(EXIT_USAGE)
+    sys.exit(USAGE_EXIT_CODE)
 
 
 def deliver(text: str, output: str | None = None, format_name: str = "text") -> None:

@@ -23,7 +23,7 @@ from bisar_budget.mission.parts import FIGURES, Part, PartError, entries, eviden
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.workers import Progress, unseen
 
-_KINDS = {"motion_error": ("imu", "gnss"), "oscillator": ("oscillator",)}
+_PART_KINDS_BY_SECTION = {"motion_error": ("imu", "gnss"), "oscillator": ("oscillator",)}
 
 
 class PartState(NamedTuple):
@@ -104,7 +104,9 @@ class Comparison(NamedTuple):
 
 def is_of_parts(key: str) -> bool:
     """Whether a key names parts of the catalogue, which `solve` compares."""
-    return parts_of(key) in {("platforms", name, section, "sensor") for name in PLATFORMS for section in _KINDS}
+    return parts_of(key) in {
+        ("platforms", name, section, "sensor") for name in PLATFORMS for section in _PART_KINDS_BY_SECTION
+    }
 
 
 def compare_parts(
@@ -226,7 +228,9 @@ class _PartSearch:
         names = named if isinstance(named, tuple) else [named] if named else []
         self.given = {name: find_part(name, beside) for name in names}
         given_kinds = {part.kind for part in self.given.values()}
-        self.kinds = tuple(kind for kind in _KINDS[self.section] if not given_kinds or kind in given_kinds)
+        self.kinds = tuple(
+            kind for kind in _PART_KINDS_BY_SECTION[self.section] if not given_kinds or kind in given_kinds
+        )
         catalogued = {entry.id: _Candidate(entry.id, entry.file, entry.part) for entry in entries(folders(beside))}
         project_files = [
             _Candidate(name, os.path.join(beside, name), part)

@@ -39,14 +39,14 @@ from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, Range
 from bisar_budget.workers import Progress, unseen
 
 _OF_ALL = ", or --scale for all of them"
-PLACES = 65  # samples of a range
-PLACES_OF_CIRCLE = 181  # samples of a circle, every 2 degrees: geometry changes fast near parallel gradients
+RANGE_SAMPLES = 65
+CIRCLE_SAMPLES = 181  # every 2 degrees: geometry changes fast near parallel gradients
 _NARROW_FRACTION = 2e-7  # of the value, between the two sides of a crossing before they are rounded
 _GOLDEN = (math.sqrt(5) - 1) / 2
 _TURN_STEPS = 20  # of a golden section, which end at 7e-5 of the distance between samples
-_MAX_TURNS = 16  # that are searched
+_SEARCHED_TURN_COUNT = 16  # per question
 # Steps that a search looks ahead: usually, and if each case is read, which takes longer.
-_LOOK_AHEAD_STEPS, _LOOK_AHEAD_STEPS_OF_READING = 5, 2
+_LOOK_AHEAD_STEPS, _READ_LOOK_AHEAD_STEPS = 5, 2
 
 # A function of the known states by value; it returns its result, or the set of values whose states it needs.
 Search = Callable[[Mapping[float, "State"]], Any]
@@ -300,18 +300,18 @@ class _Search:
         self.table = Table(
             Question.of(mission, [key], model, today, row=row, breaks=self.breaks), mission, [of_table]
         )
-        self.levels = _LOOK_AHEAD_STEPS_OF_READING if self.table.to_read else _LOOK_AHEAD_STEPS
+        self.levels = _READ_LOOK_AHEAD_STEPS if self.table.to_read else _LOOK_AHEAD_STEPS
 
     def scanned(self, progress: Progress) -> tuple[list[State], State | None]:
         """States at the samples of the range and at turns of the utilization, and the state of the file."""
-        values = self.range.places(PLACES_OF_CIRCLE if self.range.is_circle else PLACES)
+        values = self.range.places(CIRCLE_SAMPLES if self.range.is_circle else RANGE_SAMPLES)
         value = self.number.value
         if value is not None and self.range.low < value < self.range.high:
             values = sorted({*values, value})
         states = self.states(values if value is None else [*values, value], progress)
         given = None if value is None else states.pop()
         # Between samples with equal compliance it may change there and back, at a turn of the utilization.
-        searches = [partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[:_MAX_TURNS]]
+        searches = [partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[:_SEARCHED_TURN_COUNT]]
         turned = [state for state in self._searched(searches) if state is not None]
         return sorted([*states, *turned], key=lambda state: state.value), given
 

@@ -18,7 +18,7 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis, by_nodes
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import first_highest
-from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged, statuses
+from bisar_budget.budget.judged_rows import COMPLETE_FIELDS, REQUIREMENTS, Judged, statuses
 from bisar_budget.design.cases import Values
 from bisar_budget.design.varied import is_held, is_image, scaled
 from bisar_budget.faults import MissionError, SetNumber, SetValue
@@ -288,7 +288,7 @@ class Table:
         row_ids = {row for row, _ in self.fields.values()} | ({question.row} if question.row else set())
         rows = judged_mission(Analysis(self.mission), question.today).rows if row_ids else ()
         self.subjects = {row.subject.id: row.subject for row in rows if row.subject.id in row_ids}
-        self.is_complete = any(field in WHOLE for _, field in self.fields.values())
+        self.is_complete = any(field in COMPLETE_FIELDS for _, field in self.fields.values())
         # Numbers that decide more than their own value: a case with another value has to be read.
         self.to_read = {
             number.key

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from bisar_budget import units
 from bisar_budget.effects.effect import MOTION, PLATFORMS
-from bisar_budget.geometry import STILL, BistaticGeometry, norm
+from bisar_budget.geometry import STILL_SPEED_MPS, BistaticGeometry, norm
 from bisar_budget.image_plane import MIN_SINE, spans_ground
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE
+from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE_FRACTION
 from bisar_budget.mission.instruments import MAX_FALL_DB_PER_DECADE, MAX_RISE_DB_PER_DECADE
 from bisar_budget.mission.model import (
     MISSION,
     PLACE_KEYS,
-    WHOLE,
+    SHARE_SUM_TOLERANCE_FRACTION,
     MetricSplits,
     Mission,
     Shares,
@@ -30,8 +30,8 @@ from bisar_budget.mission.model import (
     least_bandwidth,
 )
 from bisar_budget.mission.platforms import (
-    FARTHEST_BY,
-    LEAST_BASELINE,
+    MAX_TRAVEL_RATIO,
+    MIN_BASELINE_M,
     MotionError,
     Platform,
     has_body_axes,
@@ -43,7 +43,7 @@ from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Sectio
 from bisar_budget.mission.vibrations import Spectrum
 
 # ---------------------------------------------------------------- keys for arrays, and cases that are missions
-SAFE = 1 + 1e-6  # factor around a limit of image formation within which a case is checked alone
+SAFETY_FACTOR = 1 + 1e-6  # around a limit of image formation within which a case is checked alone
 
 
 def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
@@ -105,27 +105,29 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
     still: Any = True
     for name, paths in zip(PLATFORMS, geometries.both, strict=True):
         platform = getattr(mission.platforms, name)
-        is_safe &= (paths.slant_range > SAFE) & (np.asarray(paths.position[2]) - paths.sinks(half) >= 0)
-        is_safe &= paths.has_frame(platform.motion_error.frame, SAFE)
+        is_safe &= (paths.slant_range > SAFETY_FACTOR) & (np.asarray(paths.position[2]) - paths.sinks(half) >= 0)
+        is_safe &= paths.has_frame(platform.motion_error.frame, SAFETY_FACTOR)
         if mission.common_motion_error is not None:
-            is_safe &= paths.has_frame(mission.common_motion_error.frame, SAFE)
+            is_safe &= paths.has_frame(mission.common_motion_error.frame, SAFETY_FACTOR)
         if platform.motion_error.lever_arm is not None:
-            is_safe &= has_body_axes(paths, np.broadcast_to(half, (cases,)), SAFE)
-        still = still & (norm(paths.velocity) < STILL * SAFE)
+            is_safe &= has_body_axes(paths, np.broadcast_to(half, (cases,)), SAFETY_FACTOR)
+        still = still & (norm(paths.velocity) < STILL_SPEED_MPS * SAFETY_FACTOR)
         if np.ndim(platform.speed):
             is_safe &= np.asarray(platform.speed) != 0
     is_safe &= ~np.asarray(still)
     turns, sine = spans_ground(geometries, mission.radar, 2 * half, cases)
-    is_safe &= turns & (sine >= SAFE * MIN_SINE)
+    is_safe &= turns & (sine >= SAFETY_FACTOR * MIN_SINE)
     if mission.propagation is not None:
         legs = dict(zip(PLATFORMS, geometries.both, strict=True))
         for _, _, degrees in least_elevations(mission.propagation, legs, mission.collection.aperture_time):
-            is_safe &= degrees > LEAST_ELEVATION_DEG * SAFE
+            is_safe &= degrees > LEAST_ELEVATION_DEG * SAFETY_FACTOR
     if mission.has_direct_path:
         halves = np.broadcast_to(half, (cases,))
-        least = np.maximum(LEAST_BASELINE, geometries.apart.travelled(halves) / FARTHEST_BY)
-        is_safe &= least_baseline(geometries.apart, halves) > SAFE * least
-    return is_safe & (np.asarray(mission.radar.bandwidth) * SAFE < 2 * np.asarray(mission.radar.center_frequency))
+        least = np.maximum(MIN_BASELINE_M, geometries.apart.travelled(halves) / MAX_TRAVEL_RATIO)
+        is_safe &= least_baseline(geometries.apart, halves) > SAFETY_FACTOR * least
+    return is_safe & (
+        np.asarray(mission.radar.bandwidth) * SAFETY_FACTOR < 2 * np.asarray(mission.radar.center_frequency)
+    )
 
 
 def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
@@ -133,26 +135,28 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
     is_safe = np.ones(cases, dtype=bool)
     sync = mission.synchronization
     if sync is not None and sync.is_holdover:
-        is_safe &= np.asarray(sync.age) > SAFE * least_age(sync.averaging, mission.collection.aperture_time)
+        is_safe &= np.asarray(sync.age) > SAFETY_FACTOR * least_age(sync.averaging, mission.collection.aperture_time)
     split = mission.allocation.split
     for shares in split if isinstance(split, MetricSplits) else (split,):
         if isinstance(shares, Shares):
             total = sum(0.0 if share is None else share for share in shares)
-            is_safe &= np.abs(np.asarray(total) - 1) * SAFE < WHOLE
+            is_safe &= np.abs(np.asarray(total) - 1) * SAFETY_FACTOR < SHARE_SUM_TOLERANCE_FRACTION
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         if platform.oscillator is not None:
             if platform.oscillator.bandwidth is not None:
                 least = least_bandwidth(np.asarray(mission.collection.aperture_time))
-                is_safe &= np.asarray(platform.oscillator.bandwidth) > SAFE * least
+                is_safe &= np.asarray(platform.oscillator.bandwidth) > SAFETY_FACTOR * least
             for (f, level), (g, next_level) in pairwise(platform.oscillator.phase_noise or ()):
                 slope = (np.asarray(next_level) - level) / math.log10(g / f)
-                is_safe &= (slope * SAFE > -MAX_FALL_DB_PER_DECADE) & (slope * SAFE < MAX_RISE_DB_PER_DECADE)
+                is_safe &= (slope * SAFETY_FACTOR > -MAX_FALL_DB_PER_DECADE) & (
+                    slope * SAFETY_FACTOR < MAX_RISE_DB_PER_DECADE
+                )
         covariance = platform.motion_error.covariance
         if covariance is not None:
             rows = [[np.broadcast_to(rho, (cases,)) for rho in row] for row in covariance.correlation]
             least = np.linalg.eigvalsh(np.array(rows).transpose(2, 0, 1)).min(axis=1)
-            is_safe &= least > -EIGENVALUE_TOLERANCE / 2
+            is_safe &= least > -EIGENVALUE_TOLERANCE_FRACTION / 2
     return is_safe
 
 
@@ -161,8 +165,8 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
 _UNSCALED_DIMENSIONS = (units.FREQUENCY, units.TIME, units.RATIO, units.MEMORY)
 # Exceptions by key: a time and a ratio that are errors, and a length that is no error.
 _OF_ERRORS, _MEASURES = ("time_tag", "accelerometer_scale_factor"), ("arm",)
-_ERRORS = ("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors")
-_ACCEPTED = (
+_ERROR_SECTIONS = ("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors")
+_ACCEPTED_KEYS = (
     "accepted: platforms.transmitter.motion_error, platforms.receiver.motion_error, common_motion_error, "
     "timing_error, propagation, other_errors, or a key below one of them"
 )
@@ -179,8 +183,8 @@ def scaled(mission: Mission, key: str, factor: Any) -> Mission:
         The key has no errors, or the mission states none below it.
     """
     parts = parts_of(key)
-    if not any(part in _ERRORS for part in parts[:3]):
-        raise QuestionError(f"{key}: holds no errors that --scale could multiply; {_ACCEPTED}")
+    if not any(part in _ERROR_SECTIONS for part in parts[:3]):
+        raise QuestionError(f"{key}: holds no errors that --scale could multiply; {_ACCEPTED_KEYS}")
     changed, count = _below(mission, MISSION, parts, factor, key)
     if not count:
         raise QuestionError(f"{key}: the mission states no error there that --scale could multiply")
@@ -204,7 +208,7 @@ def _below(value: Any, reader: Reader, parts: Sequence[str], factor: Any, key: s
         below = reader.section if isinstance(reader, ListOf) else reader.component
         inner, count = _below(value[int(child)], below, remaining, factor, key)
         return (*value[: int(child)], inner, *value[int(child) + 1 :]), count
-    raise QuestionError(f"{key}: the mission has no {child}; {_ACCEPTED}")
+    raise QuestionError(f"{key}: the mission has no {child}; {_ACCEPTED_KEYS}")
 
 
 def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[Any, int]:

@@ -43,7 +43,7 @@ from bisar_budget.mission.platforms import RAW, CommonMotionError, FlownPath, Lo
 from bisar_budget.ranges.exact_ranges import Floats
 
 _IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
-NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
+SPREADING_NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
 TILTS = ("attitude", "gyro_bias", "angle_random_walk")
 # The covariance of a position error over the aperture grows as this power of the aperture time.
 _GROWS = {
@@ -151,7 +151,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             path=("platforms", name, "motion_error", *(("imu", kind) if key == kind else (key,))),
             published=published,
             full=full,
-            spreads=kind in NOISE,
+            spreads=kind in SPREADING_NOISE,
             moves=_moves_by_imu(seen, platform_index, kind, directions, about, arm) if seen.has_edge else (),
         )
 
@@ -184,7 +184,7 @@ def _at_mid_aperture(mission: Mission, index: int, along: Any) -> tuple[Any, ...
 def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> list[Any]:
     """Sigmas of the displacement by a unit with the component `along` the line of sight of mid-aperture. [m]"""
     fit = seen.exact.fit[:2]
-    if kind in NOISE:
+    if kind in SPREADING_NOISE:
         orders = fit @ _walk_of(kind, len(seen.exact.times)).at_nodes @ fit.T
         constant, linear = np.diagonal(orders)
     else:
@@ -200,7 +200,7 @@ def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions
     """
     count, along = len(seen.exact.times), seen.range_errors(platform_index, directions[:, :, None])
     scale = seen.exact.half ** _GROWS[kind]
-    if kind not in NOISE:
+    if kind not in SPREADING_NOISE:
         courses = along * (_courses(kind, count)[0, :, None] * np.sqrt(scale))
         return seen.of_courses(courses, courses)[1]
     walk = _walk_of(kind, count)
@@ -221,7 +221,7 @@ def _courses(kind: str, count: int) -> Floats:
 
     They are zero at mid-aperture.
     """
-    if kind in NOISE:
+    if kind in SPREADING_NOISE:
         return factor(_walk_of(kind, count).at_nodes).T
     order = 3 if kind == "gyro_bias" else 2
     return nodes(count).places[None] ** order / math.factorial(order)

@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.sampling.draws import Drawing, DrawsPiece, Share, Tally
 
-MAX_CASES = 40_000  # of a study; a page has no room for more
-MAX_KEYS = 2  # of a study; a drawing has no more axes
+MAX_STUDY_CASES = 40_000  # of a study; a page has no room for more
+MAX_STUDY_KEY_COUNT = 2  # of a study; a drawing has no more axes
 _MANY_DRAWS = 1_000_000  # from which the time is estimated
 _TRIAL_DRAWS = 1 << 12  # of the first trial for this estimate
 DAY_OF_RUN = "the day of the run"
@@ -333,19 +333,19 @@ def _of(mission: Mission, ask: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, Any]) -> "Cases":
-    """Cases of a study: several values of each key, at most `MAX_CASES` cases."""
+    """Cases of a study: several values of each key, at most `MAX_STUDY_CASES` cases."""
     from bisar_budget.design.cases import grid
     from bisar_budget.front.missions import grid_of
 
-    if len(asked) > MAX_KEYS:
+    if len(asked) > MAX_STUDY_KEY_COUNT:
         raise QuestionError(f"{_OPTION} draws one key or two, and there are {len(asked)}.")
     cases = grid_of(mission, asked) if isinstance(asked, Mapping) else grid(tree_of(mission), asked, _OPTION)
     for varied, size in zip(cases.varied, cases.shape, strict=True):
         if size < 2:
             raise QuestionError(f"{_OPTION} {varied.key}: has one value; accepted: several. --set puts in one")
-    if cases.count > MAX_CASES:
+    if cases.count > MAX_STUDY_CASES:
         raise QuestionError(
-            f"{_OPTION}: {cases.count} cases; accepted: up to {MAX_CASES}, for which a page has room. "
+            f"{_OPTION}: {cases.count} cases; accepted: up to {MAX_STUDY_CASES}, for which a page has room. "
             "`bisar-budget sweep` checks more"
         )
     return cases

@@ -16,7 +16,7 @@ from bisar_budget.mission.model import MISSION
 from bisar_budget.mission.readers import INVALID, ListOf, OneOf, Reader, Section, did_you_mean, is_place
 from bisar_budget.mission.tree import MAX_BYTES, NULLS, Tree
 
-_ACCEPTED = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
+_ACCEPTED_CHANGE = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
 _MAX_KEY_CHARACTERS = 500  # a path of the schema has a tenth
 # Sections whose keys have dots: ids of rows, or whole paths.
 _WITH_DOTTED_KEYS = (("requirement_ids",), ("specifications",), ("allocation", "specify"))
@@ -35,12 +35,12 @@ def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
         key, equals, value = text.partition("=")
         key = key.strip()
         if not equals or not key:
-            raise InvalidValueError(f"{shown(text)!r} is not KEY=VALUE", _ACCEPTED)
+            raise InvalidValueError(f"{shown(text)!r} is not KEY=VALUE", _ACCEPTED_CHANGE)
         if len(key) > _MAX_KEY_CHARACTERS or len(value) > MAX_BYTES:
-            raise InvalidValueError(f"{shown(text)!r} is too long", _ACCEPTED)
+            raise InvalidValueError(f"{shown(text)!r} is too long", _ACCEPTED_CHANGE)
         parts = parts_of(key)
         if "" in parts:
-            raise InvalidValueError(f"{shown(key)!r} is no path of keys", _ACCEPTED)
+            raise InvalidValueError(f"{shown(key)!r} is no path of keys", _ACCEPTED_CHANGE)
         if parts in changes:
             raise InvalidValueError(f"{shown(key)} is set twice", "accepted: each key once")
         changes[parts] = SetValue(key, value.strip())
@@ -197,9 +197,9 @@ def _forget(tree: Tree, path: KeyPath) -> None:
 
 # ---------------------------------------------------------------------- hints for unknown keys
 _MAX_PATH_CHARACTERS = 200  # of a path that is compared with known paths
-_MAX_HINT_PATHS = 4  # in a hint; a key of more sections has no hint
+_MAX_HINT_PATH_COUNT = 4  # in a hint; a key of more sections has no hint
 # Smallest similarity of a misspelt key to a key of its section: if another section has the key as it is, and if not.
-_SIMILARITY_RATIO, _SIMILARITY_RATIO_OF_UNKNOWN = 0.8, 0.6
+_KNOWN_KEY_SIMILARITY_RATIO, _UNKNOWN_KEY_SIMILARITY_RATIO = 0.8, 0.6
 
 
 @cache
@@ -238,7 +238,7 @@ def nearest_keys(path: str) -> str:
     candidates = [key for key in all_keys() if key.startswith(prefix) and key.endswith(f".{missing}")]
     if not (candidates or section):  # without a known section, any section may have the last key
         candidates = [key for key in all_keys() if key.rpartition(".")[2] == missing.rpartition(".")[2]]
-    if 0 < len(candidates) <= _MAX_HINT_PATHS:
+    if 0 < len(candidates) <= _MAX_HINT_PATH_COUNT:
         nearest_first = sorted(candidates, key=lambda candidate: -SequenceMatcher(None, path, candidate).ratio())
         return f"Did you mean {' or '.join(map(repr, nearest_first))}?"
     if section or _is_known((_names(path) or [""])[-1]):
@@ -250,15 +250,15 @@ def section_hint(path: str, near: str) -> str:
     """Hint at the sections that have the last key of a path; `near` is the hint at a key with a similar name.
 
     The hint is `near` if the key resembles a key of its own section, or if no section has it. The hint names the
-    sections that share most of the path, and is empty if they are more than `_MAX_HINT_PATHS`.
+    sections that share most of the path, and is empty if they are more than `_MAX_HINT_PATH_COUNT`.
     """
     *above, name = _names(path[:_MAX_PATH_CHARACTERS]) or [""]
     sections = [key.split(".")[:-1] for key in all_keys() if key.rpartition(".")[2] == name]
-    if not sections or above in sections or get_close_matches(name, _keys_of(above), 1, _SIMILARITY_RATIO):
+    if not sections or above in sections or get_close_matches(name, _keys_of(above), 1, _KNOWN_KEY_SIMILARITY_RATIO):
         return near
     shared = [_shared(section, above) for section in sections]
     nearest = [section for section, length in zip(sections, shared, strict=True) if length == max(shared)]
-    if len(nearest) > _MAX_HINT_PATHS:
+    if len(nearest) > _MAX_HINT_PATH_COUNT:
         return ""
     *first, last = [repr(".".join(section)) if section else "the file itself" for section in nearest]
     return f"{name!r} is a key of {', '.join(first)}{' and ' * bool(first)}{last}"
@@ -296,7 +296,7 @@ def _spelt_right(parts: Sequence[str]) -> str:
             meant.append(part)
             continue
         keys = _keys_of(section)
-        smallest_ratio = _SIMILARITY_RATIO if _is_known(part) else _SIMILARITY_RATIO_OF_UNKNOWN
+        smallest_ratio = _KNOWN_KEY_SIMILARITY_RATIO if _is_known(part) else _UNKNOWN_KEY_SIMILARITY_RATIO
         near = [part] if part in keys else get_close_matches(part, keys, 1, smallest_ratio)
         if not near:
             return ""
@@ -314,7 +314,7 @@ def _shared(names: list[str], other_names: list[str]) -> int:
 
 
 # ---------------------------------------------------------------------- keys of errors
-_ERRORS = (
+_ERROR_KEYS = (
     *("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors"),
     *("oscillator", "synchronization"),
 )
@@ -328,7 +328,7 @@ ACCEPTED_ERRORS = (
 def is_error(key: str) -> bool:
     """Whether a key is the size of an error: in a section of errors, and no interval, frequency or the like."""
     parts = parts_of(key)
-    return any(part in _ERRORS for part in parts[:3]) and parts[-1] not in _NO_SIZES
+    return any(part in _ERROR_KEYS for part in parts[:3]) and parts[-1] not in _NO_SIZES
 
 
 def name_of_error(key: str) -> str:

@@ -6,7 +6,7 @@ from datetime import date
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget import units
-from bisar_budget.constants import GATING_MODELS, SPEED_OF_LIGHT
+from bisar_budget.constants import GATING_MODELS, SPEED_OF_LIGHT_MPS
 from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, changes_words, shown, upwards
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization, TakenFigure
@@ -16,11 +16,11 @@ from bisar_budget.mission.readers import (
     COORDINATE,
     DIRECTION,
     DURATION,
-    FREQUENCY,
     HEIGHT,
     LATITUDE,
     PHASE,
     PHASE_REQUIREMENT,
+    RADAR_FREQUENCY,
     RANGE,
     SHARE,
     SIDELOBE_REQUIREMENT,
@@ -64,8 +64,8 @@ class Document(NamedTuple):
 class Radar(NamedTuple):
     """The waveform."""
 
-    center_frequency: Annotated[float, Key(FREQUENCY, "Centre of the band; every phase uses it.")]
-    bandwidth: Annotated[float, Key(FREQUENCY, "Width of the band, for the resolution.")]
+    center_frequency: Annotated[float, Key(RADAR_FREQUENCY, "Centre of the band; every phase uses it.")]
+    bandwidth: Annotated[float, Key(RADAR_FREQUENCY, "Width of the band, for the resolution.")]
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -79,7 +79,7 @@ class Radar(NamedTuple):
     @property
     def wavelength(self) -> float:
         """Wavelength at the centre frequency. [m]"""
-        return SPEED_OF_LIGHT / self.center_frequency
+        return SPEED_OF_LIGHT_MPS / self.center_frequency
 
 
 class Collection(NamedTuple):
@@ -303,7 +303,7 @@ def _noise_cut_off(values: Mapping[str, Any]) -> Iterator[Problem]:
             )
 
 
-WHOLE = 1e-6  # largest difference of a sum of shares from 1
+SHARE_SUM_TOLERANCE_FRACTION = 1e-6  # largest difference of a sum of shares from 1
 
 
 class Shares(NamedTuple):
@@ -332,7 +332,7 @@ class Shares(NamedTuple):
         if not values.keys() >= set(Shares._fields):
             return
         total = sum(values[name] or 0.0 for name in Shares._fields)
-        if abs(total - 1) > WHOLE:
+        if abs(total - 1) > SHARE_SUM_TOLERANCE_FRACTION:
             yield Problem(f"shares must sum to 1, these sum to {total:.9g}")
 
 

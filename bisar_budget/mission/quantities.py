@@ -22,7 +22,7 @@ from bisar_budget.mission.changes import (
     next_name,
     parts_of,
 )
-from bisar_budget.mission.covariance import KINDS, Covariance, error_index
+from bisar_budget.mission.covariance import MOTION_KINDS, Covariance, error_index
 from bisar_budget.mission.instruments import IMU_KINDS, POWERS, Imu, LeverArm
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import MISSION, Mission, Simulation
@@ -44,7 +44,7 @@ from bisar_budget.mission.tree import Tree, read_tree
 from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.units import Dimension, parse_quantity
 
-DIGITS = 8  # of values in answers: both sides of a crossing stay within 1e-6
+ANSWER_DIGITS = 8  # of values in answers: both sides of a crossing stay within 1e-6
 _DECADE_RATIO = 10.0
 FACTOR = Quantity(units.RATIO, gt=0, ge=1e-12, le=1e12)
 
@@ -95,13 +95,13 @@ class Number(NamedTuple):
         return self.dimension.scales.get(self.unit) or (1.0, 1.0)
 
     def text(self, value: float, *, is_up: bool | None = None) -> str:
-        """Text of a value in the number's unit with `DIGITS` digits, rounded up, down, or (None) to the nearest."""
+        """Value in the number's unit with `ANSWER_DIGITS` digits, rounded up, down, or (None) to the nearest."""
         factor, divisor = self.scale
         number = value / factor * divisor
         if is_up is not None:
-            context = Context(prec=DIGITS, rounding=ROUND_CEILING if is_up else ROUND_FLOOR)
+            context = Context(prec=ANSWER_DIGITS, rounding=ROUND_CEILING if is_up else ROUND_FLOOR)
             number = float(context.create_decimal(repr(number)))
-        return f"{number:.{DIGITS}g}{' ' if self.unit else ''}{self.unit}"
+        return f"{number:.{ANSWER_DIGITS}g}{' ' if self.unit else ''}{self.unit}"
 
     def said_like(self, between: str | None) -> "Number":
         """The number in the unit of a range's upper end, if the file has no value whose unit could be used."""
@@ -308,7 +308,7 @@ def range_of(number: Number, between: str | None) -> Range:
 
 # ---------------------------------------------------------------- numbers of a mission
 # Sections that a file may omit, and keys whose scalar holds for each of three axes.
-_SECTIONS: Mapping[str, Callable[[], Any]] = {
+_OMITTED_SECTIONS: Mapping[str, Callable[[], Any]] = {
     "imu": Imu,
     "lever_arm": LeverArm,
     "common_motion_error": CommonMotionError,
@@ -316,7 +316,7 @@ _SECTIONS: Mapping[str, Callable[[], Any]] = {
 }
 _TRIPLES = ("position", "velocity", "acceleration", *IMU_KINDS, "uncertainty")
 # Curves of an oscillator, with the dimension of their abscissas, which name the points.
-_CURVES: Mapping[str, Dimension] = {
+_CURVE_ABSCISSAS: Mapping[str, Dimension] = {
     "phase_noise": units.FREQUENCY,
     "spurs": units.FREQUENCY,
     "allan_deviation": units.TIME,
@@ -340,12 +340,12 @@ def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
     if name.isdigit():
         index = int(name)
         return (*value[:index], _with_value(value[index], remaining, number), *value[index + 1 :])
-    if name in _CURVES:
+    if name in _CURVE_ABSCISSAS:
         return value._replace(**{name: _with_point(getattr(value, name), name, ".".join(remaining), number)})
     name = POWERS.get(name, name)
     below = getattr(value, name)
     if below is None and remaining:
-        below = _SECTIONS[name]()
+        below = _OMITTED_SECTIONS[name]()
     if below is None and name in _TRIPLES:
         below = ()
     return value._replace(**{name: _with_value(below, remaining, number)})
@@ -355,15 +355,15 @@ def _with_point(curve: Any, name: str, point: str, number: Any) -> Any:
     """A curve with another ordinate at the point that a text names."""
     if isinstance(curve, Spectrum):
         return curve._replace(points=_with_point(curve.points, name, point, number))
-    here = parse_quantity(point, _CURVES[name])
+    here = parse_quantity(point, _CURVE_ABSCISSAS[name])
     return tuple((at, number if at == here else ordinate) for at, ordinate in curve)
 
 
 def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> Covariance:
     """A covariance with another sigma of one axis or of all axes, or with another correlation of a pair."""
     kind, *remaining = parts
-    if kind in KINDS:
-        first = 3 * KINDS.index(kind)
+    if kind in MOTION_KINDS:
+        first = 3 * MOTION_KINDS.index(kind)
         changed_indices = [first + int(axis) for axis in remaining] or range(first, first + 3)
         sigmas = tuple(number if index in changed_indices else sigma for index, sigma in enumerate(covariance.sigmas))
         return covariance._replace(sigmas=sigmas)
@@ -392,7 +392,7 @@ def _value_below(value: Any, parts: Sequence[str]) -> Any:
     name, *remaining = parts
     if name.isdigit():
         return _value_below(value[int(name)], remaining) if int(name) < len(value) else None
-    if name in _CURVES:
+    if name in _CURVE_ABSCISSAS:
         return _point(getattr(value, name), name, ".".join(remaining))
     if isinstance(value, MotionError) and name in ("position", "velocity", "acceleration"):
         return _value_below(value.stated(name), remaining)
@@ -402,14 +402,14 @@ def _value_below(value: Any, parts: Sequence[str]) -> Any:
 def _point(curve: Any, name: str, point: str) -> Any:
     """Ordinate of a curve at the point that a text names; None if the curve has no such point."""
     points = curve.points if isinstance(curve, Spectrum) else curve or ()
-    here = parse_quantity(point, _CURVES[name])
+    here = parse_quantity(point, _CURVE_ABSCISSAS[name])
     return next((ordinate for at, ordinate in points if at == here), None)
 
 
 def _element(covariance: Covariance, parts: Sequence[str]) -> Any:
     """Sigma of an axis, or the three sigmas, of a covariance; None for a correlation."""
     kind, *axis = parts
-    if kind not in KINDS:
+    if kind not in MOTION_KINDS:
         return None  # a correlation is no size
     return covariance.of(kind)[int(axis[0])] if axis else covariance.of(kind)
 

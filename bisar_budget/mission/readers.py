@@ -22,11 +22,11 @@ Report = Callable[[KeyPath, Problem], None]
 
 _POINT = "A decimal is written with a point, a comma separates"
 _MAX_TEXT_CHARACTERS = 500
-_MAX_ENTRIES = 1000  # of a list of sections
+_MAX_ENTRY_COUNT = 1000  # of a list of sections
 _MAX_POINTS = 100  # of a curve
-_MAX_NAMES = 8  # of a list of names; a platform has no more parts
-_MAX_IDS = 4000  # of a mapping by row ids; the longest lists make fewer rows
-_MAX_WILDCARDS = 20  # of a pattern; an id has four parts, and fifty wildcards take a second
+_MAX_NAME_COUNT = 8  # of a list of names; a platform has no more parts
+_MAX_ID_COUNT = 4000  # of a mapping by row ids; the longest lists make fewer rows
+_MAX_WILDCARD_COUNT = 20  # of a pattern; an id has four parts, and fifty wildcards take a second
 # Controls, line separators, lone surrogates, byte order mark, and the marks that turn the reading direction.
 _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\u202a-\u202e\u2066-\u2069]")
 
@@ -264,10 +264,10 @@ class Glob(Text):
     """An id, or a pattern of ids with `*`, `?` and `[...]`."""
 
     def leaf(self, value: Any) -> str:
-        """Refuse a pattern with more than `_MAX_WILDCARDS` wildcards, which takes long to match."""
+        """Refuse a pattern with more than `_MAX_WILDCARD_COUNT` wildcards, which takes long to match."""
         pattern = super().leaf(value)
-        if sum(map(pattern.count, "*?[")) > _MAX_WILDCARDS:
-            raise InvalidValueError(f"must have at most {_MAX_WILDCARDS} wildcards")
+        if sum(map(pattern.count, "*?[")) > _MAX_WILDCARD_COUNT:
+            raise InvalidValueError(f"must have at most {_MAX_WILDCARD_COUNT} wildcards")
         return pattern
 
 
@@ -338,14 +338,14 @@ class Words(Reader):
 
 
 class TextList(Words):
-    """A list of 1 to `_MAX_NAMES` names of parts, each at most once."""
+    """A list of 1 to `_MAX_NAME_COUNT` names of parts, each at most once."""
 
     is_word = True
 
     def __init__(self) -> None:
         self.word = Reference()
-        self.problem = Problem(f"must be a list of 1 to {_MAX_NAMES} names")
-        self.fewest, self.most = 1, _MAX_NAMES
+        self.problem = Problem(f"must be a list of 1 to {_MAX_NAME_COUNT} names")
+        self.fewest, self.most = 1, _MAX_NAME_COUNT
 
     def below(self, part: str) -> Reader | None:
         """Reader of one name."""
@@ -414,12 +414,12 @@ class Day(Reader):
 def _is_few(
     value: Any, kind: type[Sized] | tuple[type[Sized], ...], kind_problem: str, path: KeyPath, report: Report
 ) -> bool:
-    """Whether a value is of a kind and has at most `_MAX_IDS` entries; reports the problem if not."""
+    """Whether a value is of a kind and has at most `_MAX_ID_COUNT` entries; reports the problem if not."""
     if not isinstance(value, kind):
         report(path, Problem(kind_problem))
         return False
-    if len(value) > _MAX_IDS:
-        report(path, Problem(f"must have at most {_MAX_IDS} entries, has {len(value)}"))
+    if len(value) > _MAX_ID_COUNT:
+        report(path, Problem(f"must have at most {_MAX_ID_COUNT} entries, has {len(value)}"))
         return False
     return True
 
@@ -439,7 +439,7 @@ class TextMap(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """JSON Schema: object."""
-        return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_IDS}
+        return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_ID_COUNT}
 
 
 class SizeMap(Reader):
@@ -457,7 +457,7 @@ class SizeMap(Reader):
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """JSON Schema: object of quantities."""
         size = {"type": ["string", "number"]}
-        return {"type": "object", "additionalProperties": size, "maxProperties": _MAX_IDS}
+        return {"type": "object", "additionalProperties": size, "maxProperties": _MAX_ID_COUNT}
 
 
 _WEIGHT = Quantity(units.RATIO, gt=0, ge=1e-6, le=1e6)
@@ -484,8 +484,8 @@ class Weights(Reader):
         label, weight = Text().schema(definitions), _WEIGHT.schema(definitions)
         return {
             "anyOf": [
-                {"type": "object", "additionalProperties": weight, "maxProperties": _MAX_IDS},
-                {"type": "array", "items": label, "maxItems": _MAX_IDS},
+                {"type": "object", "additionalProperties": weight, "maxProperties": _MAX_ID_COUNT},
+                {"type": "array", "items": label, "maxItems": _MAX_ID_COUNT},
             ]
         }
 
@@ -599,8 +599,8 @@ class ListOf(Reader):
         if not isinstance(value, list):
             report(path, Problem("must be a list"))
             return INVALID
-        if len(value) > _MAX_ENTRIES:
-            report(path, Problem(f"must have at most {_MAX_ENTRIES} entries, has {len(value)}"))
+        if len(value) > _MAX_ENTRY_COUNT:
+            report(path, Problem(f"must have at most {_MAX_ENTRY_COUNT} entries, has {len(value)}"))
             return INVALID
         entries = tuple([read_part(self.section, entry, (*path, index), report) for index, entry in enumerate(value)])
         return INVALID if INVALID in entries else entries
@@ -611,7 +611,7 @@ class ListOf(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """JSON Schema: array of the section."""
-        return {"type": "array", "items": self.section.schema(definitions), "maxItems": _MAX_ENTRIES}
+        return {"type": "array", "items": self.section.schema(definitions), "maxItems": _MAX_ENTRY_COUNT}
 
 
 class OneOf(Reader):
@@ -719,17 +719,17 @@ def did_you_mean(word: object, known_words: tuple[str, ...]) -> str:
 
 # ---------------------------------------------------------------------- bounds
 # Real values stay far inside these bounds, and squares stay finite.
-FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
+RADAR_FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
 VIBRATION_FREQUENCY = Quantity(units.FREQUENCY, gt=0, le=1e9)
 DURATION = Quantity(units.TIME, gt=0, ge=1e-6, le=1e6)
 COORDINATE = Quantity(units.LENGTH, ge=-1e9, le=1e9)
 RANGE = Quantity(units.LENGTH, gt=0, le=1e9)
 SIZE = Quantity(units.LENGTH, ge=0, le=1e9)
 VELOCITY = Quantity(units.SPEED, ge=-1e6, le=1e6)
-SPEED = Quantity(units.SPEED, ge=0, le=1e6)
-ACCELERATION = Quantity(units.ACCELERATION, ge=-1e6, le=1e6)
-JERK = Quantity(units.JERK, ge=-1e6, le=1e6)
-SNAP = Quantity(units.SNAP, ge=-1e6, le=1e6)
+GROUND_SPEED = Quantity(units.SPEED, ge=0, le=1e6)
+ACCELERATION_COMPONENT = Quantity(units.ACCELERATION, ge=-1e6, le=1e6)
+JERK_COMPONENT = Quantity(units.JERK, ge=-1e6, le=1e6)
+SNAP_COMPONENT = Quantity(units.SNAP, ge=-1e6, le=1e6)
 DIRECTION = Quantity(units.ANGLE, ge=-2 * math.pi, le=2 * math.pi)
 LATITUDE = Quantity(units.ANGLE, ge=-math.pi / 2, le=math.pi / 2)
 HEIGHT = Quantity(units.LENGTH, ge=-1e4, le=1e9)
@@ -740,5 +740,5 @@ PHASE_REQUIREMENT = Quantity(units.ANGLE, gt=0, ge=1e-6, le=2 * math.pi)
 SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
 SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)
 DISTRIBUTION = Choice("normal", "uniform", "bound")
-DISTRIBUTIONS = "normal: the values are one sigma; uniform, bound: they are not exceeded."
+DISTRIBUTION_TEXT = "normal: the values are one sigma; uniform, bound: they are not exceeded."
 Source = Annotated[str | None, Key(Text(), "Source of the values; shown as evidence.")]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.geometry import Vector
-from bisar_budget.paths.earth import ROTATION_RATE, Floats
+from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S, Floats
 from bisar_budget.paths.instant import Instant, utc
 
 Matrix = tuple[tuple[float, ...], ...]
@@ -175,7 +175,7 @@ def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: t
     last = min(instant.after(_VELOCITY_STEP_S), span[1])
     position_before, position, position_after = (np.array(position_at(time)) for time in (first, instant, last))
     velocity = (position_after - position_before) / last.since(first)
-    against_stars = velocity + np.cross((0.0, 0.0, ROTATION_RATE), position)
+    against_stars = velocity + np.cross((0.0, 0.0, ROTATION_RATE_RAD_PER_S), position)
     (x, y, z), (u, v, w) = position.tolist(), against_stars.tolist()
     return OrbitState((x, y, z), (u, v, w))
 
@@ -183,7 +183,7 @@ def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: t
 def _turning(sign: float) -> Floats:
     """Matrix (6, 6) that adds the Earth's rotation to velocities (sign 1), or removes it (sign -1)."""
     matrix = np.eye(6)
-    matrix[3:, :3] = sign * ROTATION_RATE * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    matrix[3:, :3] = sign * ROTATION_RATE_RAD_PER_S * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     return matrix
 
 

@@ -10,16 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
+from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2, EARTH_RADIUS_M
 from bisar_budget.geometry import Axes, Vector, cross, dot, unit
 
 Floats = NDArray[np.float64]
 
 # NGA.STND.0036, table 3.1
 EQUATORIAL_RADIUS_M = 6378137.0  # m
-FLATTENING = 1 / 298.257223563
-ROTATION_RATE = 7.292115e-5  # rad/s
-_ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
+FLATTENING_RATIO = 1 / 298.257223563
+ROTATION_RATE_RAD_PER_S = 7.292115e-5
+_SQUARED_ECCENTRICITY_RATIO = FLATTENING_RATIO * (2 - FLATTENING_RATIO)
 _RUNGE_KUTTA_STEPS = 4
 _MAX_CHANGE_RAD = 1e-15  # a metre on the ground is 1.6e-7
 
@@ -76,7 +76,7 @@ class SceneAxes:
         """
         r = self.earth_fixed(position)
         x, y, z = self.turned_back(velocity)
-        against_stars = (x - ROTATION_RATE * r[1], y + ROTATION_RATE * r[0], z)
+        against_stars = (x - ROTATION_RATE_RAD_PER_S * r[1], y + ROTATION_RATE_RAD_PER_S * r[0], z)
         radial = unit(r)
         across = unit(cross(r, against_stars))
         return self.turned(radial), self.turned(cross(across, radial)), self.turned(across)
@@ -100,19 +100,19 @@ def free_fall(position: Vector, velocity: Vector, axes: SceneAxes | None) -> Vec
     """
     if axes is None:
         x, y, up = position
-        z = up + EARTH_RADIUS
-        factor = -EARTH_GRAVITATIONAL_PARAMETER / (x * x + y * y + z * z) ** 1.5
+        z = up + EARTH_RADIUS_M
+        factor = -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / (x * x + y * y + z * z) ** 1.5
         return (factor * x, factor * y, factor * z)
     x, y, z = axes.earth_fixed(position)
     u, v, _ = axes.turned_back(velocity)
     square = x * x + y * y + z * z
-    factor = -EARTH_GRAVITATIONAL_PARAMETER / square**1.5
+    factor = -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / square**1.5
     flat, polar = 1.5 * J2_FACTOR * EQUATORIAL_RADIUS_M**2 / square, z * z / square
-    level = factor * (1 + flat * (1 - 5 * polar)) + ROTATION_RATE**2
+    level = factor * (1 + flat * (1 - 5 * polar)) + ROTATION_RATE_RAD_PER_S**2
     return axes.turned(
         (
-            level * x + 2 * ROTATION_RATE * v,
-            level * y - 2 * ROTATION_RATE * u,
+            level * x + 2 * ROTATION_RATE_RAD_PER_S * v,
+            level * y - 2 * ROTATION_RATE_RAD_PER_S * u,
             factor * (1 + flat * (3 - 5 * polar)) * z,
         )
     )
@@ -123,7 +123,7 @@ def earth_fixed_places(latitude: Any, longitude: Any, height: Any) -> Floats:
     sine, cosine = np.sin(latitude), np.cos(latitude)
     _, normal = curvature_radii(sine)
     level = (normal + height) * cosine
-    polar = (normal * (1 - _ECCENTRICITY_SQUARED) + height) * sine
+    polar = (normal * (1 - _SQUARED_ECCENTRICITY_RATIO) + height) * sine
     return np.stack([level * np.cos(longitude), level * np.sin(longitude), polar], axis=-1)
 
 
@@ -140,8 +140,8 @@ def _vector(coordinates: Floats) -> Vector:
 
 def curvature_radii(sine: Any) -> tuple[Any, Any]:
     """Radii of curvature along the meridian and across it, by the sine of the latitude. [m]"""
-    across = EQUATORIAL_RADIUS_M / np.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
-    return across**3 * (1 - _ECCENTRICITY_SQUARED) / EQUATORIAL_RADIUS_M**2, across
+    across = EQUATORIAL_RADIUS_M / np.sqrt(1 - _SQUARED_ECCENTRICITY_RATIO * sine * sine)
+    return across**3 * (1 - _SQUARED_ECCENTRICITY_RATIO) / EQUATORIAL_RADIUS_M**2, across
 
 
 def geodetic_places(points: Floats) -> tuple[Any, Any, Any]:
@@ -152,19 +152,21 @@ def geodetic_places(points: Floats) -> tuple[Any, Any, Any]:
     x, y, z = np.moveaxis(points, -1, 0)
     level = np.hypot(x, y)
     with np.errstate(divide="ignore", invalid="ignore"):
-        tangent = np.where(level > 0, z / (level * (1 - FLATTENING)), np.copysign(np.inf, z))
+        tangent = np.where(level > 0, z / (level * (1 - FLATTENING_RATIO)), np.copysign(np.inf, z))
     latitude = np.arctan2(z, level)
     for _ in range(10):
         reduced = np.arctan(tangent)
-        up = z + _ECCENTRICITY_SQUARED / (1 - FLATTENING) * EQUATORIAL_RADIUS_M * np.sin(reduced) ** 3
-        out = level - _ECCENTRICITY_SQUARED * EQUATORIAL_RADIUS_M * np.cos(reduced) ** 3
+        up = z + _SQUARED_ECCENTRICITY_RATIO / (1 - FLATTENING_RATIO) * EQUATORIAL_RADIUS_M * np.sin(reduced) ** 3
+        out = level - _SQUARED_ECCENTRICITY_RATIO * EQUATORIAL_RADIUS_M * np.cos(reduced) ** 3
         previous, latitude = latitude, np.arctan2(up, out)
         if np.max(np.abs(latitude - previous)) < _MAX_CHANGE_RAD:
             break
-        tangent = (1 - FLATTENING) * np.tan(latitude)
+        tangent = (1 - FLATTENING_RATIO) * np.tan(latitude)
     sine = np.sin(latitude)
     height = (
-        level * np.cos(latitude) + z * sine - EQUATORIAL_RADIUS_M * np.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
+        level * np.cos(latitude)
+        + z * sine
+        - EQUATORIAL_RADIUS_M * np.sqrt(1 - _SQUARED_ECCENTRICITY_RATIO * sine * sine)
     )
     return latitude, np.arctan2(y, x), height
 

@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, fault_words, shown
-from bisar_budget.paths.accuracy_columns import ACCEPTED, BESIDE, UNCLEAR, meaning_of
+from bisar_budget.paths.accuracy_columns import ACCEPTED_ACCURACIES, CROSS_COVARIANCE, UNCLEAR, meaning_of
 from bisar_budget.paths.earth import Floats, Geodetic, axes_at, earth_fixed_places, geodetic_places
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
-from bisar_budget.paths.instant import DAY, GPS_EPOCH_DAY, SCALES, WEEK_S, Instant, parse_instant
+from bisar_budget.paths.instant import DAY_S, GPS_EPOCH_DAY, SCALES, WEEK_S, Instant, parse_instant
 from bisar_budget.paths.log_places import (
     NO_KEYS,
     LogKeys,
@@ -56,19 +56,21 @@ _CHUNK_LINES = 1 << 16  # lines that are text and numbers at once
 _FARTHEST_M = 1e9  # of a place; beyond the Moon
 _LATEST_S = 1e11  # of a time; 3000 years, so that Unix time is one
 _DEEPEST_M = 6.2e6  # m from the Earth's centre; the poles are at 6.357e6
-_RIGHT_ANGLE = math.pi / 2 * (1 + 1e-12)  # 90 deg, rounded
+_MAX_LATITUDE_RAD = math.pi / 2 * (1 + 1e-12)  # 90 deg, rounded
 _GEODETIC = ("latitude", "longitude", "height")
-_KINDS = (_GEODETIC, ("x", "y", "z"), ("east", "north", "up"))
+_POSITION_COLUMNS = (_GEODETIC, ("x", "y", "z"), ("east", "north", "up"))
 _STAMPS = {"utc": "utc", "gpst": "gps", "gps": "gps", "tai": "tai"}  # names of columns, or units of a time
 _SPARE = ("altitude", "geoid_separation")
-_LEVEL = ("horizontal_accuracy", "vertical_accuracy")
+_LEVEL_ACCURACIES = ("horizontal_accuracy", "vertical_accuracy")
 _TOTAL = "position_accuracy"  # without a direction: along any axis
-_SIGMAS = tuple(tuple(f"sigma_{axis}" for axis in kind) for kind in (_KINDS[2], _KINDS[1]))
+_SIGMA_COLUMNS = tuple(
+    tuple(f"sigma_{axis}" for axis in kind) for kind in (_POSITION_COLUMNS[2], _POSITION_COLUMNS[1])
+)
 _VARIANCE = "variance_"
 _NOT_GIVEN = frozenset(("", "nan", "n/a", "na", "null", "none", "-", "--"))
 _NO_NUMBER = -math.inf  # of a cell of an accuracy that cannot be read
-_DIMENSIONS = {"latitude": units.ANGLE, "longitude": units.ANGLE, "time": units.TIME}
-_HEADER = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?")
+_COLUMN_DIMENSIONS = {"latitude": units.ANGLE, "longitude": units.ANGLE, "time": units.TIME}
+_COLUMN_HEADER_PATTERN = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?")
 _QUOTED = re.compile('"').search
 _IN_NUMBERS = b"0123456789+-.eE \t"
 _SECOND = r"(?:[0-5]\d(?:[.,]\d{1,12})?|60(?:[.,]0{1,12})?)"  # 60.00 is what 59.996 is rounded to
@@ -76,7 +78,7 @@ _ZONED = re.compile(_SECOND + r"(?:Z|\+00:?00)", re.ASCII).fullmatch
 _BARE = re.compile(_SECOND, re.ASCII).fullmatch
 _EITHER = re.compile(_SECOND + r"(?:Z|\+00:?00)?", re.ASCII).fullmatch
 _DATUM = re.compile(r"#\W*(?:geodetic )?(?:datum|crs|reference (?:frame|system))\s*[:=]\s*(\S.*)", re.IGNORECASE)
-_LEAST_SEARCHED = 64  # rows that are looked at one by one
+_MAX_SCANNED_ROWS = 64  # looked at one by one
 _EXAMPLE = "2026-06-01T05:20:31.250Z"
 _CLOCKS_APART_S = 1.0  # of an exporter's two clocks, beyond the second to which one is written
 
@@ -136,7 +138,7 @@ class _Header:
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the three coordinates."""
-        return next((kind for kind in _KINDS if kind[1] in self.names), _GEODETIC)
+        return next((kind for kind in _POSITION_COLUMNS if kind[1] in self.names), _GEODETIC)
 
     def place(self, name: str) -> int | None:
         """Place of a column in a table; None where there is none."""
@@ -161,7 +163,7 @@ def is_csv(data: bytes) -> bool:
     line = next(filter(_is_said, _dataflash_as_csv(head)), "")
     cells = line.split(max(",;\t", key=line.count))
     names = {_name_of(cell)[0] for cell in cells}
-    return _vendor_of(cells) is not None or any(names.issuperset(kind[:2]) for kind in _KINDS)
+    return _vendor_of(cells) is not None or any(names.issuperset(kind[:2]) for kind in _POSITION_COLUMNS)
 
 
 def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
@@ -179,7 +181,7 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
     places = _places(table, header, records, keys)
     words = header.vendor.words if header.vendor else f"CSV of {', '.join(header.axes)}"
     words += "" if keys.instance is None else f", instance {keys.instance}"
-    is_earth_fixed = header.axes != _KINDS[2]
+    is_earth_fixed = header.axes != _POSITION_COLUMNS[2]
     figures, figure_words = _figures(table, header, records)
     log = usable_log(
         records,
@@ -313,7 +315,7 @@ def _places(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) 
         column, raw = header.numbers[at], table.numbers[:, at]
         with np.errstate(over="ignore"):
             values = raw * column.scale
-        limit = {"latitude": _RIGHT_ANGLE, "longitude": 2 * math.pi * (1 + 1e-12)}.get(axis, _FARTHEST_M)
+        limit = {"latitude": _MAX_LATITUDE_RAD, "longitude": 2 * math.pi * (1 + 1e-12)}.get(axis, _FARTHEST_M)
         at_most = {"latitude": "90 deg", "longitude": "360 deg"}.get(axis, f"{_FARTHEST_M:g} m")
         records.leave_out(
             np.abs(values) > limit,
@@ -336,7 +338,7 @@ def _places(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) 
                 np.abs(separations) > 200, lambda i: f"geoid_separation {raw[i]:.10g} {column.unit} is beyond 200 m"
             )
         found[2] = from_sea_level(found[2], separations, keys, records.name)
-    if kind == _KINDS[1]:
+    if kind == _POSITION_COLUMNS[1]:
         radius = np.sqrt(sum(axis**2 for axis in found))
         records.leave_out(
             radius < _DEEPEST_M,
@@ -383,11 +385,11 @@ def _sigmas(figures: Mapping[str, Floats], header: _Header, places: Floats) -> F
     """
     local, fixed = (
         known_sigmas(np.column_stack([figures[name] for name in names])) if figures.keys() >= set(names) else None
-        for names in _SIGMAS
+        for names in _SIGMA_COLUMNS
     )
     if fixed is not None:
         fixed = _level_axes(filled_sigmas(fixed), header, places)
-    level = level_sigmas(*(figures.get(name) for name in _LEVEL))
+    level = level_sigmas(*(figures.get(name) for name in _LEVEL_ACCURACIES))
     total = level_sigmas(figures.get(_TOTAL), None)
     stated = [sigmas for sigmas in (local, fixed, level, total) if sigmas is not None]
     return None if not stated else known_sigmas(np.fmax.reduce(stated))
@@ -444,7 +446,7 @@ def _name_of(cell: str) -> tuple[str, str | None]:
 def _written_name(cell: str) -> tuple[str, str | None]:
     """The same in the letters of the file."""
     cell = cell.strip()
-    match = _HEADER.fullmatch(cell)
+    match = _COLUMN_HEADER_PATTERN.fullmatch(cell)
     name = (match[1] if match else re.split(r"[\[(]", cell)[0]).strip().strip('"')
     return name, match[2].strip() if match and match[2] is not None else None
 
@@ -462,13 +464,13 @@ def _accuracy_columns(
         column, unit = _written_name(cell)
         in_brackets = re.search(r"\(([^()]*)\)", cell)
         meaning, unit = meaning_of(column, unit or (in_brackets[1] if in_brackets else None))
-        is_beside |= meaning == BESIDE
+        is_beside |= meaning == CROSS_COVARIANCE
         if meaning == UNCLEAR:
             refuse(
                 f"{shown(column)} looks like an accuracy of the places, and is none that is read: name it as what it "
-                f"is, or leave it out where it is of something else; {ACCEPTED}"
+                f"is, or leave it out where it is of something else; {ACCEPTED_ACCURACIES}"
             )
-        if meaning in (None, BESIDE):
+        if meaning in (None, CROSS_COVARIANCE):
             continue
         if meaning in columns:
             refuse(f"has two columns of {meaning}")
@@ -477,15 +479,15 @@ def _accuracy_columns(
         columns[meaning] = _measured(column, index, unit, refuse, dimension)._replace(name=meaning)
     columns = _with_plain_heights(columns, refuse)
     stated = {name.replace(_VARIANCE, "sigma_") for name in columns}
-    for names in _SIGMAS:
+    for names in _SIGMA_COLUMNS:
         missing = [name for name in names if name not in stated]
         if 0 < len(missing) < len(names):
             has = next(name for name in names if name in stated)
             refuse(f"has {has} and no {missing[0]}; write all of {', '.join(names)}")
-    if is_beside and not stated.issuperset(_SIGMAS[0]):
-        refuse(f"has a covariance of two axes and no sigmas of them; {ACCEPTED}")
-    if kind == _KINDS[2] and _SIGMAS[1][0] in stated:
-        refuse(f"has {_SIGMAS[1][0]} beside east; write {', '.join(_SIGMAS[0])}")
+    if is_beside and not stated.issuperset(_SIGMA_COLUMNS[0]):
+        refuse(f"has a covariance of two axes and no sigmas of them; {ACCEPTED_ACCURACIES}")
+    if kind == _POSITION_COLUMNS[2] and _SIGMA_COLUMNS[1][0] in stated:
+        refuse(f"has {_SIGMA_COLUMNS[1][0]} beside east; write {', '.join(_SIGMA_COLUMNS[0])}")
     return tuple(columns.values())
 
 
@@ -494,13 +496,13 @@ def _with_plain_heights(columns: dict[str, _Column], refuse: Callable[[str], NoR
 
     The error of a height without those of east and north is a vertical one.
     """
-    level, vertical = _LEVEL
+    level, vertical = _LEVEL_ACCURACIES
     if "sigma_h" in columns:
         of_h = columns.pop("sigma_h")
         is_height = "sigma_east" in columns and "sigma_up" not in columns and vertical not in columns
         meaning = level if vertical in columns else "sigma_up" if is_height else ""
         if not meaning or meaning in columns:
-            refuse(f"has an error of h, which may be the height or horizontal; {ACCEPTED}")
+            refuse(f"has an error of h, which may be the height or horizontal; {ACCEPTED_ACCURACIES}")
         columns[meaning] = of_h._replace(name=meaning)
     is_alone = "sigma_up" in columns and "sigma_east" not in columns and "sigma_north" not in columns
     if is_alone and vertical not in columns and level in columns:
@@ -527,17 +529,17 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
     found: dict[str, tuple[int, str | None]] = {}
     for index, cell in enumerate(cells):
         column, unit = _name_of(cell)
-        if column not in ("time", *_STAMPS, *_SPARE, *(axis for kind in _KINDS for axis in kind)):
+        if column not in ("time", *_STAMPS, *_SPARE, *(axis for kind in _POSITION_COLUMNS for axis in kind)):
             continue
         if column in found:
             refuse(f"has two columns {column}")
         found[column] = (index, unit)
-    kinds = [kind for kind in _KINDS if any(axis in found for axis in kind)]
+    kinds = [kind for kind in _POSITION_COLUMNS if any(axis in found for axis in kind)]
     if not kinds:
         refuse("names no place; the first line names columns, like 'latitude [deg]', 'x [m]' or 'east [m]'")
     if len(kinds) > 1:
         one, other = (next(axis for axis in kind if axis in found) for kind in kinds[:2])
-        refuse(f"mixes {one} with {other}; places are {', or '.join(', '.join(kind) for kind in _KINDS)}")
+        refuse(f"mixes {one} with {other}; places are {', or '.join(', '.join(kind) for kind in _POSITION_COLUMNS)}")
     kind = kinds[0]
     if kind == _GEODETIC and "altitude" in found:
         if "height" in found:
@@ -608,7 +610,7 @@ def _vendor_header(
 
     # What somebody has added to an exporter's columns counts like that of a plain log.
     others = ["" if cell.strip().lower() in vendor.columns else cell for cell in cells]
-    level = {name: columns.pop(name) for name in _LEVEL if name in columns}
+    level = {name: columns.pop(name) for name in _LEVEL_ACCURACIES if name in columns}
     accuracy = _accuracy_columns(others, _GEODETIC, refuse, level)
     numbers = tuple(columns.values())
     return _Header(line, delimiter, len(cells), numbers, stamp, scale, _EITHER, vendor, accuracy)
@@ -626,7 +628,7 @@ def _measured(
     dimension: units.Dimension | None = None,
 ) -> _Column:
     """A column of numbers, whose unit is known and of the right dimension."""
-    dimension = dimension or _DIMENSIONS.get(name, units.LENGTH)
+    dimension = dimension or _COLUMN_DIMENSIONS.get(name, units.LENGTH)
     example = (
         "time [s]', 'time [UTC]' or 'time [GPST]" if dimension is units.TIME else f"{name} [{_usual(dimension)}]"
     )
@@ -680,7 +682,7 @@ def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name
         if instants is not None:
             rows.tables.append(_Table(lines, numbers, *instants))
             return
-    if len(texts) > _LEAST_SEARCHED:
+    if len(texts) > _MAX_SCANNED_ROWS:
         half = len(texts) // 2
         _read_rows(texts[:half], lines[:half], header, name, rows)
         _read_rows(texts[half:], lines[half:], header, name, rows)
@@ -780,7 +782,7 @@ def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None
 def _minute(text: str) -> float | None:
     """Seconds since MJD 0 of the beginning of a stamp, which is that of many rows; None if it is none."""
     instant = parse_instant(f"{text}00Z")
-    return None if instant is None else instant.day * DAY + instant.seconds
+    return None if instant is None else instant.day * DAY_S + instant.seconds
 
 
 def _usual(dimension: units.Dimension) -> str:
@@ -837,16 +839,19 @@ def _row_fault(text: str, header: _Header) -> str | None:
 # that Mission Planner and mavlogdump write, whose FMT rows name the columns. Alt is above mean sea level. Source:
 # ardupilot libraries/AP_GPS/LogStructure.h (LOG_STRUCTURE_FROM_GPS; a Status of 3 is a fix in three dimensions) and
 # AP_GPS.h (undulation), pymavlink/tools/mavlogdump.py.
-_DEGREE = math.pi / 180
+_DEGREE_RAD = math.pi / 180
 
 
 def _vendor(words: str, signs: str, least_fix: int = 0, **columns: _Column) -> _Vendor:
     return _Vendor(words, frozenset(signs.split()), columns, least_fix)
 
 
-_LATITUDE, _LONGITUDE = _Column("latitude", "deg", _DEGREE), _Column("longitude", "deg", _DEGREE)
+_LATITUDE_COLUMN, _LONGITUDE_COLUMN = (
+    _Column("latitude", "deg", _DEGREE_RAD),
+    _Column("longitude", "deg", _DEGREE_RAD),
+)
 _FIX = _Column("fix")
-_HORIZONTAL, _VERTICAL = (_Column(name, "m") for name in _LEVEL)
+_HORIZONTAL, _VERTICAL = (_Column(name, "m") for name in _LEVEL_ACCURACIES)
 _UNIX = _Column("unix", "us", 1e-6)
 _VENDORS = (
     _Vendor(
@@ -855,8 +860,8 @@ _VENDORS = (
         {
             "time(millisecond)": _Column("time", "ms", 1e-3),
             "datetime(utc)": _Column("utc"),
-            "latitude": _LATITUDE,
-            "longitude": _LONGITUDE,
+            "latitude": _LATITUDE_COLUMN,
+            "longitude": _LONGITUDE_COLUMN,
             "altitude_above_sealevel(feet)": _Column("altitude", "ft", 0.3048),
             "altitude_above_sealevel(meters)": _Column("altitude", "m"),
         },
@@ -866,8 +871,8 @@ _VENDORS = (
         "time_utc_usec lat lon fix_type",
         3,
         time_utc_usec=_UNIX,
-        lat=_Column("latitude", "1e-7 deg", 1e-7 * _DEGREE),
-        lon=_Column("longitude", "1e-7 deg", 1e-7 * _DEGREE),
+        lat=_Column("latitude", "1e-7 deg", 1e-7 * _DEGREE_RAD),
+        lon=_Column("longitude", "1e-7 deg", 1e-7 * _DEGREE_RAD),
         alt_ellipsoid=_Column("height", "mm", 1e-3),
         alt=_Column("altitude", "mm", 1e-3),
         fix_type=_FIX,
@@ -879,8 +884,8 @@ _VENDORS = (
         "time_utc_usec latitude_deg longitude_deg fix_type",
         3,
         time_utc_usec=_UNIX,
-        latitude_deg=_LATITUDE,
-        longitude_deg=_LONGITUDE,
+        latitude_deg=_LATITUDE_COLUMN,
+        longitude_deg=_LONGITUDE_COLUMN,
         altitude_ellipsoid_m=_Column("height", "m"),
         altitude_msl_m=_Column("altitude", "m"),
         fix_type=_FIX,
@@ -893,8 +898,8 @@ _VENDORS = (
         1,
         lat_lon_valid=_FIX,
         timestamp=_Column("time", "us", 1e-6),
-        lat=_LATITUDE,
-        lon=_LONGITUDE,
+        lat=_LATITUDE_COLUMN,
+        lon=_LONGITUDE_COLUMN,
         alt_ellipsoid=_Column("height", "m"),
         alt=_Column("altitude", "m"),
         eph=_HORIZONTAL,
@@ -906,8 +911,8 @@ _VENDORS = (
         3,
         gwk=_Column("week"),
         gms=_Column("time", "ms", 1e-3),
-        lat=_LATITUDE,
-        lng=_LONGITUDE,
+        lat=_LATITUDE_COLUMN,
+        lng=_LONGITUDE_COLUMN,
         alt=_Column("altitude", "m"),
         status=_FIX,
         i=_Column("receiver"),

@@ -30,7 +30,7 @@ from bisar_budget.extras import install_command
 from bisar_budget.faults import shown
 from bisar_budget.paths.earth import EQUATORIAL_RADIUS_M, Floats
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
-from bisar_budget.paths.instant import DAY, Instant, parse_instant
+from bisar_budget.paths.instant import DAY_S, Instant, parse_instant
 from bisar_budget.paths.log_places import (
     LogKeys,
     LogRecords,
@@ -44,18 +44,18 @@ from bisar_budget.paths.log_places import (
 from bisar_budget.paths.messages import number_in
 from bisar_budget.units import format_quantity
 
-LARGEST = 200_000_000  # bytes; ten hours at 10 Hz of eight sentences
-_LONGEST = 256  # characters of a sentence; the standard has 82
+MAX_NMEA_BYTES = 200_000_000  # ten hours at 10 Hz of eight sentences
+_MAX_SENTENCE_CHARACTERS = 256  # the standard has 82
 _SENTENCE = re.compile(r"\$[A-Z]{2}(?:GGA|GNS|RMC|ZDA|GST|DTM),", re.ASCII)
 _ANYWHERE = re.compile(rb"\$[A-Z]{2}(?:GGA|GNS|RMC|ZDA),[^\r\n$]{0,250}\*[0-9A-Fa-f]{2}")
-_CLOCK = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d{1,9})?|60(?:\.0{1,9})?)", re.ASCII)
-_ANGLE = re.compile(r"(\d{1,3})([0-5]\d(?:\.\d{1,12})?)", re.ASCII)
-_NUMBER = re.compile(r"[+-]?\d{1,9}(?:\.\d{0,12})?", re.ASCII)
+_UTC_TIME_PATTERN = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d{1,9})?|60(?:\.0{1,9})?)", re.ASCII)
+_ANGLE_PATTERN = re.compile(r"(\d{1,3})([0-5]\d(?:\.\d{1,12})?)", re.ASCII)
+_HEIGHT_PATTERN = re.compile(r"[+-]?\d{1,9}(?:\.\d{0,12})?", re.ASCII)
 _TIME_STEP_S = 1e-4  # less than between two fixes, more than a rounding of days
 _SAME_PLACE_M = 0.5  # of two sentences; four decimals of a minute are 0.2 m on each axis
-_KINDS = ("GGA", "GNS")  # of sentences with a place
+_FIX_SENTENCES = ("GGA", "GNS")  # kinds with a position
 _DATES = ("RMC", "ZDA")
-_BESIDE = ("GST", "DTM")  # of sentences beside fixes; there may be one for each
+_COMPANION_SENTENCES = ("GST", "DTM")  # kinds that come with a fix, at most one each
 _CHECKED = re.compile(r"\$([^*]+)\*([0-9A-Fa-f]{2})", re.ASCII)
 _REFERENCES = ("W84", "")  # of DTM; an offset from another datum is none from WGS-84
 _GST_REACH_S = 5.0  # from a fix to a GST that speaks for it; receivers write one a second, or fewer than fixes
@@ -158,16 +158,16 @@ def is_nmea(data: bytes) -> bool:
 
 
 def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read a log of NMEA 0183 of at most `LARGEST` bytes, as every reader of `LOG_FORMATS` does; needs pynmea2.
+    """Read a log of NMEA 0183 of at most `MAX_NMEA_BYTES`, as every reader of `LOG_FORMATS` does; needs pynmea2.
 
     Of GGA and GNS those count of which there are more; both must have the same places, and the worse quality counts.
     """
     hold_to_scale("utc", keys, name)
-    hold_to_bytes(data, LARGEST, name)
+    hold_to_bytes(data, MAX_NMEA_BYTES, name)
     found = _sentences(data, name)
     talker = found.talker_of_fixes(keys, name)
     found.hold_to_datum(talker, name)
-    kind = max(_KINDS, key=lambda kind: len(found.fixes[talker, kind]))
+    kind = max(_FIX_SENTENCES, key=lambda kind: len(found.fixes[talker, kind]))
     found.hold_to_one_solution(talker, kind, name)
     return _log(talker, kind, found, name, keys)
 
@@ -217,7 +217,7 @@ class _Sentences:
 
     def _words(self, talker: str) -> str:
         """How many fixes of which quality a talker has, the most frequent first."""
-        of_talker = (fix.quality.words for kind in _KINDS for fix in self.fixes.get((talker, kind), ()))
+        of_talker = (fix.quality.words for kind in _FIX_SENTENCES for fix in self.fixes.get((talker, kind), ()))
         return ", ".join(f"{count} of {words}" for words, count in Counter(of_talker).most_common(2))
 
     def other_receivers(self, talker: str) -> set[str]:
@@ -241,7 +241,7 @@ class _Sentences:
 
     def hold_to_one_solution(self, talker: str, kind: str, name: str) -> None:
         """Refuse GGA and GNS of two solutions; give fixes of a kind the worse quality of both at their time."""
-        other_kind = next(one for one in _KINDS if one != kind)
+        other_kind = next(one for one in _FIX_SENTENCES if one != kind)
         fixes, others = self.fixes[talker, kind], self.fixes[talker, other_kind]
         if not others:
             return
@@ -326,9 +326,13 @@ def _sentences(data: bytes, name: str) -> _Sentences:
         sentence = text[begin.start() :].rstrip()
         talker, kind = sentence[1:3], sentence[3:6]
         try:
-            if len(sentence) > _LONGEST or not sentence.isascii():
+            if len(sentence) > _MAX_SENTENCE_CHARACTERS or not sentence.isascii():
                 raise ParseError("no sentence of the standard", sentence)
-            data_fields = _checked_fields(sentence) if kind in _BESIDE else parse_sentence(sentence, check=True).data
+            data_fields = (
+                _checked_fields(sentence)
+                if kind in _COMPANION_SENTENCES
+                else parse_sentence(sentence, check=True).data
+            )
             fields = [field.strip() for field in data_fields] + [""] * 14
         except (ParseError, ValueError):
             found.lost[talker, kind] += 1
@@ -339,7 +343,7 @@ def _sentences(data: bytes, name: str) -> _Sentences:
         try:
             read_one = _READERS[kind](fields, f"{name}:{number}: {kind}", number)
         except PathFileError as fault:
-            if kind in _KINDS:
+            if kind in _FIX_SENTENCES:
                 found.broken[talker, kind][number] = str(fault)
             elif kind in _DATES:
                 found.undated.append(str(fault))
@@ -372,16 +376,16 @@ def _log(talker: str, kind: str, found: _Sentences, name: str, keys: LogKeys) ->
     separations = None if has_none.all() else separation
     heights = from_sea_level(height, separations, keys, name)
     days, seconds = _dated(fixes, dates, fixes[len(fixes) // 2].seconds)
-    times, start = days * DAY + seconds, None
+    times, start = days * DAY_S + seconds, None
     if dates:
         start = Instant(int(days[0]), float(seconds[0]))
-        times = (days - days[0]) * DAY + (seconds - seconds[0])
+        times = (days - days[0]) * DAY_S + (seconds - seconds[0])
     words = f"NMEA 0183 {kind}" + (f" of the talker {talker}" if keys.talker else "") + found.lost_words()
     words += found.unusable_words(talker)
     log = geodetic_log(records, words, times, start, "utc", (latitude, longitude, heights))
     qualities = [fix.quality for fix, is_usable in zip(fixes, records.is_usable.tolist(), strict=True) if is_usable]
     # Without dates, times of day are those of day 0 or of its neighbours.
-    at = (days * DAY + seconds)[records.is_usable]
+    at = (days * DAY_S + seconds)[records.is_usable]
     return replace(
         log,
         clock="" if dates else "day",
@@ -401,7 +405,7 @@ def _sigmas(
     if not stated:
         return None
     days, seconds = _dated(stated, dates, middle)
-    at = days * DAY + seconds
+    at = days * DAY_S + seconds
     order = np.argsort(at, kind="stable")
     at, figures = at[order], np.array([gst.sigmas for gst in stated])[order]
     sigmas = np.full((len(times), 3), np.nan)
@@ -422,10 +426,10 @@ def _dated(
     """
     seconds = np.array([fix.seconds for fix in fixes])
     if not dates:
-        return np.round((middle - seconds) / DAY), seconds
+        return np.round((middle - seconds) / DAY_S), seconds
     before = np.searchsorted([line for line, _ in dates], [fix.line for fix in fixes], "right") - 1
     dated = np.array([[date.day, date.seconds] for _, date in dates])[np.maximum(before, 0)]
-    return dated[:, 0] + np.round((dated[:, 1] - seconds) / DAY), seconds
+    return dated[:, 0] + np.round((dated[:, 1] - seconds) / DAY_S), seconds
 
 
 # ---------------------------------------------------------------------- sentences
@@ -447,14 +451,14 @@ def _refused(where: str, says: str, given: str) -> NoReturn:
 
 
 def _clock(text: str, where: str) -> float:
-    match = _CLOCK.fullmatch(text)
+    match = _UTC_TIME_PATTERN.fullmatch(text)
     if match is None:
         _refused(where, "must have a time like 052001.25", text)
     return int(match[1]) * 3600.0 + int(match[2]) * 60.0 + float(match[3])  # 60.00 is what 59.996 is rounded to
 
 
 def _angle(text: str, side: str, sides: str, where: str) -> float:
-    match = _ANGLE.fullmatch(text)
+    match = _ANGLE_PATTERN.fullmatch(text)
     if match is None or side not in (sides[0], sides[1]):
         _refused(
             where, f"must have degrees and minutes like 4805.196, and {sides[0]} or {sides[1]}", f"{text},{side}"
@@ -463,7 +467,7 @@ def _angle(text: str, side: str, sides: str, where: str) -> float:
 
 
 def _metres(text: str, unit: str, where: str) -> float:
-    if not _NUMBER.fullmatch(text) or unit != "M":
+    if not _HEIGHT_PATTERN.fullmatch(text) or unit != "M":
         _refused(where, "must have a height and a geoid separation in M", f"{text},{unit}")
     return float(text)
 

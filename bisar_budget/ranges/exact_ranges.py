@@ -36,9 +36,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.geometry import GroundVector, PlatformState, Vectors, dot, norm
-from bisar_budget.image_plane import FEWEST_NODES, LEADING, GroundMatrix, Sampling, band_variance, nodes
+from bisar_budget.image_plane import FEWEST_PATH_NODES, LEGENDRE_LEADING, GroundMatrix, Sampling, band_variance, nodes
 
 if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
@@ -54,7 +54,7 @@ MAX_TURN_RAD = 1.0  # turn of a line of sight within the aperture up to which Le
 # A quadratic phase φ at the aperture edge leaves the phase with a variance of 4φ²/45.
 QUADRATIC_OF_VARIANCE = math.sqrt(45 / 4)
 
-STILL = [np.zeros((1, 1))] * 3  # shifts of a platform that no error moves
+NO_SHIFTS = [np.zeros((1, 1))] * 3  # shifts of a platform that no error moves
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class PointSettings:
     samples_at_once: int = 1 << 16
 
 
-SETTINGS = PointSettings()
+POINT_SETTINGS = PointSettings()
 
 # Number of arrays of all samples that hold measured paths, and the number together with the arrays of a step.
 _MEASURED_ARRAY_COUNT, _ARRAY_COUNT = 8, 16
@@ -459,7 +459,7 @@ class ExactRanges:
     def is_turned(self) -> Truths:
         """Whether a line of sight turns by more than `MAX_TURN_RAD` between two times of the aperture, (n,)."""
         least = np.full(self.half.shape, math.inf)
-        if self.fit.shape[1] > FEWEST_NODES:  # with fewer nodes no line of sight turns that far
+        if self.fit.shape[1] > FEWEST_PATH_NODES:  # with fewer nodes no line of sight turns that far
             for track, ranges in zip(self.tracks, self.ranges, strict=True):
                 looks = np.stack(np.broadcast_arrays(*(component / ranges for component in track)))
                 looks = np.concatenate((looks, self.sampling.to_ends @ looks), axis=1)
@@ -511,7 +511,7 @@ class ExactRanges:
     def clock_course(self, terms: Sequence[Any]) -> Floats:
         """Range error at the nodes of a clock error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³, by its terms. [m]"""
         seconds = sum(term * self.times**power for power, term in enumerate(terms) if np.any(term))
-        return np.asarray(SPEED_OF_LIGHT * seconds + np.zeros_like(self.times))
+        return np.asarray(SPEED_OF_LIGHT_MPS * seconds + np.zeros_like(self.times))
 
     def along(self, platform: int, direction: Vectors) -> Floats:
         """Change of a platform's range at the nodes per metre along a direction: −u·d, or −(u − b)·d if heard."""
@@ -542,7 +542,7 @@ class ExactRanges:
         for error_index, ways in errors.turning.items():
             phase[error_index] = np.einsum("np,wnp,wnp->p", weights, ways, along)
             seen[error_index] = np.einsum("np,wnp->p", np.abs(weights), np.abs(ways))
-        return np.where(np.abs(phase) > ROUNDING * seen, phase, 0.0)
+        return np.where(np.abs(phase) > VECTOR_ROUNDING_FRACTION * seen, phase, 0.0)
 
     @cached_property
     def place_weights(self) -> tuple[Floats, Floats]:
@@ -620,7 +620,7 @@ class ExactRanges:
     @cached_property
     def _legendre(self) -> Floats:
         """Orders 0 to 3 at the nodes, each with its leading term equal to 1 at the edge, (nodes, 4)."""
-        return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEADING)
+        return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEGENDRE_LEADING)
 
     # ------------------------------------------------------------------ errors of any size
     def phases(self, lanes: Lanes, size: Floats, near: tuple[Any, Any], *, is_at_fold: bool = False) -> ImagePoints:
@@ -695,7 +695,7 @@ class ExactRanges:
         [m], `near` the start of the search [m], and `case` the cases of the lanes.
         """
         lanes = clock.shape[1]
-        size = max(1, min(lanes, SETTINGS.samples_at_once // self.fit.shape[1]))
+        size = max(1, min(lanes, POINT_SETTINGS.samples_at_once // self.fit.shape[1]))
         points = ImagePoints(np.zeros(lanes, dtype=bool), *(np.full(lanes, math.nan) for _ in range(7)))
         start = [np.broadcast_to(np.asarray(values, dtype=float), (lanes,)) for values in near]
         with np.errstate(all="ignore"):
@@ -782,7 +782,7 @@ class _PointSearch:
     def run(self) -> None:
         """Search with the slopes of each point."""
         exact, before = self.exact, np.full(self.alive.size, math.inf)
-        for _ in range(SETTINGS.max_newton_iterations):
+        for _ in range(POINT_SETTINGS.max_newton_iterations):
             k, meets, band = _take_cases([exact.k, exact.nearest, exact.band], self.of)
             remaining, looks, distances = _seen(self.measured, self.east, self.north, self.room)
             nearest = distances.min(axis=(0, 1))
@@ -790,22 +790,22 @@ class _PointSearch:
             step_east, step_north = _newton_step(matrix, remaining, looks, distances)
             self.east, self.north = self.east + step_east, self.north + step_north
             step = step_east * step_east + step_north * step_north
-            is_apart = nearest >= SETTINGS.nearest_fraction * meets
+            is_apart = nearest >= POINT_SETTINGS.nearest_fraction * meets
             turn = matrix.turned_from(exact.matrix, self.of)
             unseen = np.where(
-                np.abs(turn) < SETTINGS.near_fold_fraction,
-                SETTINGS.last_step_near_fold_fraction * SETTINGS.last_step_rad,
-                SETTINGS.last_step_rad,
+                np.abs(turn) < POINT_SETTINGS.near_fold_fraction,
+                POINT_SETTINGS.last_step_near_fold_fraction * POINT_SETTINGS.last_step_rad,
+                POINT_SETTINGS.last_step_rad,
             )
             is_done = is_apart & (k * step < unseen * nearest)
             self._keep(
-                is_done & (turn > -SETTINGS.folded_fraction),
+                is_done & (turn > -POINT_SETTINGS.folded_fraction),
                 remaining,
                 matrix.slopes,
                 (step_east, step_north),
                 turn,
             )
-            going = np.flatnonzero(~is_done & (step < SETTINGS.shrinking_ratio * before) & is_apart)
+            going = np.flatnonzero(~is_done & (step < POINT_SETTINGS.shrinking_ratio * before) & is_apart)
             if not going.size:
                 return
             before = step
@@ -817,10 +817,10 @@ class _PointSearch:
         """Search by damped steps that only go down V. It is slower, and safe where V hardly bends, as near a fold."""
         exact = self.exact
         k, meets, band = _take_cases([exact.k, exact.nearest, exact.band], self.of)
-        damping = SETTINGS.damping_fraction * sum(_take_cases([exact.matrix.xx + exact.matrix.yy], self.of))
+        damping = POINT_SETTINGS.damping_fraction * sum(_take_cases([exact.matrix.xx + exact.matrix.yy], self.of))
         least, is_going = np.full(self.alive.size, math.inf), np.ones(self.alive.size, dtype=bool)
         best_point, slope, bends = (np.zeros((count, least.size)) for count in (2, 2, 3))
-        for _ in range(SETTINGS.max_descent_steps):
+        for _ in range(POINT_SETTINGS.max_descent_steps):
             remaining, looks, distances = _seen(self.measured, self.east, self.north, self.room)
             matrix = GroundMatrix.of(looks[0] + looks[1], exact.fit, band)
             weights, nearest = matrix.projected(remaining), distances.min(axis=(0, 1))
@@ -828,7 +828,7 @@ class _PointSearch:
             falls = variance <= least
             least, damping = (
                 np.minimum(least, variance),
-                np.where(falls, damping / SETTINGS.damping_ratio, damping * SETTINGS.damping_ratio),
+                np.where(falls, damping / POINT_SETTINGS.damping_ratio, damping * POINT_SETTINGS.damping_ratio),
             )
             best_point = np.where(falls, (self.east, self.north), best_point)
             bends = np.where(falls, _bends(matrix, weights, looks, distances), bends)
@@ -840,10 +840,12 @@ class _PointSearch:
             turn = matrix.turned_from(exact.matrix, self.of)
             is_done = falls & (
                 k * (step[0] ** 2 + step[1] ** 2)
-                < SETTINGS.last_step_near_fold_fraction * SETTINGS.last_step_rad * nearest
+                < POINT_SETTINGS.last_step_near_fold_fraction * POINT_SETTINGS.last_step_rad * nearest
             )
-            is_done &= nearest >= SETTINGS.nearest_fraction * meets
-            self._keep(is_going & is_done & (turn > -SETTINGS.folded_fraction), remaining, matrix.slopes, step, turn)
+            is_done &= nearest >= POINT_SETTINGS.nearest_fraction * meets
+            self._keep(
+                is_going & is_done & (turn > -POINT_SETTINGS.folded_fraction), remaining, matrix.slopes, step, turn
+            )
             is_going &= ~is_done
             if not is_going.any():
                 return
@@ -895,7 +897,7 @@ def _against(
 ) -> tuple[Floats, Floats]:
     """Step that removes half a slope of V, by the change of the slope; where V is no bowl, by H alone. [m]"""
     xx, xy, yy = _bends(matrix, weights, looks, distances)
-    is_bowl = (xx * yy - xy * xy > SETTINGS.bowl_fraction * matrix.determinant) & (xx > 0)
+    is_bowl = (xx * yy - xy * xy > POINT_SETTINGS.bowl_fraction * matrix.determinant) & (xx > 0)
     if not is_bowl.all():
         of_matrix = matrix.xx, matrix.xy, matrix.yy
         xx, xy, yy = (np.where(is_bowl, *both) for both in zip((xx, xy, yy), of_matrix, strict=True))
@@ -928,14 +930,14 @@ def _unresolved(
 
 
 def _unless_rounding(value: Floats, seen: Floats) -> Floats:
-    return np.where(np.abs(value) <= ROUNDING * seen, 0.0, value)
+    return np.where(np.abs(value) <= VECTOR_ROUNDING_FRACTION * seen, 0.0, value)
 
 
 def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:
     """Shift of a platform, multiplied by the weight with which lanes move the platform."""
     if np.ndim(weight):
         return [weight * component for component in along]
-    return along if weight else STILL
+    return along if weight else NO_SHIFTS
 
 
 def _grow(platform: Sequence[Floats], east: Any, north: Any, room: Floats, distance: Floats) -> None:
@@ -1001,7 +1003,7 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Ind
         of `point_paths`, no point has it if half a cycle is hidden and the gradients of V span little.
     """
     points = _within_ends(exact.settled(clock, shifts, (0.0, 0.0), case))
-    for steps in SETTINGS.course_steps:
+    for steps in POINT_SETTINGS.course_steps:
         missed = np.flatnonzero(~points.is_settled)
         if not missed.size:
             break
@@ -1014,7 +1016,7 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Ind
             near = np.array((there.east, there.north)) * ((step + 2) / (step + 1))  # NaN from the first lost point on
         for column, later in zip(points, there, strict=True):
             column[missed] = later
-    has_ended = (np.abs(points.turn) < SETTINGS.folded_fraction) & (points.hidden > SETTINGS.end_rad)
+    has_ended = (np.abs(points.turn) < POINT_SETTINGS.folded_fraction) & (points.hidden > POINT_SETTINGS.end_rad)
     points.is_settled[has_ended] = False
     for values in points[1:]:
         values[has_ended] = math.nan
@@ -1023,7 +1025,7 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Ind
 
 def _within_ends(points: ImagePoints) -> ImagePoints:
     """The points, without points beyond the end of the image."""
-    is_gone = (np.abs(points.turn) < SETTINGS.folded_fraction) & (points.hidden > SETTINGS.end_rad)
+    is_gone = (np.abs(points.turn) < POINT_SETTINGS.folded_fraction) & (points.hidden > POINT_SETTINGS.end_rad)
     return ImagePoints(points.is_settled & ~is_gone, *(np.where(is_gone, math.nan, column) for column in points[1:]))
 
 

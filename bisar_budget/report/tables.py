@@ -17,7 +17,7 @@ from bisar_budget.extras import install_command
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
-from bisar_budget.memory import OF_TABLES, hold_room
+from bisar_budget.memory import TABLES_MEMORY_BYTES, hold_room
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import Number
 from bisar_budget.report.words.sentences import spreadsheet_text
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 
-FORMAT = "bisar-budget/sweep/1"
+SWEEP_FORMAT = "bisar-budget/sweep/1"
 
 
 class Described:
@@ -39,7 +39,7 @@ class Described:
         self.numbers = {key.key: key for key in cases.varied if isinstance(key, Number)}
         changed = changes_words(mission.changes)
         self.facts = {
-            "format": FORMAT,
+            "format": SWEEP_FORMAT,
             "mission": printable(swept.mission_name),
             "mission_sha256": swept.mission_sha256,
             **({"set": changed} if changed else {}),
@@ -167,8 +167,8 @@ def _groups(parts: Iterable[Part]) -> Iterator[list[Part]]:
         yield group
 
 
-_UNITS = {"": "1", "deg": "degree", "°": "degree"}  # names of UDUNITS
-_TITLES = {"mission": "title"}
+_UDUNITS_NAMES = {"": "1", "deg": "degree", "°": "degree"}
+_FACT_TITLES = {"mission": "title"}
 _PROBE_BYTES = 1 << 20  # a write of this size fails on a disk that was too full for the library
 _EMPTY_MEANING = "none"  # meaning of the flag of an empty text
 
@@ -184,7 +184,7 @@ def write_netcdf(described: Described, parts: Iterable[Part], path: str) -> None
     try:
         with Dataset(path, "w", format="NETCDF4") as file:
             file.Conventions = "CF-1.11"
-            file.setncatts({_TITLES.get(name, name): value for name, value in described.facts.items()})
+            file.setncatts({_FACT_TITLES.get(name, name): value for name, value in described.facts.items()})
             shape = described.cases.shape
             columns = _dimensions(file, described)
             names = tuple(file.dimensions)
@@ -227,7 +227,7 @@ def _dimensions(file: Any, described: Described) -> list[Column]:
 
 
 def _attributes(column: Column) -> Mapping[str, str]:
-    units = {} if column.is_text else {"units": _UNITS.get(column.unit, column.unit)}
+    units = {} if column.is_text else {"units": _UDUNITS_NAMES.get(column.unit, column.unit)}
     return {"long_name": column.words, **units}
 
 
@@ -316,7 +316,7 @@ def writer_of(suffix: str) -> TableFormat:
     """
     table_format = TABLES[suffix]
     if table_format.library:
-        hold_room(OF_TABLES, table_format.name)
+        hold_room(TABLES_MEMORY_BYTES, table_format.name)
         try:
             import_module(table_format.library)
         except ImportError:

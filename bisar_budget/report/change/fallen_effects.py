@@ -15,7 +15,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.requirement import NAMES
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.mission.model import MetricSplits, Mission
 from bisar_budget.mission.paths import with_radial
@@ -26,9 +26,9 @@ from bisar_budget.report.change.names import plain, plain_file
 from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.units import format_quantity
 
-SUMS = (*NAMES, "autofocus_pull_in")  # kinds of rows that are no error
+SUMS = (*REQUIREMENT_NAMES, "autofocus_pull_in")  # kinds of rows that are no error
 _RESULTS = (*SUMS, "spatial_variance", "dispersion")  # kinds of rows that only other rows make
-_ROUNDING = 1e-6  # part by which the same error may use less of the same limit, as searches for limits settle
+_SIZE_TOLERANCE_FRACTION = 1e-6  # by which the same error may use less of the same limit, as searches settle
 _ANY_DAY = date(2000, 1, 1)  # waivers decide no use of a limit
 
 
@@ -196,7 +196,7 @@ def _is_less(before: Row, after: Row | None) -> bool:
         sizes = (before.utilization or 0.0, after.utilization or 0.0)
     elif before.unit != after.unit:
         return False
-    return sizes[0] - sizes[1] > _ROUNDING * abs(sizes[0])
+    return sizes[0] - sizes[1] > _SIZE_TOLERANCE_FRACTION * abs(sizes[0])
 
 
 def _family(row: Row) -> tuple[str, ...]:

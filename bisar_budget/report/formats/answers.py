@@ -5,10 +5,10 @@ import re
 from collections.abc import Iterator, Sequence
 
 from bisar_budget.design.compare import Comparison, PartState
-from bisar_budget.design.sensitivity import LITTLE, Relaxed, Sensitivity, Slope
+from bisar_budget.design.sensitivity import MIN_SHOWN_CHANGE_FRACTION, Relaxed, Sensitivity, Slope
 from bisar_budget.design.solve import Crossing, Imaged, Solution, State
 from bisar_budget.faults import printable
-from bisar_budget.findings.requirement import NAMES
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import document_text, outside_item, verdict_item
@@ -300,7 +300,7 @@ def _shown(imaged: Imaged) -> str:
 
 def _undecided(requirement: str | None) -> str:
     """Words for a state without a deciding row; they name the requirement that cannot be judged."""
-    return "no row decides" if requirement is None else f"{NAMES[requirement]} cannot be judged"
+    return "no row decides" if requirement is None else f"{REQUIREMENT_NAMES[requirement]} cannot be judged"
 
 
 def _state_words(state: State) -> str:
@@ -489,4 +489,8 @@ def _change_words(change: tuple[str, float, float] | None) -> str:
     if change is None:
         return "-"
     _, before, after = change
-    return percent(before) if abs(after - before) <= LITTLE * before else f"{percent(before)} -> {percent(after)}"
+    return (
+        percent(before)
+        if abs(after - before) <= MIN_SHOWN_CHANGE_FRACTION * before
+        else f"{percent(before)} -> {percent(after)}"
+    )
