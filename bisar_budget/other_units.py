@@ -170,11 +170,11 @@ def about_unit(digits: str, written: str, dimension: Dimension) -> tuple[str, st
         if meant := _of_same_size(value, dimension):
             return problem, f"Did you mean {meant!r}?"
         return problem, _converted(digits, written, value.factor, dimension)
-    other = next((one for one in DIMENSIONS if _powers_of(one) == value.powers), None)
-    if other is None or "Hz" in unit:  # a density that is not of the field's dimension
+    other_dimension = next((candidate for candidate in DIMENSIONS if _powers_of(candidate) == value.powers), None)
+    if other_dimension is None or "Hz" in unit:  # a density that is not of the field's dimension
         return problem, ""
-    conversion = _converted(digits, written, value.factor, other)
-    return problem, f"{conversion}, {other.name}" if conversion else ""
+    conversion = _converted(digits, written, value.factor, other_dimension)
+    return problem, f"{conversion}, {other_dimension.name}" if conversion else ""
 
 
 def is_of(written: str, dimension: Dimension) -> bool:
@@ -241,10 +241,10 @@ def _atom(name: str) -> UnitValue | None:
             return UnitValue(factor * of_name[0], of_name[1])
     word = name.lower()
     for prefix, factor in {"": 1.0, **_WORD_PREFIXES}.items():
-        rest = word.removeprefix(prefix).lstrip("-") if word.startswith(prefix) else ""
-        known = _UNIT_WORDS.get(rest) or _UNIT_WORDS.get(rest.removesuffix("s"))
-        if known is not None:
-            return UnitValue(factor * _ATOMS[known][0], _ATOMS[known][1])
+        bare_word = word.removeprefix(prefix).lstrip("-") if word.startswith(prefix) else ""
+        unit_name = _UNIT_WORDS.get(bare_word) or _UNIT_WORDS.get(bare_word.removesuffix("s"))
+        if unit_name is not None:
+            return UnitValue(factor * _ATOMS[unit_name][0], _ATOMS[unit_name][1])
     is_plural = len(name) >= _MIN_PLURAL_CHARACTERS and name.endswith("s") and name[:-1] in _ATOMS
     return UnitValue(*_ATOMS[name[:-1]][:2]) if is_plural else None
 
@@ -257,10 +257,10 @@ def _powers_of(dimension: Dimension) -> tuple[float, float, float] | None:
 
 def _of_same_size(value: UnitValue, dimension: Dimension) -> str:
     """Unit of a dimension with the same size as `value`; empty without such a unit."""
-    return next((unit for unit, factor in dimension.units.items() if unit and _is_same(factor, value.factor)), "")
+    return next((unit for unit, factor in dimension.units.items() if unit and _is_equal(factor, value.factor)), "")
 
 
-def _is_same(a: float, b: float) -> bool:
+def _is_equal(a: float, b: float) -> bool:
     return math.isclose(a, b, rel_tol=_SAME_FACTOR)
 
 
@@ -277,21 +277,21 @@ def _respelt(unit: str, dimension: Dimension) -> str:
     """
     candidates = dict(_conceivable(dimension))
     spellings = {unit.lower(), normal_unit(unit.lower().replace("hz", "Hz")).lower()}
-    folded = [one for one in candidates if one.lower() in spellings and len(one) > 1]
-    if not _is_one_size([candidates[one] for one in folded]):
-        folded = [one for one in folded if one in dimension.units]
+    folded = [spelling for spelling in candidates if spelling.lower() in spellings and len(spelling) > 1]
+    if not _is_one_size([candidates[spelling] for spelling in folded]):
+        folded = [spelling for spelling in folded if spelling in dimension.units]
         is_unsure = len(folded) > 1 or folded[0][0] != unit[0]  # Mhz is not millihertz, and Nm is ambiguous
         folded = [] if is_unsure else folded
     is_level = _powers_of(dimension) is None  # without a letter of dBc, the unit is a power ratio
-    slips = [one for one in candidates if _is_one_slip(unit, one)]
-    if not _is_one_size([candidates[one] for one in (*folded, *slips)]):
+    slips = [spelling for spelling in candidates if _is_one_slip(unit, spelling)]
+    if not _is_one_size([candidates[spelling] for spelling in (*folded, *slips)]):
         return ""
     offered = [*folded, *(slips if len(unit) >= _MIN_TYPO_CHARACTERS and not is_level else ())]
-    return next((one for one in offered if one in dimension.units), "")
+    return next((spelling for spelling in offered if spelling in dimension.units), "")
 
 
 def _is_one_size(factors: list[float]) -> bool:
-    return all(_is_same(factor, factors[0]) for factor in factors)
+    return all(_is_equal(factor, factors[0]) for factor in factors)
 
 
 def _conceivable(dimension: Dimension) -> Iterator[tuple[str, float]]:
@@ -315,6 +315,6 @@ def _is_one_slip(a: str, b: str) -> bool:
     if a == b or abs(len(a) - len(b)) > 1:
         return a == b
     start = next((n for n, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
-    rest_a, rest_b = a[start:], b[start:]
-    is_exchanged = rest_a[:2] == rest_b[1::-1] and rest_a[2:] == rest_b[2:] and len(rest_a) > 1
-    return rest_a[1:] == rest_b or rest_a == rest_b[1:] or rest_a[1:] == rest_b[1:] or is_exchanged
+    tail_a, tail_b = a[start:], b[start:]
+    is_exchanged = tail_a[:2] == tail_b[1::-1] and tail_a[2:] == tail_b[2:] and len(tail_a) > 1
+    return tail_a[1:] == tail_b or tail_a == tail_b[1:] or tail_a[1:] == tail_b[1:] or is_exchanged

@@ -325,31 +325,31 @@ def given_unit(text: str, unit: str) -> str:
     dimension = _OF_SI.get(unit)
     if match is None or dimension is None:
         return ""
-    given = text.strip()[match.end() :].lstrip()
-    given = given if given in dimension.scales else normal_unit(given)
-    return given if given in dimension.scales else ""
+    stated_unit = text.strip()[match.end() :].lstrip()
+    stated_unit = stated_unit if stated_unit in dimension.scales else normal_unit(stated_unit)
+    return stated_unit if stated_unit in dimension.scales else ""
 
 
-def format_in(value: float, unit: str, given: str, digits: int = 3, rounding: str = "nearest") -> str:
+def format_in(value: float, unit: str, written_unit: str, digits: int = 3, rounding: str = "nearest") -> str:
     """Write an SI value in a unit of the same dimension: 349 µrad is `0.02 deg` if the file uses degrees.
 
     Without a unit the text is the same as by `format_quantity`. A number with more than six digits or zeros has a
     power of ten.
     """
-    if not given or unit == "dB" or not math.isfinite(value):
+    if not written_unit or unit == "dB" or not math.isfinite(value):
         return format_quantity(value, unit, digits, rounding)
-    factor, divisor = _OF_SI[unit].scales[given]
+    factor, divisor = _OF_SI[unit].scales[written_unit]
     number = value * divisor / factor
     text = _rounded(number, digits, rounding) if number else "0"
     mantissa, _, power = text.partition("e")
     text = f"{mantissa}e{int(power)}" if power else text
-    return text + _pretty(given)
+    return text + _pretty(written_unit)
 
 
 @cache
-def _pretty(given: str) -> str:
+def _pretty(written_unit: str) -> str:
     """Write a unit of the tables for print: `um` is µm, `m/s^2` m/s², `deg/sqrt(h)` deg/√h, `1/s` /s."""
-    text = given.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("°", "deg")
+    text = written_unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("°", "deg")
     text = re.sub(r"sqrt\((\w+)\)", r"√\1", text)
     text = re.sub(r"^u(?=m|g|s|rad|Gal)", "µ", text)
     return text.removeprefix("1") if text.startswith(("1/", "/")) else f" {text}"
@@ -445,10 +445,10 @@ def _wrong_unit(digits: str, written: str, dimension: Dimension) -> InvalidValue
     unit = normal_unit(written)
     if unit.startswith(","):
         return _invalid("has a decimal comma", dimension, "Write a point")
-    others = [other for other in DIMENSIONS if unit in other.units]
-    if others:
+    matches = [match for match in DIMENSIONS if unit in match.units]
+    if matches:
         meant = dimension.si if unit in _DECIBELS and dimension.si.startswith("dB") else ""
-        problem = f"must be {dimension.name}, but {written!r} makes it {others[0].name}"
+        problem = f"must be {dimension.name}, but {written!r} makes it {matches[0].name}"
         return _invalid(problem, dimension, f"Did you mean {meant!r}?" if meant else "")
     from bisar_budget.other_units import about_unit
 

@@ -101,9 +101,9 @@ def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable
                 fail(f"{name} is in the folder of a report's pictures, {folder}")
     for file in files:
         for real_path, target in written.items():
-            if _is_same(0 if file == "-" else file, real_path):
+            if _is_open_as(0 if file == "-" else file, real_path):
                 fail(f"{target} is to be read; a result would replace it")
-        if file != "-" and _is_same(1, file):
+        if file != "-" and _is_open_as(1, file):
             fail(f"{file} is to be read; standard output goes to it")
 
 
@@ -115,7 +115,7 @@ def _real_path(path: str) -> str:
         fail(f"cannot write {path}: {getattr(error, 'strerror', None) or error}")
 
 
-def _is_same(file: str | int, path: str) -> bool:
+def _is_open_as(file: str | int, path: str) -> bool:
     """Whether a path, or an open stream, and another path are one regular file."""
     try:
         return os.path.isfile(file) and os.path.samestat(os.stat(file), os.stat(path))

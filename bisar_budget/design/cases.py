@@ -202,13 +202,13 @@ def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Cases:
         As for a grid; or the method, count or seed of `how` is invalid.
     """
     option = f"--sample {shown(how)}"
-    kind, *parts = (part.strip() for part in how.split(":"))
-    if kind != "latin" or len(parts) != 2:
+    kind, *fields = (field.strip() for field in how.split(":"))
+    if kind != "latin" or len(fields) != 2:
         raise QuestionError(f"{option}: is no way to draw cases; {_LATIN}")
-    count = _count(parts[0], f"{option}: the count of cases", 1)
-    if not (parts[1].isascii() and parts[1].isdigit() and len(parts[1]) <= 18):
+    count = _count(fields[0], f"{option}: the count of cases", 1)
+    if not (fields[1].isascii() and fields[1].isdigit() and len(fields[1]) <= 18):
         raise QuestionError(f"{option}: the seed must be a whole number; {_LATIN}")
-    rng = np.random.default_rng(int(parts[1]))
+    rng = np.random.default_rng(int(fields[1]))
     every = list(_all_asked(tree, texts, "--vary"))
     if count * len(every) > MAX_TABLE_VALUE_COUNT:
         raise QuestionError(
@@ -235,16 +235,16 @@ def _all_asked(tree: dict[str, Any], texts: Sequence[str], name: str) -> Iterato
     seen: set[tuple[str, ...]] = set()
     for text in texts:
         asked = _asked(tree, text, name)
-        parts = tuple(parts_of(asked.varied.key))
-        if parts in seen:
+        steps = tuple(parts_of(asked.varied.key))
+        if steps in seen:
             raise QuestionError(f"{name} {asked.varied.key}: varies twice; accepted: each key once")
-        seen.add(parts)
+        seen.add(steps)
         yield asked
 
 
 def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked:
     """Read one option; its values are checked against the bounds of the key."""
-    key, equals, values_text = (part.strip() for part in text.partition("="))
+    key, equals, values_text = (field.strip() for field in text.partition("="))
     option = f"{name} {shown(text)}"
     if not (key and equals and values_text):
         raise QuestionError(f"{option}: does not say which values; {_ACCEPTED_VARIATIONS}")
@@ -254,9 +254,9 @@ def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked:
         varied, values = choices, _texts(option, choices, words)
     else:
         number = number_of(tree, key)
-        parts = [part.strip() for part in values_text.split(":")]
-        if len(parts) > 1:
-            return _range(option, number, parts)
+        fields = [field.strip() for field in values_text.split(":")]
+        if len(fields) > 1:
+            return _range(option, number, fields)
         texts = values_text.split(",")
         if len(texts) > MAX_TABLE_VALUE_COUNT:
             raise QuestionError(f"{option}: {len(texts)} values; accepted: up to {MAX_TABLE_VALUE_COUNT}")
@@ -267,13 +267,13 @@ def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked:
     return _Asked(option, varied, values)
 
 
-def _range(option: str, number: Number, parts: list[str]) -> _Asked:
-    """Read a range of an option from the parts between its colons."""
-    if is_log := len(parts) > 2 and parts[-1] == "log":
-        parts.pop()
-    if len(parts) > 3 or "" in parts:
+def _range(option: str, number: Number, fields: list[str]) -> _Asked:
+    """Read a range of an option from the fields between its colons."""
+    if is_log := len(fields) > 2 and fields[-1] == "log":
+        fields.pop()
+    if len(fields) > 3 or "" in fields:
         raise QuestionError(f"{option}: is no range; {_ACCEPTED_RANGE.format(key=number.key)}")
-    number, (low, high) = _read(option, number, parts[:2])
+    number, (low, high) = _read(option, number, fields[:2])
     if not low < high:
         kind, hint = ("empty", "; KEY=VALUE is a single value") if low == high else ("reversed", "")
         if number.reader is DIRECTION and low > high:
@@ -281,7 +281,7 @@ def _range(option: str, number: Number, parts: list[str]) -> _Asked:
         raise QuestionError(f"{option}: the range is {kind}; accepted: FROM < TO{hint}")
     if is_log and low <= 0:
         raise QuestionError(f"{option}: equal ratios begin above 0; accepted: FROM > 0, or no :log")
-    return _Asked(option, number, None, (low, high), parts[2] if len(parts) == 3 else "", is_log)
+    return _Asked(option, number, None, (low, high), fields[2] if len(fields) == 3 else "", is_log)
 
 
 def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tuple[float, ...]]:
@@ -322,7 +322,7 @@ def _spread(asked: _Asked, fractions: Floats) -> Floats:
 
 
 # ---------------------------------------------------------------- values of cases
-def some_of(cases: Cases, count: int) -> Cases:
+def sampled_cases(cases: Cases, count: int) -> Cases:
     """A sample of cases in short stretches, spread over all cases."""
     length = max(1, count // _STRETCH_COUNT)
     starts = [

@@ -224,20 +224,20 @@ class SpecifiedMission:
         cases = np.repeat(sizes[:, None], 2 * count + 1, axis=1)
         for number, factor in enumerate(PROBE_FACTORS):
             cases[np.arange(count), 1 + number * count + np.arange(count)] *= factor
-        found = self.uses(cases)
-        allowed, power = self.allowed(found.ids), found.powers[:, None]
-        if not (found.uses[:, 0] <= _MAX_STEP_RATIO * allowed).all():
+        row_uses = self.uses(cases)
+        allowed, power = self.allowed(row_uses.ids), row_uses.powers[:, None]
+        if not (row_uses.uses[:, 0] <= _MAX_STEP_RATIO * allowed).all():
             return None
-        powers = found.uses**power
+        powers = row_uses.uses**power
         base, (less, more) = powers[:, :1], np.split(powers[:, 1:], 2, axis=1)
         is_lost = ~np.isfinite(more)
         low, high = (factor**power for factor in PROBE_FACTORS)
         with np.errstate(invalid="ignore"):
-            part: Floats = np.where(is_lost, (base - less) / (1 - low), (more - less) / (high - low))
-        part = np.where(part > _ROW_ROUNDING_FRACTION * base, part, 0.0)
-        room = allowed**found.powers - (base[:, 0] - part.sum(axis=1))
-        is_limit: Truths = np.any(part > 0, axis=1)
+            share: Floats = np.where(is_lost, (base - less) / (1 - low), (more - less) / (high - low))
+        share = np.where(share > _ROW_ROUNDING_FRACTION * base, share, 0.0)
+        room = allowed**row_uses.powers - (base[:, 0] - share.sum(axis=1))
+        is_limit: Truths = np.any(share > 0, axis=1)
         if (room[is_limit] <= 0).any():
             return None
-        is_free: Truths = ~np.any(part > 0, axis=0)
-        return Near(found, allowed, sizes, part, room, is_limit, is_free)
+        is_free: Truths = ~np.any(share > 0, axis=0)
+        return Near(row_uses, allowed, sizes, share, room, is_limit, is_free)

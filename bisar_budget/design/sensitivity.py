@@ -284,8 +284,8 @@ def sensitivity(
         ):
             unchanging.append(slope.key)
         else:
-            parts = (figure.part for figure in taken if f"{slope.key}.".startswith(f"{figure.key}."))
-            slopes.append(slope._replace(part=next(parts, "")))
+            part_names = (figure.part for figure in taken if f"{slope.key}.".startswith(f"{figure.key}."))
+            slopes.append(slope._replace(part=next(part_names, "")))
     slopes.sort(key=lambda slope: -abs(slope.even_effect))
     balanced = is_balanced(base)
     return Sensitivity(
@@ -383,7 +383,7 @@ class _Neighbours:
                 yield Skipped(number.number.key, number.text, f"no mission beside it: {why}")
                 continue
             ordered, weights = [here, near, far], (-1.5, 2.0, -0.5)
-            yield self._slope(number, here, kind, ordered[::side], tuple(side * one for one in weights[::side]))
+            yield self._slope(number, here, kind, ordered[::side], tuple(side * weight for weight in weights[::side]))
 
     def _slope(
         self, number: Stated, here: _Uses, kind: str, uses: Sequence[_Uses], weights: Sequence[float]

@@ -204,7 +204,7 @@ def solve(
         The mission cannot answer the question; the message says why.
     """
     search = _Search(mission, key, between, row, target, model, is_scale, today)
-    scanned, given = search.scanned(progress)
+    scanned, file_state = search.scanned(progress)
     borders = [(low, high) for low, high in pairwise(scanned) if low.complies != high.complies]
     crossings = search.crossings(borders)
     missions = [state for state in scanned if not state.reason]
@@ -223,7 +223,7 @@ def solve(
         low=search.range.low,
         high=search.range.high,
         is_circle=search.range.is_circle,
-        given=given,
+        given=file_state,
         crossings=crossings,
         nearest=nearest,
         is_constant=missions[0].status != "not_evaluated"
@@ -309,11 +309,11 @@ class _Search:
         if value is not None and self.range.low < value < self.range.high:
             values = sorted({*values, value})
         states = self.states(values if value is None else [*values, value], progress)
-        given = None if value is None else states.pop()
+        file_state = None if value is None else states.pop()
         # Between samples with equal compliance it may change there and back, at a turn of the utilization.
         searches = [partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[:_SEARCHED_TURN_COUNT]]
         turned = [state for state in self._searched(searches) if state is not None]
-        return sorted([*states, *turned], key=lambda state: state.value), given
+        return sorted([*states, *turned], key=lambda state: state.value), file_state
 
     def states(self, values: Sequence[float], progress: Progress = unseen) -> list[State]:
         """States of the mission at values."""
@@ -356,14 +356,16 @@ class _Search:
 
     def _searched(self, searches: Sequence[Search]) -> list[Any]:
         """Results of searches that take their steps together."""
-        known: dict[float, State] = {}
+        states_by_value: dict[float, State] = {}
         while True:
-            results = [search(known) for search in searches]
-            needed = {value for result in results if isinstance(result, set) for value in result} - known.keys()
+            results = [search(states_by_value) for search in searches]
+            needed = {
+                value for result in results if isinstance(result, set) for value in result
+            } - states_by_value.keys()
             if not needed:
                 return results
             values = sorted(needed)
-            known.update(zip(values, self.states(values), strict=True))
+            states_by_value.update(zip(values, self.states(values), strict=True))
 
     def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[float, str]:
         """Texts of all values of the answer, as the file would write them."""
@@ -374,16 +376,16 @@ class _Search:
 
 
 def _bracketed(
-    low: State, high: State, least: float, levels: int, known: Mapping[float, State]
+    low: State, high: State, least: float, levels: int, states_by_value: Mapping[float, State]
 ) -> tuple[State, State] | set[float]:
     """Bisect an interval with a border until it is narrow, or return the values of the next steps."""
     while high.value - low.value > _NARROW_FRACTION * max(abs(low.value), abs(high.value), least):
         middle = (low.value + high.value) / 2
         if not low.value < middle < high.value:
             break
-        if middle not in known:
+        if middle not in states_by_value:
             return _ahead(_middle, low.value, high.value, levels)
-        state = known[middle]
+        state = states_by_value[middle]
         low, high = (state, high) if state.complies == low.complies else (low, state)
     return low, high
 
@@ -419,21 +421,21 @@ def _turns(states: Sequence[State]) -> list[tuple[float, float, State]]:
 
 
 def _turn(
-    low: float, high: float, here: State, levels: int, known: Mapping[float, State]
+    low: float, high: float, here: State, levels: int, states_by_value: Mapping[float, State]
 ) -> State | set[float] | None:
     """A state near a turn with another compliance, None if there is none, or the values of the next steps."""
     for _ in range(_TURN_STEPS):
         values = _golden(low, high)
-        if not known.keys() >= set(values):
+        if not states_by_value.keys() >= set(values):
             return _ahead(_golden, low, high, levels)
-        left, right = (known[value] for value in values)
+        left, right = (states_by_value[value] for value in values)
         for state in (left, right):
             if state.complies != here.complies and not state.reason:
                 return state
         if left.utilization is None or right.utilization is None:
             return None
-        is_left = _sign(here) * left.utilization > _sign(here) * right.utilization
-        low, high = (low, right.value) if is_left else (left.value, high)
+        is_before = _sign(here) * left.utilization > _sign(here) * right.utilization
+        low, high = (low, right.value) if is_before else (left.value, high)
     return None
 
 

@@ -52,32 +52,32 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
     An array cannot replace a number that decides more than its own value: a number of an orbit or a log, the position
     of the scene on the Earth, the orientation of the Earth, an element of a covariance matrix.
     """
-    section, *parts = parts_of(key)
+    section, *steps = parts_of(key)
     if section == "platforms":
-        platform: Platform = getattr(mission.platforms, parts[0])
-        if parts[1] == "motion_error":
-            return _is_held_of_error(platform.motion_error, parts[2:], is_stated)
-        if parts[1] == "oscillator":
-            if platform.oscillator is None or (parts[2] == "frequency" and platform.oscillator.sensor is not None):
+        platform: Platform = getattr(mission.platforms, steps[0])
+        if steps[1] == "motion_error":
+            return _is_held_of_error(platform.motion_error, steps[2:], is_stated)
+        if steps[1] == "oscillator":
+            if platform.oscillator is None or (steps[2] == "frequency" and platform.oscillator.sensor is not None):
                 return False  # the noise of a part holds at the part's frequency
-            return is_stated or parts[2] in ("frequency", "bandwidth", "level")
-        return not flies_on_earth(mission) and _is_held_of_path(platform, parts[1], is_stated)
+            return is_stated or steps[2] in ("frequency", "bandwidth", "level")
+        return not flies_on_earth(mission) and _is_held_of_path(platform, steps[1], is_stated)
     if section == "earth_orientation":
         return False
-    if key == "collection.aperture_time" or (section == "scene" and parts[0] in PLACE_KEYS):
+    if key == "collection.aperture_time" or (section == "scene" and steps[0] in PLACE_KEYS):
         return not flies_on_earth(mission)
     return is_stated or section in _FREE or key in _FREE
 
 
-def _is_held_of_error(error: MotionError, parts: Sequence[str], is_stated: bool) -> bool:
+def _is_held_of_error(error: MotionError, steps: Sequence[str], is_stated: bool) -> bool:
     """Whether an array can replace a number of a motion error."""
-    if parts[0] in MOTION:
-        return parts[0] == "acceleration" or error.covariance is None  # a covariance replaces position and velocity
-    if parts[0] == "covariance" and error.covariance is not None:
+    if steps[0] in MOTION:
+        return steps[0] == "acceleration" or error.covariance is None  # a covariance replaces position and velocity
+    if steps[0] == "covariance" and error.covariance is not None:
         return is_stated and not error.covariance.is_matrix  # an element of a matrix has a twin
-    if parts == ["vibration", "spectrum_level"]:
+    if steps == ["vibration", "spectrum_level"]:
         return error.vibration.spectrum is not None  # the level shifts the spectrum
-    return is_stated or parts[0] == "imu" or tuple(parts) in (("time_tag",), ("lever_arm", "uncertainty"))
+    return is_stated or steps[0] == "imu" or tuple(steps) in (("time_tag",), ("lever_arm", "uncertainty"))
 
 
 def _is_held_of_path(platform: Platform, name: str, is_stated: bool) -> bool:
@@ -182,24 +182,24 @@ def scaled(mission: Mission, key: str, factor: Any) -> Mission:
     QuestionError
         The key has no errors, or the mission states none below it.
     """
-    parts = parts_of(key)
-    if not any(part in _ERROR_SECTIONS for part in parts[:3]):
+    steps = parts_of(key)
+    if not any(step in _ERROR_SECTIONS for step in steps[:3]):
         raise QuestionError(f"{key}: holds no errors that --scale could multiply; {_ACCEPTED_KEYS}")
-    changed, count = _below(mission, MISSION, parts, factor, key)
+    changed, count = _below(mission, MISSION, steps, factor, key)
     if not count:
         raise QuestionError(f"{key}: the mission states no error there that --scale could multiply")
     return cast(Mission, changed)
 
 
-def _below(value: Any, reader: Reader, parts: Sequence[str], factor: Any, key: str) -> tuple[Any, int]:
+def _below(value: Any, reader: Reader, steps: Sequence[str], factor: Any, key: str) -> tuple[Any, int]:
     """A value with the errors at a path below it scaled, and the number of errors that are not zero."""
-    if not parts:
+    if not steps:
         name = parts_of(key)[-1]
         if name in _MEASURES:
             return value, 0
         is_clock = parts_of(key)[0] == "timing_error" or name in _OF_ERRORS
         return _scaled(value, reader, factor, is_clock=is_clock)
-    child, *remaining = parts
+    child, *remaining = steps
     reader = _form(reader, value)
     if isinstance(reader, Section) and child in reader.keys and value is not None:
         inner, count = _below(getattr(value, child), reader.keys[child].reader, remaining, factor, key)

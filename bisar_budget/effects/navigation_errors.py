@@ -235,8 +235,8 @@ def body_axes(state: PlatformState, times: Floats) -> Floats:
         u, v, w = (np.where(state.is_still, *both) for both in ((1.0, u), (0.0, v), (0.0, w)))
     with np.errstate(all="ignore"):
         along = without_rounding(unit((u, v, w)))
-        to_left = without_rounding(unit((-v, u, 0.0 * w)))
-    return np.array((along, to_left, cross(along, to_left)))
+        leftward = without_rounding(unit((-v, u, 0.0 * w)))
+    return np.array((along, leftward, cross(along, leftward)))
 
 
 def arm_at(state: PlatformState, arm: Any, times: Floats) -> Floats:
@@ -338,8 +338,8 @@ class _Walks(NamedTuple):
 @cache
 def _walks(first: int, second: int, count: int) -> _Walks:
     """The noise integrated `first` + 1 and `second` + 1 times, at `count` nodes; 0 is a walk."""
-    places, weights = np.polynomial.legendre.leggauss(2 * count)
-    start, weight = (1 + places) / 2, weights / 2  # on one side of the middle
+    gauss_nodes, weights = np.polynomial.legendre.leggauss(2 * count)
+    start, weight = (1 + gauss_nodes) / 2, weights / 2  # on one side of the middle
     number = np.arange(count)
 
     def order_of(times: int) -> Floats:
@@ -368,8 +368,8 @@ def _courses_of_both_walks(count: int) -> tuple[Floats, Floats]:
     return twice, once
 
 
-def _legendre(places: Floats, count: int) -> Floats:
-    return np.asarray(np.polynomial.legendre.legvander(places, count - 1))
+def _legendre(abscissas: Floats, count: int) -> Floats:
+    return np.asarray(np.polynomial.legendre.legvander(abscissas, count - 1))
 
 
 # ---------------------------------------------------------------------- position noise
@@ -456,16 +456,16 @@ def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], pat
     """Noise along axes of the platforms that it moves, (axes, 3, cases) each."""
     k = 2 * math.pi / seen.mission.radar.wavelength
     largest, sizes = parts_of_largest(seen.vector(process.sigma))
-    found = gauss_markov(seen.aperture_time, process.correlation_time)
-    courses = seen.courses(found.covariance) if seen.has_edge else np.zeros((0, len(seen.exact.times), 1))
+    moments = gauss_markov(seen.aperture_time, process.correlation_time)
+    courses = seen.courses(moments.covariance) if seen.has_edge else np.zeros((0, len(seen.exact.times), 1))
     sighted, moved, moves = list[Floats](), list[Floats](), list[Moves]()
     for name, of_platform in axes.items():
-        place, directions = PLATFORMS.index(name), of_platform * sizes[:, None]
-        sighted.append((directions * seen.vector(seen.geometry.both[place].look)).sum(axis=1))
-        moved.append(seen.range_errors(place, directions[:, :, None]))
-        moves.append(Moves(place, directions[:, :, None], courses))
+        platform_index, directions = PLATFORMS.index(name), of_platform * sizes[:, None]
+        sighted.append((directions * seen.vector(seen.geometry.both[platform_index].look)).sum(axis=1))
+        moved.append(seen.range_errors(platform_index, directions[:, :, None]))
+        moves.append(Moves(platform_index, directions[:, :, None], courses))
     along = np.sqrt(np.square(sum(sighted)).sum(axis=0))
-    quadratic, cubic, left = (np.sqrt(one) for one in found[:3])
+    quadratic, cubic, left = (np.sqrt(square) for square in moments[:3])
     return RandomError(
         subject=process.subject,
         unit="m",
@@ -475,7 +475,7 @@ def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], pat
             k * along * quadratic,
             k * along * cubic,
             k * along * left / seen.factor,
-            *seen.moved(found.constant * along**2, found.linear * along**2),
+            *seen.moved(moments.constant * along**2, moments.linear * along**2),
         ),
         full=seen.of_gauss_markov(np.asarray(sum(moved)), process.correlation_time),
         spreads=process.spreads,

@@ -210,11 +210,11 @@ def _reader_and_value(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
     """Reader of a key, which may be one of several forms, and the file's value, None if it has none."""
     reader: Reader = MISSION
     value: Any = tree
-    parts = parts_of(key)
-    while parts:
+    steps = parts_of(key)
+    while steps:
         reader = form_of(reader, value)
-        name, remaining = next_name(value, parts)
-        child, parts = (parts[0], parts[1:]) if name is None else (str(name), remaining)
+        name, remaining = next_name(value, steps)
+        child, steps = (steps[0], steps[1:]) if name is None else (str(name), remaining)
         inner = reader.below(child)
         if inner is None and isinstance(value, str):
             raise QuestionError(f"{shown(key)}: the file has {shown(value)!r} there, which has no {shown(child)!r}")
@@ -285,7 +285,7 @@ def range_of(number: Number, between: str | None) -> Range:
         low, high = (low * (1 + 1e-9) if low == gt else low), (high * (1 - 1e-9) if high == lt else high)
     else:
         option = f"--between {shown(between)}"
-        first, dots, last = (part.strip() for part in between.partition(".."))
+        first, dots, last = (end.strip() for end in between.partition(".."))
         if not dots:
             example = (1.0, 10.0) if number.value is None else (number.value / 2, number.value * 2)
             example_range = "..".join(map(number.text, example)).replace(" ", "")
@@ -330,13 +330,13 @@ def with_number(mission: Mission, key: str, number: Any) -> Mission:
     return changed_mission
 
 
-def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
+def _with_value(value: Any, steps: Sequence[str], number: Any) -> Any:
     """A value with a number at a path below it; at a triple the number goes into all three axes."""
-    if not parts:
+    if not steps:
         return (number, number, number) if isinstance(value, tuple) else number
     if isinstance(value, Covariance):
-        return _with_element(value, parts, number)
-    name, *remaining = parts
+        return _with_element(value, steps, number)
+    name, *remaining = steps
     if name.isdigit():
         index = int(name)
         return (*value[:index], _with_value(value[index], remaining, number), *value[index + 1 :])
@@ -359,9 +359,9 @@ def _with_point(curve: Any, name: str, point: str, number: Any) -> Any:
     return tuple((at, number if at == here else ordinate) for at, ordinate in curve)
 
 
-def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> Covariance:
+def _with_element(covariance: Covariance, steps: Sequence[str], number: Any) -> Covariance:
     """A covariance with another sigma of one axis or of all axes, or with another correlation of a pair."""
-    kind, *remaining = parts
+    kind, *remaining = steps
     if kind in MOTION_KINDS:
         first = 3 * MOTION_KINDS.index(kind)
         changed_indices = [first + int(axis) for axis in remaining] or range(first, first + 3)
@@ -383,13 +383,13 @@ def value_at(mission: Mission, key: str) -> Any:
     return _value_below(mission, parts_of(key))
 
 
-def _value_below(value: Any, parts: Sequence[str]) -> Any:
+def _value_below(value: Any, steps: Sequence[str]) -> Any:
     """The value at a path below a value; None if there is none."""
-    if not parts or value is None:
+    if not steps or value is None:
         return value
     if isinstance(value, Covariance):
-        return _element(value, parts)
-    name, *remaining = parts
+        return _element(value, steps)
+    name, *remaining = steps
     if name.isdigit():
         return _value_below(value[int(name)], remaining) if int(name) < len(value) else None
     if name in _CURVE_ABSCISSAS:
@@ -406,9 +406,9 @@ def _point(curve: Any, name: str, point: str) -> Any:
     return next((ordinate for at, ordinate in points if at == here), None)
 
 
-def _element(covariance: Covariance, parts: Sequence[str]) -> Any:
+def _element(covariance: Covariance, steps: Sequence[str]) -> Any:
     """Sigma of an axis, or the three sigmas, of a covariance; None for a correlation."""
-    kind, *axis = parts
+    kind, *axis = steps
     if kind not in MOTION_KINDS:
         return None  # a correlation is no size
     return covariance.of(kind)[int(axis[0])] if axis else covariance.of(kind)

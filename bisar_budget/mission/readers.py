@@ -56,7 +56,7 @@ class Reader:
         """Return the value; raises `InvalidValueError`."""
         raise NotImplementedError
 
-    def below(self, part: str) -> "Reader | None":
+    def below(self, step: str) -> "Reader | None":
         """Reader of the value at a key or an index within this value; None if there is no such key or index."""
         return None
 
@@ -191,9 +191,9 @@ class Triple(Reader):
             scalar = self.component.read(value, path, report)
             return scalar if scalar is INVALID else (scalar, scalar, scalar)
         if not isinstance(value, list) or len(value) != 3:
-            given = f", {len(value)} given" if isinstance(value, list) else ""
+            length_words = f", {len(value)} given" if isinstance(value, list) else ""
             hint = _POINT if isinstance(value, list) and len(value) > 3 else bracketed
-            report(path, Problem(f"must be three components{given}", "accepted: [a, b, c]", hint))
+            report(path, Problem(f"must be three components{length_words}", "accepted: [a, b, c]", hint))
             return INVALID
         components = tuple(
             [read_part(self.component, item, (*path, index), report) for index, item in enumerate(value)]
@@ -218,9 +218,9 @@ class Triple(Reader):
             return "Write brackets, and the unit of each" if value.count(", ") == 2 else ""
         return f"Did you mean [{', '.join(text.strip() for text in texts)}]?"
 
-    def below(self, part: str) -> Reader | None:
+    def below(self, step: str) -> Reader | None:
         """Reader of one component."""
-        return self.component if is_place(part) else None
+        return self.component if is_index(step) else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """JSON Schema: array of three, or also a single value."""
@@ -347,9 +347,9 @@ class TextList(Words):
         self.problem = Problem(f"must be a list of 1 to {_MAX_NAME_COUNT} names")
         self.fewest, self.most = 1, _MAX_NAME_COUNT
 
-    def below(self, part: str) -> Reader | None:
+    def below(self, step: str) -> Reader | None:
         """Reader of one name."""
-        return self.word if is_place(part) else None
+        return self.word if is_index(step) else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """JSON Schema: array of text."""
@@ -553,9 +553,9 @@ class Section(Reader):
             if name in self.keys
         }
 
-    def below(self, part: str) -> Reader | None:
+    def below(self, step: str) -> Reader | None:
         """Reader of a key."""
-        return self.keys[part].reader if part in self.keys else None
+        return self.keys[step].reader if step in self.keys else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """JSON Schema: reference to a definition, which is made on first use."""
@@ -605,9 +605,9 @@ class ListOf(Reader):
         entries = tuple([read_part(self.section, entry, (*path, index), report) for index, entry in enumerate(value)])
         return INVALID if INVALID in entries else entries
 
-    def below(self, part: str) -> Reader | None:
+    def below(self, step: str) -> Reader | None:
         """Reader of one entry."""
-        return self.section if is_place(part) else None
+        return self.section if is_index(step) else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """JSON Schema: array of the section."""
@@ -645,9 +645,10 @@ class CurveReader(Reader):
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each point; a problem is reported at its own path."""
         if not isinstance(value, dict) or not self.fewest <= len(value) <= _MAX_POINTS:
-            given = f", {len(value)} given" if isinstance(value, dict) else ""
+            length_words = f", {len(value)} given" if isinstance(value, dict) else ""
             report(
-                path, Problem(f"must be {self.fewest} to {_MAX_POINTS} points{given}", f"accepted: {self.accepted}")
+                path,
+                Problem(f"must be {self.fewest} to {_MAX_POINTS} points{length_words}", f"accepted: {self.accepted}"),
             )
             return INVALID
         points = {}
@@ -695,9 +696,9 @@ def is_empty(item: Any) -> bool:
     return isinstance(item, list) and all(map(is_empty, item))
 
 
-def is_place(part: str) -> bool:
-    """Whether a part of a key is the index of an entry."""
-    return part.isascii() and part.isdigit() and len(part) < 9
+def is_index(step: str) -> bool:
+    """Whether a step of a path is the index of an entry."""
+    return step.isascii() and step.isdigit() and len(step) < 9
 
 
 def read_part(reader: Reader, value: Any, path: KeyPath, report: Report) -> Any:

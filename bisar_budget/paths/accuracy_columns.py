@@ -104,27 +104,27 @@ _COLUMN_SPELLINGS = (
 
 
 def meaning_of(name: str, unit: str | None) -> tuple[str | None, str | None]:
-    """Meaning of a column, and its unit, as it is given or by the end of its name.
+    """Meaning of a column, and its unit, as stated or by the end of its name.
 
     It is `sigma_east` or of another axis, `variance_east`, `horizontal_accuracy`, `vertical_accuracy`,
     `position_accuracy` without a direction, `sigma_h` where another column has to say what h is, `CROSS_COVARIANCE`,
     `UNCLEAR`, or None of a column that is no accuracy of a position.
     """
     split, lower = _tokens(_CAMELS.sub("_", name)), _tokens(name)
-    given = unit
-    if not given:
+    stated_unit = unit
+    if not stated_unit:
         for tail, its_unit in _TAILS.items():
             if tuple(split[-len(tail) :]) == tail and len(split) > len(tail):
-                given, split, lower = its_unit, split[: -len(tail)], _without(lower, tail)
+                stated_unit, split, lower = its_unit, split[: -len(tail)], _without(lower, tail)
                 break
     # `SDn` is sdn, `SDHeight` is sd height: of both readings the one that is plain counts.
     meanings = [_of_tokens(tokens) for tokens in (split, lower)]
-    meaning = next((known for known in meanings if known not in (None, UNCLEAR, _OTHER)), None)
+    meaning = next((candidate for candidate in meanings if candidate not in (None, UNCLEAR, _OTHER)), None)
     if meaning is None and _OTHER not in meanings and UNCLEAR in meanings:
         meaning = UNCLEAR
-    if meaning is not None and given and not _may_be_of_positions(meaning, given):
+    if meaning is not None and stated_unit and not _may_be_of_positions(meaning, stated_unit):
         meaning = None
-    return meaning, given
+    return meaning, stated_unit
 
 
 def _tokens(name: str) -> list[str]:
@@ -150,34 +150,38 @@ def _of_tokens(tokens: Sequence[str]) -> str | None:
     ):
         return _OTHER if _PLACE.isdisjoint(tokens) else UNCLEAR
     is_position = not _POSITION_WORDS.isdisjoint(tokens)
-    rest = [
+    axis_tokens = [
         token
         for token in tokens
         if token not in _SIGMA_WORDS | _VARIANCES | _ERROR_WORDS | _POSITION_WORDS | _FILLING | {"ep"}
     ]
-    if any(_UNCLEAR_MEASURES.fullmatch(token) for token in rest):
+    if any(_UNCLEAR_MEASURES.fullmatch(token) for token in axis_tokens):
         return UNCLEAR
-    is_of_axis = len(rest) == 1 and (rest[0] in _AXIS_OF or rest[0] in _HORIZONTAL | _VERTICAL)
+    is_of_axis = len(axis_tokens) == 1 and (axis_tokens[0] in _AXIS_OF or axis_tokens[0] in _HORIZONTAL | _VERTICAL)
     if is_error:
-        return UNCLEAR if is_of_axis or (not rest and is_position) else None
+        return UNCLEAR if is_of_axis or (not axis_tokens and is_position) else None
     if not _VARIANCES.isdisjoint(words):
-        return _of_variance(rest)
-    if is_of_axis and rest[0] in _AXIS_OF:
-        return f"sigma_{_AXIS_OF[rest[0]]}"
+        return _of_variance(axis_tokens)
+    if is_of_axis and axis_tokens[0] in _AXIS_OF:
+        return f"sigma_{_AXIS_OF[axis_tokens[0]]}"
     if is_of_axis:
-        return "horizontal_accuracy" if rest[0] in _HORIZONTAL else "vertical_accuracy"
-    if rest == ["h"]:
+        return "horizontal_accuracy" if axis_tokens[0] in _HORIZONTAL else "vertical_accuracy"
+    if axis_tokens == ["h"]:
         return "horizontal_accuracy" if "accuracy" in words else "sigma_h"
-    if len(rest) == 1 and _is_cross(rest[0]):
+    if len(axis_tokens) == 1 and _is_cross(axis_tokens[0]):
         return CROSS_COVARIANCE
-    if not rest and (is_position or _WEAK.isdisjoint(words)):
+    if not axis_tokens and (is_position or _WEAK.isdisjoint(words)):
         return "position_accuracy" if is_position or "accuracy" not in words else "horizontal_accuracy"
     return None if _WEAK.issuperset(words) else UNCLEAR
 
 
-def _of_variance(rest: Sequence[str]) -> str:
+def _of_variance(axis_tokens: Sequence[str]) -> str:
     """Meaning of a variance or a covariance by the names of its axes: `ee`, `e`, `e e`, `east`."""
-    pair = list(rest[0]) if len(rest) == 1 and re.fullmatch(r"[enudxyz]{2}", rest[0]) else list(rest)
+    pair = (
+        list(axis_tokens[0])
+        if len(axis_tokens) == 1 and re.fullmatch(r"[enudxyz]{2}", axis_tokens[0])
+        else list(axis_tokens)
+    )
     axes = {_AXIS_OF.get(axis) for axis in pair}
     if None in axes or len(pair) > 2 or not axes:
         return UNCLEAR
@@ -201,7 +205,7 @@ def _may_be_of_positions(meaning: str, unit: str) -> bool:
 
     A length and an area do. An angle is refused where an axis of the place has it, as one that nobody knows.
     """
-    dimension = next((known for known in units.DIMENSIONS if _is_unit_of(unit, known)), None)
+    dimension = next((candidate for candidate in units.DIMENSIONS if _is_unit_of(unit, candidate)), None)
     if dimension in _OF_POSITIONS or dimension is None:
         return True
     return dimension is units.ANGLE and meaning not in (UNCLEAR, CROSS_COVARIANCE, "sigma_h", "vertical_accuracy")

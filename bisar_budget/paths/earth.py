@@ -127,9 +127,9 @@ def earth_fixed_places(latitude: Any, longitude: Any, height: Any) -> Floats:
     return np.stack([level * np.cos(longitude), level * np.sin(longitude), polar], axis=-1)
 
 
-def earth_fixed(place: Geodetic) -> Vector:
-    """Earth-fixed coordinates of a geodetic place, or of those of many cases. [m]"""
-    return _vector(earth_fixed_places(*np.broadcast_arrays(*place)))
+def earth_fixed(position: Geodetic) -> Vector:
+    """Earth-fixed coordinates of a geodetic position, or of positions of many cases. [m]"""
+    return _vector(earth_fixed_places(*np.broadcast_arrays(*position)))
 
 
 def _vector(coordinates: Floats) -> Vector:
@@ -187,18 +187,18 @@ def _directions(latitude: Any, longitude: Any) -> Floats:
     return np.stack([np.stack(direction, axis=-1) for direction in (east, north, up)])
 
 
-def axes_at(place: Geodetic) -> SceneAxes:
-    """East, north and up at a place, or at those of many cases."""
-    east, north, up = map(_vector, _directions(*np.broadcast_arrays(place.latitude, place.longitude)))
-    return SceneAxes(earth_fixed(place), (east, north, up))
+def axes_at(position: Geodetic) -> SceneAxes:
+    """East, north and up at a position, or at positions of many cases."""
+    east, north, up = map(_vector, _directions(*np.broadcast_arrays(position.latitude, position.longitude)))
+    return SceneAxes(earth_fixed(position), (east, north, up))
 
 
-def flown(place: Geodetic, heading: float, speed: float, climb: float, times_s: Any) -> Floats:
-    """Earth-fixed places (..., 3) after flights along the geodesic, at a height that `climb` changes. [m]
+def flown(position: Geodetic, heading: float, speed: float, climb: float, times_s: Any) -> Floats:
+    """Earth-fixed positions (..., 3) after flights along the geodesic, at a height that `climb` changes. [m]
 
     Parameters
     ----------
-    place : Geodetic
+    position : Geodetic
         At the beginning.
     heading : float
         There, from north, clockwise. [rad]
@@ -212,7 +212,7 @@ def flown(place: Geodetic, heading: float, speed: float, climb: float, times_s: 
     Derived here. The direction turns with the ellipsoid's normal alone, at speed over radius of curvature, which is
     Euler's formula. Runge and Kutta's fourth order, in Earth-fixed axes: there a pole is a place like others.
     """
-    axes = axes_at(place)
+    axes = axes_at(position)
     start = np.array(axes.origin)
     step = np.asarray(times_s, dtype=float)[..., None] / _RUNGE_KUTTA_STEPS
 
@@ -235,5 +235,5 @@ def flown(place: Geodetic, heading: float, speed: float, climb: float, times_s: 
         rates_3 = rates(state + step / 2 * rates_2)
         rates_4 = rates(state + step * rates_3)
         state = state + step / 6 * (rates_1 + 2 * rates_2 + 2 * rates_3 + rates_4)
-    places: Floats = start + state[0]
-    return places
+    positions: Floats = start + state[0]
+    return positions

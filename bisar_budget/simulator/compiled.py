@@ -332,11 +332,11 @@ def _expand(middle, platform, along, ranges):
 
 
 @_compiled
-def _split(ranges, per_metre, first, cycles, whole, fraction, turn, order):
+def _split(ranges, per_metre, first, cycles, whole_samples, fraction, turn, order):
     """Split off whole samples and whole cycles, in double precision."""
     for i in range(ranges.shape[1]):
         cell, step = ranges[0, i] * per_metre - first, ranges[1, i] * per_metre
-        whole[0, i], whole[1, i] = _I(np.floor(cell)), _I(np.rint(step))
+        whole_samples[0, i], whole_samples[1, i] = _I(np.floor(cell)), _I(np.rint(step))
         fraction[0, i], fraction[1, i] = _F(cell - np.floor(cell)), _F(step - np.rint(step))
     for n in range(3):
         for i in range(ranges.shape[1]):
@@ -350,13 +350,13 @@ def _split(ranges, per_metre, first, cycles, whole, fraction, turn, order):
 
 
 @_compiled
-def _places(whole, fraction, turn, order, cells_per_cycle, index, between, cycles):
+def _sample_points(whole_samples, fraction, turn, order, cells_per_cycle, index, between, cycles):
     """Sample before each pixel, distance of the pixel from that sample, and cycles of the carrier at the pixel.
 
     Cycles are in integers up to second order, in fractions of a cycle beyond.
     """
     for i in range(between.shape[0]):
-        base, step, start, slope = whole[0, i], whole[1, i], fraction[0, i], fraction[1, i]
+        base, step, start, slope = whole_samples[0, i], whole_samples[1, i], fraction[0, i], fraction[1, i]
         c0, c1, c2 = turn[0, i], turn[1, i], turn[2, i]
         p2, p3, p4 = order[0, i], order[1, i], order[2, i]
         for j in range(_SEGMENT_LENGTH):
@@ -459,7 +459,7 @@ def _add_lattice(
             _expand(middle, transmitter[pulse], along, ranges)
             _expand(middle, receiver[pulse], along, ranges)
             _split(ranges, per_metre, first[pulse], cycles, whole, fraction, turn, order)
-            _places(whole, fraction, turn, order, cells_per_cycle, index, between, carrier)
+            _sample_points(whole, fraction, turn, order, cells_per_cycle, index, between, carrier)
             _fetch(profiles[pulse], index, cubic, fetched)
             _add_taps(taps, between, carrier, cubic, real, imag)
         for i in range(rows):
