@@ -8,6 +8,7 @@ and back. Each step checks many values at once in the case table. Values in SI a
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from datetime import date
 from functools import partial
 from itertools import pairwise
@@ -39,14 +40,38 @@ from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, Range
 from bisar_budget.workers import Progress, unseen
 
 _OF_ALL = ", or --scale for all of them"
-RANGE_SAMPLES = 65
-CIRCLE_SAMPLES = 181  # every 2 degrees: geometry changes fast near parallel gradients
-_NARROW_FRACTION = 2e-7  # of the value, between the two sides of a crossing before they are rounded
 _GOLDEN = (math.sqrt(5) - 1) / 2
-_TURN_STEPS = 20  # of a golden section, which end at 7e-5 of the distance between samples
-_SEARCHED_TURN_COUNT = 16  # per question
-# Steps that a search looks ahead: usually, and if each case is read, which takes longer.
-_LOOK_AHEAD_STEPS, _READ_LOOK_AHEAD_STEPS = 5, 2
+
+
+@dataclass(frozen=True)
+class SolveSettings:
+    """Tunings of the search for the borders of compliance.
+
+    Attributes
+    ----------
+    range_samples, circle_samples : int
+        Number of samples of a range, and of a circle: every 2 degrees, because geometry changes fast near parallel
+        gradients.
+    border_fraction : float
+        Distance between the two sides of a border before they are rounded, as a fraction of the value.
+    max_turns_count : int
+        Largest number of maxima and minima of the utilization that are searched.
+    turn_steps : int
+        Number of steps of a golden section, which then ends at 7e-5 of the distance between samples.
+    ahead_steps, read_ahead_steps : int
+        Number of steps that a search looks ahead: usually, and if each case is read, which takes longer.
+    """
+
+    range_samples: int = 65
+    circle_samples: int = 181
+    border_fraction: float = 2e-7
+    max_turns_count: int = 16
+    turn_steps: int = 20
+    ahead_steps: int = 5
+    read_ahead_steps: int = 2
+
+
+SOLVE_SETTINGS = SolveSettings()
 
 # A function of the known states by value; it returns its result, or the set of values whose states it needs.
 Search = Callable[[Mapping[float, "State"]], Any]
@@ -300,18 +325,22 @@ class _Search:
         self.table = Table(
             Question.of(mission, [key], model, today, row=row, breaks=self.breaks), mission, [of_table]
         )
-        self.levels = _READ_LOOK_AHEAD_STEPS if self.table.to_read else _LOOK_AHEAD_STEPS
+        self.levels = SOLVE_SETTINGS.read_ahead_steps if self.table.to_read else SOLVE_SETTINGS.ahead_steps
 
     def scanned(self, progress: Progress) -> tuple[list[State], State | None]:
         """States at the samples of the range and at turns of the utilization, and the state of the file."""
-        values = self.range.places(CIRCLE_SAMPLES if self.range.is_circle else RANGE_SAMPLES)
+        values = self.range.places(
+            SOLVE_SETTINGS.circle_samples if self.range.is_circle else SOLVE_SETTINGS.range_samples
+        )
         value = self.number.value
         if value is not None and self.range.low < value < self.range.high:
             values = sorted({*values, value})
         states = self.states(values if value is None else [*values, value], progress)
         file_state = None if value is None else states.pop()
         # Between samples with equal compliance it may change there and back, at a turn of the utilization.
-        searches = [partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[:_SEARCHED_TURN_COUNT]]
+        searches = [
+            partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[: SOLVE_SETTINGS.max_turns_count]
+        ]
         turned = [state for state in self._searched(searches) if state is not None]
         return sorted([*states, *turned], key=lambda state: state.value), file_state
 
@@ -379,7 +408,7 @@ def _bracketed(
     low: State, high: State, least: float, levels: int, states_by_value: Mapping[float, State]
 ) -> tuple[State, State] | set[float]:
     """Bisect an interval with a border until it is narrow, or return the values of the next steps."""
-    while high.value - low.value > _NARROW_FRACTION * max(abs(low.value), abs(high.value), least):
+    while high.value - low.value > SOLVE_SETTINGS.border_fraction * max(abs(low.value), abs(high.value), least):
         middle = (low.value + high.value) / 2
         if not low.value < middle < high.value:
             break
@@ -424,7 +453,7 @@ def _turn(
     low: float, high: float, here: State, levels: int, states_by_value: Mapping[float, State]
 ) -> State | set[float] | None:
     """A state near a turn with another compliance, None if there is none, or the values of the next steps."""
-    for _ in range(_TURN_STEPS):
+    for _ in range(SOLVE_SETTINGS.turn_steps):
         values = _golden(low, high)
         if not states_by_value.keys() >= set(values):
             return _ahead(_golden, low, high, levels)

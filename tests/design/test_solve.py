@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import date
 from itertools import pairwise
 
@@ -88,7 +89,7 @@ def test_the_target_may_be_not_to_warn() -> None:
 @pytest.mark.parametrize("file", sorted(MISSIONS.glob("*.yaml")), ids=lambda file: file.stem)
 def test_check_passes_just_inside_and_fails_just_outside(file, monkeypatch) -> None:
     """Of the gate itself, with the values as they are written: aperture time, and the errors of a platform."""
-    monkeypatch.setattr(solving, "RANGE_SAMPLES", 5)
+    monkeypatch.setattr(solving, "SOLVE_SETTINGS", replace(solving.SOLVE_SETTINGS, range_samples=5))
     found = solve("collection.aperture_time", file=str(file))
     asked = [(found, lambda text: load_mission(str(file), changes=[SetValue(found.key, text)]))]
     mission = load_mission(str(file))
