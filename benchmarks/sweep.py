@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.design.cases import Cases
 from bisar_budget.design.sweep import Asked
 from bisar_budget.faults import SetValue
@@ -36,7 +36,7 @@ ACCELERATION, TOTAL, CARRIER, BANDWIDTH = 0.005, math.pi / 4, 10e9, 300e6
 
 def by_hand(azimuth: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Utilization, phase by exact ranges [rad] and status of Section V for azimuths of the receiver and apertures."""
-    wavelength = SPEED_OF_LIGHT / CARRIER
+    wavelength = SPEED_OF_LIGHT_MPS / CARRIER
     k, elevation, R = 2 * np.pi / wavelength, math.radians(13.609), 8500.0
     p, v = (30414.0, 0.0, 6000.0), (0.0, 150.0, 0.0)
     q = (
@@ -56,7 +56,10 @@ def by_hand(azimuth: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     skew = np.arctan2(
         np.abs(gradient[0] * rate[1] - gradient[1] * rate[0]), np.abs(gradient[0] * rate[0] + gradient[1] * rate[1])
     )
-    resolution = SPEED_OF_LIGHT / (BANDWIDTH * np.hypot(*gradient)), wavelength / (T * np.hypot(*rate) * np.sin(skew))
+    resolution = (
+        SPEED_OF_LIGHT_MPS / (BANDWIDTH * np.hypot(*gradient)),
+        wavelength / (T * np.hypot(*rate) * np.sin(skew)),
+    )
     angle = np.arccos(sum(x * y for x, y in zip(t_look, r_look, strict=True)))
     nodes, weights = np.polynomial.legendre.leggauss(6)
     mean, quadratic = weights / 2, 3.75 * weights * np.polynomial.legendre.legval(nodes, (0.0, 0.0, 1.0))

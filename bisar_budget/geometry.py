@@ -15,19 +15,19 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 
 Vector = tuple[float, float, float]
 Vectors = tuple[Any, Any, Any]  # three components, each an array or a float
 GroundVector = tuple[float, float]
 
-_DIRECTED = 1e-300  # m/s; a smaller velocity has too few digits for a direction
+_MIN_DIRECTED_SPEED_MPS = 1e-300  # a smaller velocity has too few digits for a direction
 STRAIGHT: Vector = (0.0, 0.0, 0.0)  # acceleration of a platform with a straight path
 Axes = tuple[Vectors, Vectors, Vectors]
 
-STILL = 1e-6  # m/s; a slower platform does not move
+STILL_SPEED_MPS = 1e-6  # a slower platform does not move
 _LOOKS_PER_PIECE = 8  # samples of a path in pieces, for its length and its lowest point
-_FEWEST_LOOKS = 32  # samples on each side of the midpoint
+_MIN_LOOK_COUNT = 32  # samples on each side of the midpoint
 FRAME_AXES = {
     "scene": ("x", "y", "z"),
     "track": ("along", "cross", "up"),
@@ -88,7 +88,7 @@ def unit(a: Vectors) -> Vectors:
 
 def without_rounding(a: Vectors) -> Vectors:
     """Set components to zero that are only rounding errors relative to the vector's length: cos 90° is 6e-17."""
-    floor = ROUNDING * norm(a)
+    floor = VECTOR_ROUNDING_FRACTION * norm(a)
     return (_above(floor, a[0]), _above(floor, a[1]), _above(floor, a[2]))
 
 
@@ -256,7 +256,7 @@ class PlatformState:
     @property
     def is_still(self) -> Any:
         """Whether the platform does not move; a path in pieces always moves."""
-        return self.curve is None and self.travelled(1.0) < STILL
+        return self.curve is None and self.travelled(1.0) < STILL_SPEED_MPS
 
     @property
     def is_straight(self) -> bool:
@@ -352,7 +352,7 @@ class PlatformState:
 
     def _looks(self, duration_s: Any) -> Vectors:
         """Positions within a time of the midpoint, equally many on each side, (samples, cases). [m]"""
-        count = _FEWEST_LOOKS if self.curve is None else max(_FEWEST_LOOKS, _LOOKS_PER_PIECE * self.curve.count)
+        count = _MIN_LOOK_COUNT if self.curve is None else max(_MIN_LOOK_COUNT, _LOOKS_PER_PIECE * self.curve.count)
         return self.place(np.linspace(-1.0, 1.0, 2 * count + 1)[:, None] * duration_s)
 
     def less(self, other: "PlatformState") -> "PlatformState":
@@ -382,7 +382,7 @@ class PlatformState:
         if speed == 0:
             return None
         sine = -dot(self.look, self.velocity) / speed
-        return math.asin(max(-1.0, min(1.0, sine))) if abs(sine) > ROUNDING else 0.0
+        return math.asin(max(-1.0, min(1.0, sine))) if abs(sine) > VECTOR_ROUNDING_FRACTION else 0.0
 
     def has_frame(self, name: str, margin: float = 1.0) -> Any:
         """Whether the platform has a frame, with a margin for rounding."""
@@ -390,7 +390,9 @@ class PlatformState:
             return name == "scene" or self.radial is not None
         first = self._first_axis(name)
         length = norm(first)
-        return (length >= _DIRECTED) & (_hypot(first[0], first[1]) >= margin * ROUNDING * length)
+        return (length >= _MIN_DIRECTED_SPEED_MPS) & (
+            _hypot(first[0], first[1]) >= margin * VECTOR_ROUNDING_FRACTION * length
+        )
 
     def _first_axis(self, name: str) -> Vectors:
         return self.velocity if name == "track" else self.position
@@ -425,7 +427,7 @@ class PlatformState:
     def _why_no_frame(self, name: str) -> str:
         if name == "ric":
             return "the ric frame needs the scene's latitude, longitude and height"
-        if norm(self._first_axis(name)) < _DIRECTED:
+        if norm(self._first_axis(name)) < _MIN_DIRECTED_SPEED_MPS:
             return "a still platform has no track frame"
         return f"the first axis of its {name} frame is vertical, so cross has no direction"
 
@@ -477,7 +479,7 @@ class BistaticGeometry:
     def echo_delay(self) -> Any:
         """Delay of the scene centre's echo after the direct path, at mid-aperture. [s]"""
         t, r = self.both
-        return (t.slant_range + r.slant_range - self.apart.slant_range) / SPEED_OF_LIGHT
+        return (t.slant_range + r.slant_range - self.apart.slant_range) / SPEED_OF_LIGHT_MPS
 
     def at(self, tau: Any) -> "BistaticGeometry":
         """The geometry at slow times [s], with straight paths through the positions at these times."""

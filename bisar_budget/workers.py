@@ -39,7 +39,7 @@ class MapBlocks(Protocol):
         """Map the blocks."""
 
 
-_PATIENCE = 10.0  # s to wait for the pool's own thread, which ends as soon as its workers end
+_POOL_TIMEOUT_S = 10.0  # to wait for the pool's own thread, which ends as soon as its workers end
 
 
 def unseen(done: int, total: int) -> None:
@@ -64,7 +64,7 @@ def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExe
             worker.terminate()
         for thread in set(threading.enumerate()) - worker_count:
             if not thread.daemon:  # the pool's own: at its exit Python might write to the pipe that it is closing
-                thread.join(_PATIENCE)
+                thread.join(_POOL_TIMEOUT_S)
         if isinstance(error, BrokenProcessPool):
             raise WorkerLostError("a worker process was ended from outside, as when memory runs out") from None
         raise

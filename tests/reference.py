@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import FRAME_AXES, PlatformState
 from bisar_budget.mission.model import Mission
 
@@ -98,7 +98,7 @@ def errors_of(mission: Mission) -> Iterator[Error]:
     near, still = FAR * min(ranges), np.zeros((2, 3, 3))
     for order, term in enumerate(CLOCK):
         value = getattr(mission.timing_error, term)
-        cap = 2 * min(ranges) / SPEED_OF_LIGHT / (T / 2) ** order
+        cap = 2 * min(ranges) / SPEED_OF_LIGHT_MPS / (T / 2) ** order
         size = None if value is None else factor * value
         clock = np.zeros(4) if _is_heard(mission) else np.eye(4)[order]
         yield Error(f"timing.{term}", "clock", still, clock, size, cap)
@@ -195,7 +195,7 @@ class Lanes:
         self.is_heard = _is_heard(mission)
         self.apart, self.parted = self.true[:, 0] - self.true[:, 1], self.error[:, 0] - self.error[:, 1]
         clock = np.array([e.clock for e in errors])
-        self.clock = SPEED_OF_LIGHT * clock @ np.array([tau**order for order in range(4)])  # (L, n)
+        self.clock = SPEED_OF_LIGHT_MPS * clock @ np.array([tau**order for order in range(4)])  # (L, n)
         self.band = (mission.radar.bandwidth / mission.radar.center_frequency) ** 2 / 12
         looks = self.true / self.recorded[..., None]
         cosines = np.einsum("lknf,lkmf->lknm", looks, looks).min(axis=(1, 2, 3))

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.constants import ROUNDING
+from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.declared import published_planes
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones
@@ -130,5 +130,5 @@ def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
 
 def _by_ranges(exact: ExactRanges, along: Floats) -> Floats:
     """Displacement by a metre of each order by exact ranges, if the range has `along` of it, (nodes, n). [m/m]"""
-    seen = np.where(np.abs(along) > ROUNDING, along, 0.0)
+    seen = np.where(np.abs(along) > VECTOR_ROUNDING_FRACTION, along, 0.0)
     return np.asarray(np.einsum("wnc,nc,no->owc", exact.place_weights, seen, orders_at(exact.sampling.places)))

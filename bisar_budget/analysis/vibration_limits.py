@@ -30,7 +30,7 @@ from bisar_budget.effects.slow_tones import SlowTone
 from bisar_budget.effects.vibration import near_groups, worst_phases
 from bisar_budget.mission.model import Mission, Shares
 
-LARGEST_ECHO = 2.0  # rad; with a larger phase, echoes are above the response
+MAX_ECHO_PHASE_RAD = 2.0  # with a larger phase, echoes are above the response
 
 
 class VibrationLimits(NamedTuple):
@@ -81,7 +81,7 @@ class Echo(NamedTuple):
 
 def level_of(phase: Any) -> Any:
     """Amplitude of a paired echo over the amplitude of the response; half the phase beyond 2 rad."""
-    return np.where(phase <= LARGEST_ECHO, echo_level(np.minimum(phase, LARGEST_ECHO)), phase / 2)[()]
+    return np.where(phase <= MAX_ECHO_PHASE_RAD, echo_level(np.minimum(phase, MAX_ECHO_PHASE_RAD)), phase / 2)[()]
 
 
 def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:

@@ -370,7 +370,7 @@ class _Words(NamedTuple):
     equation: tuple[str, str]  # by the published model, by the full model
 
 
-_EQUATIONS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "each": "largest of the rows"}
+_ROW_SUM_WORDS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "each": "largest of the rows"}
 _PATHS: dict[str, KeyPath] = {"mission": ("platforms",), "clock": ("timing_error",)}
 _WORDINGS = {
     CUBIC: _Words("cubic phase", "rad", ("requirements", CUBIC), ("Table I, cubic column", "full model")),
@@ -383,7 +383,7 @@ def _wording_of(row_subject: Subject, rule: str) -> _Words:
     if row_subject.kind in _WORDINGS:
         return _WORDINGS[row_subject.kind]
     path = _PATHS.get(row_subject.owner, ("platforms", row_subject.owner, "motion_error"))
-    return _Words("QPE", "rad", path, (_EQUATIONS[rule], _EQUATIONS[rule]))
+    return _Words("QPE", "rad", path, (_ROW_SUM_WORDS[rule], _ROW_SUM_WORDS[rule]))
 
 
 def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, Note]:

@@ -24,7 +24,7 @@ from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, Subject
 from bisar_budget.effects.navigation_errors import residual_subject
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, norm, unit
-from bisar_budget.mission.covariance import KINDS
+from bisar_budget.mission.covariance import MOTION_KINDS
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath, LogNoise, MotionError, Platform
 from bisar_budget.paths.accuracy import StatedAccuracy
@@ -73,7 +73,7 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
             key = f"platforms.{name}.motion_error.position"
             note = phrases.input_in_doubt(path.doubt_m, path.doubt_of, declared, key)
             doubts.append(InputDoubt(name, path.doubt_m, declared or 0.0, note))
-        for kind in KINDS:
+        for kind in MOTION_KINDS:
             doubts += [
                 _stated_doubt(platform, name, kind, stated)
                 for stated in path.stated
@@ -94,7 +94,7 @@ def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Tru
     for name in PLATFORMS:
         path: FlownPath | None = getattr(mission.platforms, name).path
         if path is not None:
-            for kind in KINDS:
+            for kind in MOTION_KINDS:
                 doubts = [strays(mission, name), is_coarse(mission, name)] if kind == "position" else []
                 doubts += [states_more(mission, name, kind, stated) for stated in path.stated]
                 doubted[name, kind] = np.any([np.broadcast_to(doubt, (cases,)) for doubt in (False, *doubts)], axis=0)
@@ -181,7 +181,7 @@ def _stated_covariance(stated: StatedAccuracy, kind: str, platform: Platform) ->
 
     A velocity of a platform in free fall is against the stars where the file states its errors in `ric`.
     """
-    covariance, row, fall = stated.covariance, 3 * KINDS.index(kind), platform.state.fall
+    covariance, row, fall = stated.covariance, 3 * MOTION_KINDS.index(kind), platform.state.fall
     if covariance is None or len(covariance) <= row:
         return None
 
@@ -350,7 +350,7 @@ def _range_errors(mission: Mission, name: str, kind: str, half: Floats) -> Seque
         return [sight * power for sight, power in zip(sights, powers, strict=True)]
     halves = np.atleast_1d(np.broadcast_to(half, np.broadcast_shapes(half.shape, sights[0].shape[:-1])))
     motions = path.fall.motions(path, halves, np.array((-1.0, 0.0, 1.0)))
-    units = motions[KINDS.index(kind)]
+    units = motions[MOTION_KINDS.index(kind)]
     if kind == "position" and platform.motion_error.frame == "ric":
         rates = [path.fall.rate_against_stars(axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
         turned = [sum(motions[1][i] * rate[i] for i in range(3)) for rate in rates]

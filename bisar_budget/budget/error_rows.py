@@ -11,7 +11,7 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, Model
 from bisar_budget.budget.judged_rows import (
     CODE,
-    EFFECTS,
+    EFFECT_WORDS,
     LIMIT_RATIO,
     REQUIREMENTS,
     FamilyRow,
@@ -19,7 +19,15 @@ from bisar_budget.budget.judged_rows import (
     Judging,
     worded,
 )
-from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, OTHER_MODEL, QUADRATIC, Declared
+from bisar_budget.effects.declared import (
+    CUBIC,
+    END_OF_IMAGE,
+    LIMITING_REQUIREMENTS,
+    LOCATION,
+    OTHER_MODEL,
+    QUADRATIC,
+    Declared,
+)
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.geometry import FRAME_AXES
@@ -28,7 +36,9 @@ from bisar_budget.mission.quantities import Number, largest_at
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Floats
 
-_BINDING = np.array([REQUIREMENTS.index(name) for name in (*HELD, END_OF_IMAGE)] + [-1], dtype=np.int8)
+_BINDING = np.array(
+    [REQUIREMENTS.index(name) for name in (*LIMITING_REQUIREMENTS, END_OF_IMAGE)] + [-1], dtype=np.int8
+)
 
 
 class ErrorRows:
@@ -190,8 +200,8 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
     if size <= allowed * LIMIT_RATIO or other.is_blind:
         return NOTHING
     if binding == QUADRATIC and other.is_published:
-        return phrases.other_model_fails(other.name, size, allowed, *EFFECTS[binding], source.equation)
-    note = phrases.other_model_fails(other.name, size, allowed, *EFFECTS[binding])
+        return phrases.other_model_fails(other.name, size, allowed, *EFFECT_WORDS[binding], source.equation)
+    note = phrases.other_model_fails(other.name, size, allowed, *EFFECT_WORDS[binding])
     return note.then(_cause(source)) if binding == QUADRATIC else note
 
 

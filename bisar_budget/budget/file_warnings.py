@@ -15,7 +15,7 @@ from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubted_noise import noise_doubts
 from bisar_budget.budget.doubts import input_doubts, missing_settings
 from bisar_budget.budget.fit_noise import MAX_UNSAID_CHANGE_FRACTION, allowable_noise
-from bisar_budget.constants import FASTEST_FLIGHT
+from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
 from bisar_budget.faults import KeyPath, changes_words
@@ -173,7 +173,7 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         speed, axes = norm(platform.state.velocity), mission.scene.axes
-        if speed <= FASTEST_FLIGHT or platform.acceleration is not None or platform.is_of_the_earth:
+        if speed <= MAX_FLIGHT_SPEED_MPS or platform.acceleration is not None or platform.is_of_the_earth:
             continue
         key = ("platforms", name, "speed" if platform.velocity is None else "velocity")
         from bisar_budget.paths.earth import free_fall  # takes 8 ms; most missions do not need it

@@ -25,7 +25,7 @@ from bisar_budget.budget.error_rows import ErrorRows, specification_rows
 from bisar_budget.budget.file_warnings import calm_oscillators
 from bisar_budget.budget.half_causes import HalfCause, half_causes
 from bisar_budget.budget.judged_requirements import (
-    KEYS,
+    REQUIREMENT_KEYS,
     RequirementState,
     UntakenEffect,
     is_as_high,
@@ -39,7 +39,7 @@ from bisar_budget.budget.staying_air import StayingAir, staying_air
 from bisar_budget.budget.tone_rows import accelerated_rows, pslr_row, spur_rows
 from bisar_budget.budget.vibration_rows import Vibrations
 from bisar_budget.budget.waivers import holding_place
-from bisar_budget.constants import FASTEST_FLIGHT
+from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.findings.row import DECLARE, SPECIFICATION
@@ -48,7 +48,7 @@ from bisar_budget.geometry import BistaticGeometry, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import Truths
 
-_BROKEN = [CODE[name] for name in BROKEN]
+_BROKEN_CODES = [CODE[name] for name in BROKEN]
 _GATES = np.array([status.gates for status in STATUS.values()])
 _OWNERS = (*PLATFORMS, "clock", "mission")
 
@@ -149,11 +149,13 @@ class _Judgement:
         before = of_all.status
         waivers = of_all.waivers(self.today)
         after = np.where(waivers >= 0, CODE["waived"], before)
-        of_requirements = {key: holding_place(mission, self.today, [f"mission.{key}"]) for key in KEYS}
+        of_requirements = {key: holding_place(mission, self.today, [f"mission.{key}"]) for key in REQUIREMENT_KEYS}
         states = requirement_states(
             mission,
             # A requirement judges its effects without the row's status, but a waiver of its row waives it too.
-            np.where((after == CODE["waived"]) & np.isin(by_themselves, _BROKEN), CODE["waived"], by_themselves),
+            np.where(
+                (after == CODE["waived"]) & np.isin(by_themselves, _BROKEN_CODES), CODE["waived"], by_themselves
+            ),
             np.array([row.utilization for row in rows]),
             of_all.judges(),
             np.array([row.quadratic_use for row in rows]),
@@ -311,7 +313,9 @@ class _Judgement:
                 strays_from_log = strays(self.mission, name) & (not platform.path.samples)
                 floor[~np.broadcast_to(strays_from_log, floor.shape)] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
-                floor[np.broadcast_to(np.asarray(norm(path.velocity)) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
+                floor[np.broadcast_to(np.asarray(norm(path.velocity)) > MAX_FLIGHT_SPEED_MPS, floor.shape)] = CODE[
+                    "warn"
+                ]
         platforms = (getattr(self.mission.platforms, name) for name in PLATFORMS)
         if calm_oscillators(self.mission) or any(map(swings_nothing, platforms)):
             floor[:] = CODE["warn"]
@@ -420,12 +424,14 @@ class RowStatuses:
             waiver_of_row = holding_place(self.mission, today, [row_subject.id])
             both = [waiver_index for waiver_index in (waiver_of_row, of_missing) if waiver_index >= 0]
             indices[row] = np.where(is_missing[row], min(both, default=-1), waiver_of_row)
-        return np.where(np.isin(self.status, _BROKEN), indices, -1)
+        return np.where(np.isin(self.status, _BROKEN_CODES), indices, -1)
 
     def judges(self) -> Codes:
-        """Index in `KEYS` of the requirement that judges each row; -1: no requirement, or not declared."""
+        """Index in `REQUIREMENT_KEYS` of the requirement that judges each row; -1: none, or not declared."""
         binding = np.array([row.binding for row in self.rows])
-        metric = np.array([[KEYS.index(row.metric) if row.metric in KEYS else -1] for row in self.rows])
+        metric = np.array(
+            [[REQUIREMENT_KEYS.index(row.metric) if row.metric in REQUIREMENT_KEYS else -1] for row in self.rows]
+        )
         judges = np.where((binding >= 0) & (binding < REQUIREMENTS.index(END_OF_IMAGE)), binding, metric)
         return np.where(self.why == Why.NOT_DECLARED_AS_REQUIRED, -1, judges).astype(np.int8)
 

@@ -22,8 +22,8 @@ from bisar_budget.findings.status import BROKEN, RANK, STATUS
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 
-KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
-UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
+REQUIREMENT_KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
+REQUIREMENT_UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
 EQUAL_USE_FRACTION = 1e-9  # relative difference below which utilizations are equal, but for rounding
 NEGLIGIBLE_FRACTION, SMALL_RAD = 0.1, 0.08  # of the quadratic requirement; phase that is small in any image
 # Relative to the largest part: rows with smaller parts do not make up an effect if their sum is negligible.
@@ -91,7 +91,9 @@ def negligible_rad(mission: Mission) -> Any:
 def required_keys(mission: Mission) -> tuple[str, ...]:
     """Keys of the requirements that a mission has, the default of the quadratic phase included."""
     needs = mission.requirements
-    return tuple(key for key in KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None))
+    return tuple(
+        key for key in REQUIREMENT_KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None)
+    )
 
 
 def requirement_states(
@@ -119,7 +121,7 @@ def requirement_states(
     utilization : (rows, n)
         Utilizations of the rows; NaN without a value.
     judges : (rows, n)
-        Index in KEYS of the requirement that each row judges; -1: no requirement.
+        Index in `REQUIREMENT_KEYS` of the requirement that each row judges; -1: no requirement.
     quadratic_use : (rows, n)
         Quadratic phase of each row over its limit, for any requirement that sets the allowable; NaN without a phase.
     waived : mapping of str to bool
@@ -140,7 +142,7 @@ def requirement_states(
     uses, states = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     is_open = before == RANK["not_evaluated"]
     for key in required_keys(mission):
-        mine = IS_JUDGED[codes] & (judges == KEYS.index(key))
+        mine = IS_JUDGED[codes] & (judges == REQUIREMENT_KEYS.index(key))
         levels, used = np.where(mine, codes, _NONE), uses
         if key == QUADRATIC:  # this requirement also limits a row that another requirement binds
             is_of_other = IS_JUDGED[codes] & ~mine & ~np.isnan(quadratic_use)

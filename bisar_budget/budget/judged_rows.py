@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
-from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.constants import UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import Subject
 from bisar_budget.faults import KeyPath
@@ -24,20 +24,30 @@ from bisar_budget.ranges.exact_ranges import Floats
 
 Codes = NDArray[np.int8]  # indices of statuses in STATUS: the worst has the lowest
 
-LIMIT_RATIO = 1 + UTILIZATION_TOLERANCE
+LIMIT_RATIO = 1 + UTILIZATION_TOLERANCE_FRACTION
 CODE = {name: np.int8(rank) for name, rank in RANK.items()}
-_NAMES = np.array(list(STATUS), dtype=object)
+_STATUS_NAMES = np.array(list(STATUS), dtype=object)
 REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", END_OF_IMAGE)
-EFFECTS = {QUADRATIC: ("rad", "QPE"), CUBIC: ("rad", "cubic phase"), LOCATION: ("m", "displacement")}  # in a sentence
+EFFECT_WORDS = {
+    QUADRATIC: ("rad", "QPE"),
+    CUBIC: ("rad", "cubic phase"),
+    LOCATION: ("m", "displacement"),
+}  # in a sentence
 
-WHOLE = ("allowable_published", "allowable_full", "qpe_full_rad", "qpe_exact_rad", "islr_db")  # see `Judging`
+COMPLETE_FIELDS = (
+    "allowable_published",
+    "allowable_full",
+    "qpe_full_rad",
+    "qpe_exact_rad",
+    "islr_db",
+)  # see `Judging`
 NUMBERS = (
     "declared",
     "allowable",
     "utilization",
     "qpe_published_rad",
     "cubic_rad",
-    *WHOLE[:3],
+    *COMPLETE_FIELDS[:3],
     "islr_db",
     "equal_loss_qpe_rad",
     "rest_rad",
@@ -48,7 +58,7 @@ IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # 
 
 def statuses(codes: Any) -> Any:
     """Name of the status with a code, or names for an array of codes."""
-    return _NAMES[codes]
+    return _STATUS_NAMES[codes]
 
 
 class Why(IntEnum):
@@ -109,12 +119,12 @@ class Judged(NamedTuple):
 
     def at(self, row_index: int, row_subject: Subject) -> "Judged":
         """The row at `row_index` of several rows that were judged together, (rows, cases)."""
-        return self._of_columns(lambda column: column[row_index], _COLUMNS)._replace(subject=row_subject)
+        return self._of_columns(lambda column: column[row_index], _ARRAY_FIELDS)._replace(subject=row_subject)
 
     def where(self, takes_other: Any, other: "Judged") -> "Judged":
         """This row, with the values of `other` in the cases where `takes_other` is true."""
         columns: dict[str, Any] = {
-            name: np.where(takes_other, getattr(other, name), getattr(self, name)) for name in _COLUMNS
+            name: np.where(takes_other, getattr(other, name), getattr(self, name)) for name in _ARRAY_FIELDS
         }
         return self._replace(**columns)
 
@@ -158,7 +168,7 @@ class Judged(NamedTuple):
         return margin
 
 
-_COLUMNS = tuple(name for name in Judged._fields if name not in ("subject", "metric", "is_of_ranges"))
+_ARRAY_FIELDS = tuple(name for name in Judged._fields if name not in ("subject", "metric", "is_of_ranges"))
 
 
 def decibels(amplitude: Any) -> Floats:

@@ -19,7 +19,7 @@ from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
 from bisar_budget.budget.aggregates import untaken_effects
 from bisar_budget.budget.judged_requirements import EXAMPLES, NEGLIGIBLE_FRACTION, TAKEN_BY, UntakenEffect
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, Judged
-from bisar_budget.budget.random_rows import HELD, ISLR, held_effect
+from bisar_budget.budget.random_rows import ISLR, RANDOM_REQUIREMENTS, held_effect
 from bisar_budget.effects.air_delays import changing_air
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
@@ -176,7 +176,7 @@ def _uses(analysis: Analysis, errors: Sequence[RandomError], model: str) -> Iter
     """Use of each row that a requirement limits, by changing delays, by one model."""
     mission, allocation = analysis.mission, analysis.allocation
     rule = mission.allocation.combine
-    for key in HELD:
+    for key in RANDOM_REQUIREMENTS:
         sizes = [(error, _size(analysis, error, model, key)) for error in errors]
         if key == QUADRATIC and rule == "each":
             for error, size in sizes:

@@ -12,7 +12,7 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import islr_of
 from bisar_budget.analysis.vibration_limits import (
-    LARGEST_ECHO,
+    MAX_ECHO_PHASE_RAD,
     VibrationLimits,
     echo_level,
     slow_limits,
@@ -152,7 +152,7 @@ class Vibrations:
             does, gain = self.slow_tones[row_subject.id].declared, self.allocation.autofocus_gain
             phases_of_line = (does.quadratic, does.cubic, does.judged(1.0), does.judged(gain))
             phases = NearPhases.of(self.mission, self.allocation, name, is_near, phases_of_line)
-        level = 20 * np.log10(echo_level(np.minimum(both, LARGEST_ECHO)))
+        level = 20 * np.log10(echo_level(np.minimum(both, MAX_ECHO_PHASE_RAD)))
         required = self.mission.requirements.pslr
         is_over_both = np.zeros(is_there.shape, dtype=bool) if required is None else level > required + _ROUNDING_DB
         return self._row(
@@ -316,7 +316,7 @@ def _line_row(case: Case, vibration_row: VibrationRow, error: MotionError, model
             other_platform,
             NEAR_CYCLES,
             float(vibration_row.level[case_index]),
-            bool(vibration_row.both[case_index] > LARGEST_ECHO),
+            bool(vibration_row.both[case_index] > MAX_ECHO_PHASE_RAD),
             required,
         )
         more, doubt = [note], note if vibration_row.is_over_both[case_index] else NOTHING

@@ -27,7 +27,7 @@ from bisar_budget.cli.options import (
 )
 from bisar_budget.cli.projects import Project, by_settings
 from bisar_budget.cli.streams import (
-    EXIT_BROKEN,
+    BROKEN_EXIT_CODE,
     complain,
     deliver,
     expand,
@@ -40,7 +40,7 @@ from bisar_budget.cli.streams import (
     wants_color,
     write_file,
 )
-from bisar_budget.constants import MAX_DRAWS, MAX_DRAWS_HERE
+from bisar_budget.constants import MAX_DRAWS, MAX_LOCAL_DRAWS
 from bisar_budget.faults import closed, fault_words, printable
 from bisar_budget.json_types import JsonObject
 from bisar_budget.report import FORMATS
@@ -169,7 +169,7 @@ class _Draws(ParamType[int]):
         except InvalidOperation:
             number = Decimal(0)
         if not (number.is_finite() and 1 <= number <= MAX_DRAWS and number == int(number)):
-            most = f"{MAX_DRAWS_HERE:,}, or {MAX_DRAWS:,} with --scheduler"
+            most = f"{MAX_LOCAL_DRAWS:,}, or {MAX_DRAWS:,} with --scheduler"
             accepted = f"must be a whole number of draws from 1 to {most}, such as 100000 or 1e6"
             self.fail(f"{printable(str(value))}: {accepted}.", param, ctx)
         return int(number)
@@ -401,7 +401,7 @@ def _code_of(project: Project, statuses: "Sequence[frozenset[str]]") -> int:
 
     strict, exit_zero = (project.context.params[name] for name in ("strict", "exit_zero"))
     code = exit_code(frozenset[str]().union(*statuses), strict)
-    return 0 if exit_zero and code == EXIT_BROKEN else code
+    return 0 if exit_zero and code == BROKEN_EXIT_CODE else code
 
 
 def _reports_of(projects: Sequence[Project]) -> list[tuple[Project, str, str]]:
@@ -471,9 +471,9 @@ def _check_draws(context: click.Context, scheduler: str | None) -> None:
             raise click.UsageError("--seed needs --monte-carlo N.")
         if scheduler is not None:
             raise click.UsageError(f"--scheduler {scheduler}: shares out draws, and needs --monte-carlo N.")
-    elif scheduler is None and draws > MAX_DRAWS_HERE:
+    elif scheduler is None and draws > MAX_LOCAL_DRAWS:
         raise click.UsageError(
-            f"--monte-carlo {draws:,}: must be at most {MAX_DRAWS_HERE:,} draws; with --scheduler ADDRESS, whose "
+            f"--monte-carlo {draws:,}: must be at most {MAX_LOCAL_DRAWS:,} draws; with --scheduler ADDRESS, whose "
             f"workers share them, {MAX_DRAWS:,}."
         )
 

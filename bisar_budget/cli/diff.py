@@ -21,7 +21,7 @@ from bisar_budget.cli.options import (
     settings_here,
 )
 from bisar_budget.cli.projects import folder_of_file
-from bisar_budget.cli.streams import EXIT_BROKEN, deliver, expand, fail, read_all, spare
+from bisar_budget.cli.streams import BROKEN_EXIT_CODE, deliver, expand, fail, read_all, spare
 from bisar_budget.faults import printable
 from bisar_budget.resources import DISK, Files
 
@@ -126,7 +126,7 @@ def diff(
         write = difference.as_text if format_name == "text" else difference.as_markdown
         text = write(comparison, gate, all_rows)
     deliver(text, output, format_name)
-    sys.exit(EXIT_BROKEN if gate is not None and comparison.is_refused(gate) else 0)
+    sys.exit(BROKEN_EXIT_CODE if gate is not None and comparison.is_refused(gate) else 0)
 
 
 def _with_files(

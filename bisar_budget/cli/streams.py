@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MISSION_SUFFIXES = (".yaml", ".yml")
 PICTURE_SUFFIXES = (".svg", ".png", ".pdf")
 _TEMPORARY = (".bisar-budget.", ".tmp")  # first and last letters of the name of a temporary folder
-EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
+BROKEN_EXIT_CODE, USAGE_EXIT_CODE, DEFECT_EXIT_CODE, INTERRUPTED_EXIT_CODE = 1, 2, 3, 130
 
 
 def expand(patterns: Iterable[str]) -> list[str]:
@@ -62,7 +62,7 @@ def read_all(reads: "Iterable[Callable[[], Mission]]") -> "list[Mission]":
             is_usable = False
             say_faults(error.file, error.faults)
     if not is_usable:
-        sys.exit(EXIT_USAGE)
+        sys.exit(USAGE_EXIT_CODE)
     return found
 
 
@@ -101,9 +101,9 @@ def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable
                 fail(f"{name} is in the folder of a report's pictures, {folder}")
     for file in files:
         for real_path, target in written.items():
-            if _is_same(0 if file == "-" else file, real_path):
+            if _is_open_as(0 if file == "-" else file, real_path):
                 fail(f"{target} is to be read; a result would replace it")
-        if file != "-" and _is_same(1, file):
+        if file != "-" and _is_open_as(1, file):
             fail(f"{file} is to be read; standard output goes to it")
 
 
@@ -115,7 +115,7 @@ def _real_path(path: str) -> str:
         fail(f"cannot write {path}: {getattr(error, 'strerror', None) or error}")
 
 
-def _is_same(file: str | int, path: str) -> bool:
+def _is_open_as(file: str | int, path: str) -> bool:
     """Whether a path, or an open stream, and another path are one regular file."""
     try:
         return os.path.isfile(file) and os.path.samestat(os.stat(file), os.stat(path))
@@ -220,7 +220,7 @@ def complain(message: str) -> None:
 def fail(message: str) -> NoReturn:
     """Write an error about the usage of the command, and exit with 2."""
     complain(f"Error: {printable(message)}")
-    sys.exit(EXIT_USAGE)
+    sys.exit(USAGE_EXIT_CODE)
 
 
 def deliver(text: str, output: str | None = None, format_name: str = "text") -> None:

@@ -26,7 +26,7 @@ from urllib.parse import urlsplit
 from bisar_budget import __version__
 from bisar_budget.cluster.parts_folder import check_libraries
 from bisar_budget.faults import ClusterError, MissionError, printable
-from bisar_budget.memory import OF_CLUSTER
+from bisar_budget.memory import CLUSTER_MEMORY_BYTES
 from bisar_budget.workers import Block, Common, Result
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
     local = _LOCAL.fullmatch(address)
     if not (local or _ADDRESS.fullmatch(address)):
         raise ClusterError(f"--scheduler {printable(address)}: is no scheduler; {_ACCEPTED_ADDRESSES}")
-    check_libraries("--scheduler", OF_CLUSTER, "cluster", "distributed", "pyarrow")
+    check_libraries("--scheduler", CLUSTER_MEMORY_BYTES, "cluster", "distributed", "pyarrow")
     from distributed import Client
 
     with ExitStack() as ends:

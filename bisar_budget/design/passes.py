@@ -29,13 +29,13 @@ from bisar_budget.mission.paths import orbits_of, reader_of
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.paths.earth import Floats, SceneAxes
 from bisar_budget.paths.flight import PathFileError
-from bisar_budget.paths.instant import DAY, Instant, parse_instant
+from bisar_budget.paths.instant import DAY_S, Instant, parse_instant
 from bisar_budget.paths.visibility import Stretch, Watched, shared
 from bisar_budget.workers import Progress, unseen
 
 CENTER_TIME = "collection.center_time"
 MIN_ELEVATION = math.radians(20)
-_BLOCK_PASSES = 64  # that are checked together
+_PASSES_PER_BLOCK = 64  # checked together
 _YEARS = (1957, 2200)  # first year with orbits, and the year after the last
 _TRACK_POINTS = 41  # of a pass in a drawing
 
@@ -231,7 +231,7 @@ def passes(
         model=model if model is not None and not mission.has_direct_path else mission.gating_model,
         platform=chosen,
         start=start,
-        stop=start.after(days * DAY),
+        stop=start.after(days * DAY_S),
         min_elevation=min_elevation,
         squint=squint,
         found=tuple(_checked(unchecked, chosen, variation, today, progress)),
@@ -269,7 +269,7 @@ def _watched(
         if route is None:
             continue
         try:
-            seen[name] = Watched.over(orbits_of(mission, route, read), axes, start, days * DAY)
+            seen[name] = Watched.over(orbits_of(mission, route, read), axes, start, days * DAY_S)
         except PathFileError as error:  # the file went away since the mission was loaded
             raise QuestionError(f"platforms.{name}.orbit: {error}") from None
         if not seen[name].pieces:
@@ -336,8 +336,8 @@ def _checked(
     found: Sequence[SatellitePass], platform: str, variation: Variation, today: date, progress: Progress
 ) -> Iterator[SatellitePass]:
     """Check the mission at the mid-time of each pass."""
-    for first in range(0, len(found), _BLOCK_PASSES):
-        block = list(found[first : first + _BLOCK_PASSES])
+    for first in range(0, len(found), _PASSES_PER_BLOCK):
+        block = list(found[first : first + _PASSES_PER_BLOCK])
         missions, places = [], []
         for position, unjudged in enumerate(block):
             if unjudged.center is None:

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from bisar_budget.constants import EARTH_RADIUS
+from bisar_budget.constants import EARTH_RADIUS_M
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases, factor
@@ -29,7 +29,7 @@ from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vectors, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.propagation import (
-    ABOVE_THE_AIR,
+    AIR_TOP_M,
     DELAYS,
     LEAST_ELEVATION_DEG,
     elevation_deg,
@@ -41,7 +41,7 @@ ELECTRON_DELAY_M3_PER_S2 = 40.308  # m³/s²: e²/(8π²ε₀mₑ); the group de
 TROPOSPHERE_HEIGHT_M = 7e3  # m, height of a thin shell in place of a spherical troposphere
 IONOSPHERE_HEIGHT_M = 350e3  # m, height of the shell of free electrons, unless the platform is lower
 DELAY, CONTENT = DELAYS
-UNITS = dict(zip(DELAYS, ("m", "1/m^2"), strict=True))
+DELAY_UNITS = dict(zip(DELAYS, ("m", "1/m^2"), strict=True))
 
 
 def obliquity(position: Vectors, shell: Any) -> Any:
@@ -56,7 +56,7 @@ def obliquity(position: Vectors, shell: Any) -> Any:
     """
     x, y, _ = position
     level = np.square(np.hypot(x, y) / norm(position))  # cos² of the elevation
-    return 1 / np.sqrt(1 - level / np.square(1 + np.asarray(shell) / EARTH_RADIUS))
+    return 1 / np.sqrt(1 - level / np.square(1 + np.asarray(shell) / EARTH_RADIUS_M))
 
 
 def leg_factor(delay: str, position: Vectors, middle: Vectors) -> Any:
@@ -66,7 +66,7 @@ def leg_factor(delay: str, position: Vectors, middle: Vectors) -> Any:
     which the file may not state a delay, has factor 0.
     """
     height = np.asarray(height_of(middle))
-    is_above = height >= ABOVE_THE_AIR
+    is_above = height >= AIR_TOP_M
     if delay == DELAY:
         is_low = elevation_deg(middle) < LEAST_ELEVATION_DEG
         with np.errstate(divide="ignore"):
@@ -190,7 +190,7 @@ def _delay_error(
         published, full = _changing(seen, delay, moving, at_mid_aperture[0], correlation_time)
     return RandomError(
         subject=subject(owner, "propagation", delay),
-        unit=UNITS[delay],
+        unit=DELAY_UNITS[delay],
         declared=None if value is None else value * seen.factor,
         path=("propagation", delay) if propagation is None else propagation.path(name, delay),
         published=published,

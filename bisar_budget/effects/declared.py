@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT
+from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT_RATIO
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, plain
 from bisar_budget.effects.sources import ErrorListing
 from bisar_budget.geometry import BistaticGeometry, GroundVector, angle_between_lines, norm
@@ -41,7 +41,7 @@ from bisar_budget.ranges.limit_search import LimitSearches, find_first_sizes
 from bisar_budget.ranges.point_paths import ROWS, PointPaths, tries_several_sizes
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
-HELD = (QUADRATIC, CUBIC, LOCATION)  # requirements that limit an error
+LIMITING_REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION)  # requirements that limit an error
 END_OF_IMAGE = "end_of_image"  # no requirement: no ground point has the range history of a larger error
 MODELS = ("published", "full")
 OTHER_MODEL = {"published": "full", "full": "published"}
@@ -123,8 +123,8 @@ def point(displacement: tuple[Any, Any], case: int = 0) -> GroundVector | None:
 class Allowed(NamedTuple):
     """Allowable sizes of errors by one model, for all requirements and for the quadratic phase alone; NaN: no limit.
 
-    `binding` is the index in `HELD` of the requirement that sets the smallest size, `len(HELD)` where the image ends
-    at that size, and -1 where no limit exists.
+    `binding` is the index in `LIMITING_REQUIREMENTS` of the requirement that sets the smallest size, their number
+    where the image ends at that size, and -1 where no limit exists.
     """
 
     smallest: Floats
@@ -163,7 +163,7 @@ def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, Any]:
     first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
     # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
     degrees = np.degrees(angle_between_lines((-second[1], first[1]), (second[0], -first[0])))
-    is_short = np.hypot(second[0], second[1]) < MIN_GROUND_GRADIENT
+    is_short = np.hypot(second[0], second[1]) < MIN_GROUND_GRADIENT_RATIO
     return ImagePlane((first, second), determinant, is_short | (degrees < MIN_GRADIENT_ANGLE_DEG)), degrees
 
 
@@ -446,7 +446,7 @@ class ErrorBlock:
         smallest = smallest_by_requirement.min(axis=0)
         binding = np.where(np.isfinite(smallest), smallest_by_requirement.argmin(axis=0), -1).astype(np.int8)
         if model == "full":
-            binding = np.where(self.ends_image(smallest), len(HELD), binding)
+            binding = np.where(self.ends_image(smallest), len(LIMITING_REQUIREMENTS), binding)
         smallest, quadratic = (
             np.where(np.isfinite(sizes), sizes, math.nan) for sizes in (smallest, smallest_by_requirement[0])
         )
@@ -726,7 +726,7 @@ class Model:
         return block.does(self.name, sizes).of(index).in_one_case()
 
     def allowed(self, source: ErrorSource, limits: Sequence[float | None]) -> tuple[float | None, str | None]:
-        """Smallest size, of either sign, at which an error reaches a limit, and which of `HELD` it reaches; or None.
+        """Smallest size, of either sign, at which an error reaches a limit, and the requirement it reaches; or None.
 
         `limits` are the limits of quadratic and cubic phase [rad], and of the displacement. [m]
         """
@@ -738,16 +738,16 @@ class Model:
             limits_of_block.append(None if limit is None else of_all)
         allowed_of_block = block.allowed(self.name, limits_of_block, is_complete=False)
         size, binding = plain(allowed_of_block.smallest[index]), int(allowed_of_block.binding[index, 0])
-        return (None, None) if math.isnan(size) else (size, (*HELD, END_OF_IMAGE)[binding])
+        return (None, None) if math.isnan(size) else (size, (*LIMITING_REQUIREMENTS, END_OF_IMAGE)[binding])
 
     def allowable(self, source: ErrorSource, requirement: str, limit: float) -> float | None:
         """Smallest size, of either sign, at which an error reaches one limit; or None."""
-        return self.allowed(source, [limit if name == requirement else None for name in HELD])[0]
+        return self.allowed(source, [limit if name == requirement else None for name in LIMITING_REQUIREMENTS])[0]
 
     def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
         """Size at which an error would reach a limit if its effects were proportional to it; infinite: never."""
         block, index = self.errors.block_of(source)
-        per_unit = float(block.per_unit(self.name)[HELD.index(requirement), index, 0])
+        per_unit = float(block.per_unit(self.name)[LIMITING_REQUIREMENTS.index(requirement), index, 0])
         return limit / per_unit if per_unit else math.inf
 
     def hidden_per_unit(self, source: ErrorSource) -> float:
@@ -763,7 +763,7 @@ class Model:
     def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
         """Whether effects of an error are proportional to its size up to a limit."""
         block, index = self.errors.block_of(source)
-        requirement_index = HELD.index(requirement)
+        requirement_index = LIMITING_REQUIREMENTS.index(requirement)
         per_unit = block.per_unit(self.name)[requirement_index]
         with np.errstate(all="ignore"):
             first = np.minimum(np.where(per_unit > 0, limit / per_unit, math.inf), block.farthest)

@@ -43,7 +43,7 @@ from bisar_budget.mission.platforms import RAW, CommonMotionError, FlownPath, Lo
 from bisar_budget.ranges.exact_ranges import Floats
 
 _IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
-NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
+SPREADING_NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
 TILTS = ("attitude", "gyro_bias", "angle_random_walk")
 # The covariance of a position error over the aperture grows as this power of the aperture time.
 _GROWS = {
@@ -151,7 +151,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             path=("platforms", name, "motion_error", *(("imu", kind) if key == kind else (key,))),
             published=published,
             full=full,
-            spreads=kind in NOISE,
+            spreads=kind in SPREADING_NOISE,
             moves=_moves_by_imu(seen, platform_index, kind, directions, about, arm) if seen.has_edge else (),
         )
 
@@ -184,7 +184,7 @@ def _at_mid_aperture(mission: Mission, index: int, along: Any) -> tuple[Any, ...
 def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> list[Any]:
     """Sigmas of the displacement by a unit with the component `along` the line of sight of mid-aperture. [m]"""
     fit = seen.exact.fit[:2]
-    if kind in NOISE:
+    if kind in SPREADING_NOISE:
         orders = fit @ _walk_of(kind, len(seen.exact.times)).at_nodes @ fit.T
         constant, linear = np.diagonal(orders)
     else:
@@ -200,7 +200,7 @@ def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions
     """
     count, along = len(seen.exact.times), seen.range_errors(platform_index, directions[:, :, None])
     scale = seen.exact.half ** _GROWS[kind]
-    if kind not in NOISE:
+    if kind not in SPREADING_NOISE:
         courses = along * (_courses(kind, count)[0, :, None] * np.sqrt(scale))
         return seen.of_courses(courses, courses)[1]
     walk = _walk_of(kind, count)
@@ -221,7 +221,7 @@ def _courses(kind: str, count: int) -> Floats:
 
     They are zero at mid-aperture.
     """
-    if kind in NOISE:
+    if kind in SPREADING_NOISE:
         return factor(_walk_of(kind, count).at_nodes).T
     order = 3 if kind == "gyro_bias" else 2
     return nodes(count).places[None] ** order / math.factorial(order)
@@ -235,8 +235,8 @@ def body_axes(state: PlatformState, times: Floats) -> Floats:
         u, v, w = (np.where(state.is_still, *both) for both in ((1.0, u), (0.0, v), (0.0, w)))
     with np.errstate(all="ignore"):
         along = without_rounding(unit((u, v, w)))
-        to_left = without_rounding(unit((-v, u, 0.0 * w)))
-    return np.array((along, to_left, cross(along, to_left)))
+        leftward = without_rounding(unit((-v, u, 0.0 * w)))
+    return np.array((along, leftward, cross(along, leftward)))
 
 
 def arm_at(state: PlatformState, arm: Any, times: Floats) -> Floats:
@@ -338,8 +338,8 @@ class _Walks(NamedTuple):
 @cache
 def _walks(first: int, second: int, count: int) -> _Walks:
     """The noise integrated `first` + 1 and `second` + 1 times, at `count` nodes; 0 is a walk."""
-    places, weights = np.polynomial.legendre.leggauss(2 * count)
-    start, weight = (1 + places) / 2, weights / 2  # on one side of the middle
+    gauss_nodes, weights = np.polynomial.legendre.leggauss(2 * count)
+    start, weight = (1 + gauss_nodes) / 2, weights / 2  # on one side of the middle
     number = np.arange(count)
 
     def order_of(times: int) -> Floats:
@@ -368,8 +368,8 @@ def _courses_of_both_walks(count: int) -> tuple[Floats, Floats]:
     return twice, once
 
 
-def _legendre(places: Floats, count: int) -> Floats:
-    return np.asarray(np.polynomial.legendre.legvander(places, count - 1))
+def _legendre(abscissas: Floats, count: int) -> Floats:
+    return np.asarray(np.polynomial.legendre.legvander(abscissas, count - 1))
 
 
 # ---------------------------------------------------------------------- position noise
@@ -456,16 +456,16 @@ def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], pat
     """Noise along axes of the platforms that it moves, (axes, 3, cases) each."""
     k = 2 * math.pi / seen.mission.radar.wavelength
     largest, sizes = parts_of_largest(seen.vector(process.sigma))
-    found = gauss_markov(seen.aperture_time, process.correlation_time)
-    courses = seen.courses(found.covariance) if seen.has_edge else np.zeros((0, len(seen.exact.times), 1))
+    moments = gauss_markov(seen.aperture_time, process.correlation_time)
+    courses = seen.courses(moments.covariance) if seen.has_edge else np.zeros((0, len(seen.exact.times), 1))
     sighted, moved, moves = list[Floats](), list[Floats](), list[Moves]()
     for name, of_platform in axes.items():
-        place, directions = PLATFORMS.index(name), of_platform * sizes[:, None]
-        sighted.append((directions * seen.vector(seen.geometry.both[place].look)).sum(axis=1))
-        moved.append(seen.range_errors(place, directions[:, :, None]))
-        moves.append(Moves(place, directions[:, :, None], courses))
+        platform_index, directions = PLATFORMS.index(name), of_platform * sizes[:, None]
+        sighted.append((directions * seen.vector(seen.geometry.both[platform_index].look)).sum(axis=1))
+        moved.append(seen.range_errors(platform_index, directions[:, :, None]))
+        moves.append(Moves(platform_index, directions[:, :, None], courses))
     along = np.sqrt(np.square(sum(sighted)).sum(axis=0))
-    quadratic, cubic, left = (np.sqrt(one) for one in found[:3])
+    quadratic, cubic, left = (np.sqrt(square) for square in moments[:3])
     return RandomError(
         subject=process.subject,
         unit="m",
@@ -475,7 +475,7 @@ def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], pat
             k * along * quadratic,
             k * along * cubic,
             k * along * left / seen.factor,
-            *seen.moved(found.constant * along**2, found.linear * along**2),
+            *seen.moved(moments.constant * along**2, moments.linear * along**2),
         ),
         full=seen.of_gauss_markov(np.asarray(sum(moved)), process.correlation_time),
         spreads=process.spreads,

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import specific_force
 from bisar_budget.effects.oscillator_tones import LeftTone, left_of_tone
@@ -31,7 +31,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.vibrations import FeltVibration, Vibration
 from bisar_budget.ranges.exact_ranges import Floats
 
-PHASE = (1.0, 2.0)  # S_φ = (Γ·f₀)²·S_a/f²
+PHASE_LAW = (1.0, 2.0)  # S_φ = (Γ·f₀)²·S_a/f²
 _FELT_ACCELERATION_MPS2 = 1e-6  # m/s²; a smaller acceleration of a path counts as none
 _EXCHANGE_START_COUNT = 8  # beginnings of the exchanges within an interval, over which the rest of a turn is averaged
 
@@ -173,7 +173,7 @@ def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
     if vibration.spectrum is not None:
         interval = None if sync is None else sync.interval
         delay = seen.geometry.echo_delay if mission.has_direct_path else None
-        random = spectrum_parts(seen, vibration.spectrum, PHASE, interval, delay)
+        random = spectrum_parts(seen, vibration.spectrum, PHASE_LAW, interval, delay)
         total += random.rows * (power_of(vibration) * np.square(mission.radar.center_frequency))
     for line in accelerated_tones(mission, seen.geometry):
         if line.name == name:
@@ -191,7 +191,7 @@ def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] 
         return None
     sync = seen.mission.synchronization
     interval = None if sync is None else sync.interval
-    courses = SPEED_OF_LIGHT * felt_part * turn_courses(state, seen.exact.times, interval)
+    courses = SPEED_OF_LIGHT_MPS * felt_part * turn_courses(state, seen.exact.times, interval)
     return seen.of_courses(courses, courses)
 
 
@@ -216,7 +216,7 @@ def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) ->
         exact_gain, joined = gained(moments), gained(before) * (1 - fraction) + gained(before + interval) * fraction
         remaining = exact_gain - joined  # for a constant acceleration only rounding
         courses.append(
-            np.where(np.abs(remaining) > ROUNDING * np.abs(exact_gain).max(), remaining, 0.0)
+            np.where(np.abs(remaining) > VECTOR_ROUNDING_FRACTION * np.abs(exact_gain).max(), remaining, 0.0)
             / math.sqrt(_EXCHANGE_START_COUNT)
         )
     return np.concatenate(courses)
@@ -250,4 +250,4 @@ def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, 
     if felt_vibration is None or felt_vibration.vibration.spectrum is None or not is_heard:
         return ()
     factor = mission.radar.center_frequency**2 * float(power_of(felt_vibration.vibration))
-    return spectrum_pieces(felt_vibration.vibration.spectrum, (factor, PHASE[1]))
+    return spectrum_pieces(felt_vibration.vibration.spectrum, (factor, PHASE_LAW[1]))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import ROUNDING
+from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.declared import ImagePlane, published_planes
 from bisar_budget.effects.effect import Subject, plain
 from bisar_budget.effects.range_processes import (
@@ -29,7 +29,7 @@ from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.spectra import Parts
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
-from bisar_budget.image_plane import LEADING, nodes_for
+from bisar_budget.image_plane import LEGENDRE_LEADING, nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
 # Nodes at which random errors are sampled: fewer tell too few orders of a process apart. More cost seconds, and
 # these follow nine circles; on a race track of 70 pieces 16 give every effect to 1e-3.
-FEWEST_NODES, MOST_NODES = 16, 64
-_CANCELLED_SQUARE_FRACTION = ROUNDING * 1e-2  # of a square of magnitudes; the root of a smaller square is rounding
+FEWEST_EFFECT_NODES, MOST_EFFECT_NODES = 16, 64
+_CANCELLED_SQUARE_FRACTION = VECTOR_ROUNDING_FRACTION * 1e-2  # the root of a smaller square is rounding
 
 
 class RandomEffect(NamedTuple):
@@ -209,7 +209,7 @@ class SensorCases:
     def exact(self) -> ExactRanges:
         """Exact ranges at as many nodes as the paths and random errors need."""
         count = nodes_for(self.geometry, self.aperture_time, has_direct_path=self.mission.has_direct_path)
-        count = min(MOST_NODES, max(FEWEST_NODES, int(np.max(count))))
+        count = min(MOST_EFFECT_NODES, max(FEWEST_EFFECT_NODES, int(np.max(count))))
         return exact_ranges(self.mission, self.geometry, count, self.cases)
 
     @cached_property
@@ -233,7 +233,9 @@ class SensorCases:
             Range errors with the line of sight held at mid-aperture, for the published model.
         """
         k, orders = self.exact.k, np.einsum("fn,enc->fec", self.exact.fit, at_mid_aperture)
-        orders = np.where(np.abs(orders) > ROUNDING * np.abs(at_mid_aperture).max(axis=1), orders, 0.0)
+        orders = np.where(
+            np.abs(orders) > VECTOR_ROUNDING_FRACTION * np.abs(at_mid_aperture).max(axis=1), orders, 0.0
+        )
         quadratic, cubic = np.sqrt(np.square(orders[2:]).sum(axis=1))
         # Both orders of a course are one error: unlike the orders of noise they add with their signs.
         (a, b), (c, d) = self.plane.adjugate
@@ -305,7 +307,7 @@ class SensorCases:
 
     @cached_property
     def orders(self) -> Floats:
-        """Orders 0 to 3 at the nodes, scaled by their values at the aperture edge as in `LEADING`, (nodes, 4)."""
+        """Orders 0 to 3 at the nodes over their values at the aperture edge, as in `LEGENDRE_LEADING`, (nodes, 4)."""
         return orders_at(self.exact.sampling.places)
 
     def of_orders(self, covariance: Floats, along: Any = 1.0) -> tuple[Sequence[Floats], Floats]:
@@ -357,7 +359,7 @@ class SensorCases:
 
 def orders_at(slow_times: Floats) -> Floats:
     """Orders 0 to 3 at slow times in half apertures, (times, 4), of size 1 at the aperture edge as in `Parts`."""
-    return np.asarray(np.polynomial.legendre.legvander(slow_times, LEADING.size - 1) / LEADING)
+    return np.asarray(np.polynomial.legendre.legvander(slow_times, LEGENDRE_LEADING.size - 1) / LEGENDRE_LEADING)
 
 
 def _arrays_in(value: Any) -> Iterator[Floats]:

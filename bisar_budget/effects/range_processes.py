@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.image_plane import LEADING
+from bisar_budget.image_plane import LEGENDRE_LEADING
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 
 _ORDER_COUNT = 4  # Legendre orders 0 to 3, which displace and defocus
@@ -72,7 +72,7 @@ def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, 
     beyond : (cases,)
         Mean square of the range error in higher orders, which spread. [m²]
     """
-    orders = np.polynomial.legendre.legvander(exact.sampling.places, _ORDER_COUNT - 1) / LEADING
+    orders = np.polynomial.legendre.legvander(exact.sampling.places, _ORDER_COUNT - 1) / LEGENDRE_LEADING
     higher = np.eye(len(orders)) - orders @ exact.fit  # leaves the part beyond the cubic
     bends = np.einsum("nm,amc->anc", higher, exact.slopes)
     weighted_bends = exact.mean * bends

@@ -27,11 +27,21 @@ from bisar_budget.geometry import BistaticGeometry, Vectors
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
-from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, STILL, ExactRanges, Floats, Indices, Truths, followed
+from bisar_budget.ranges.exact_ranges import (
+    FINE_NODE_COUNT,
+    NO_SHIFTS,
+    ExactRanges,
+    Floats,
+    Indices,
+    Truths,
+    followed,
+)
 
 TONE_PHASE_COUNT = 16  # phases in which exact ranges follow a large vibration
-ANGLES = 2 * math.pi * np.arange(TONE_PHASE_COUNT) / TONE_PHASE_COUNT
-TURNED = np.stack((np.cos(ANGLES), np.sin(ANGLES)), axis=1)  # weights of a cosine and a sine in each phase
+TONE_PHASES_RAD = 2 * math.pi * np.arange(TONE_PHASE_COUNT) / TONE_PHASE_COUNT
+TURNED = np.stack(
+    (np.cos(TONE_PHASES_RAD), np.sin(TONE_PHASES_RAD)), axis=1
+)  # weights of a cosine and a sine in each phase
 VALUES_PER_PHASE = 16  # values of the harmonics from each phase to the next
 MAX_LANE_COUNT = 1 << 12  # lanes in one search
 
@@ -183,11 +193,11 @@ class _Tone:
 
         Where no ground point has the range history of a phase, the phase of the whole motion replaces each effect.
         """
-        case, turned = np.repeat(cases, TONE_PHASE_COUNT), np.tile(ANGLES, cases.size)
+        case, turned = np.repeat(cases, TONE_PHASE_COUNT), np.tile(TONE_PHASES_RAD, cases.size)
         angle = self.angle[:, case] if self.angle.shape[1] > 1 else self.angle
         course = size[case] * np.cos(angle + turned)
         moved = [_of_case(component, case) * course for component in way]
-        shifts = [moved, STILL] if self.platform_index == 0 else [STILL, moved]
+        shifts = [moved, NO_SHIFTS] if self.platform_index == 0 else [NO_SHIFTS, moved]
         point = followed(self.exact, np.zeros_like(course), shifts, case)
         phases = np.array((point.quadratic, point.cubic, point.hidden, point.rest))
         phases = np.moveaxis(phases.reshape(4, cases.size, TONE_PHASE_COUNT), 2, 1)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.combined import squared
 from bisar_budget.effects.effect import (
     CLOCK_UNITS,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
 
 AnyEffect = TypeVar("AnyEffect", Effect, FullEffect)
-_AXES: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_UNIT_VECTORS: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _PUBLISHED_UNIT = Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0)  # effect of a pure phase error
 _FULL_UNIT = FullEffect(east=0.0, north=0.0, qpe=1.0, cubic=0.0)
 
@@ -98,7 +98,7 @@ class ErrorListing:
         if (platform_index, kind) not in self._legs:
             first = 3 * list(MOTION_UNITS).index(kind)
             published = [Effect._make(row) for row in self._published[platform_index][first : first + 3]]
-            along = np.stack([self.exact.along(platform_index, axis) for axis in _AXES])
+            along = np.stack([self.exact.along(platform_index, axis) for axis in _UNIT_VECTORS])
             effects = self.exact.effect(along * self.exact.powers[MOTION_UNITS[kind]])
             full = [FullEffect._make(row) for row in zip(*effects, strict=True)]
             self._legs[platform_index, kind] = published, full
@@ -193,7 +193,7 @@ class ErrorListing:
                     )
             if covariance is not None:
                 row_path = (*path, *covariance.path(kind, axis))
-            flown = self._flown(kind, {platform_index: _AXES[axis]}, "scene")
+            flown = self._flown(kind, {platform_index: _UNIT_VECTORS[axis]}, "scene")
             yield ErrorSource(
                 subject=row_subject,
                 unit=unit,
@@ -201,7 +201,7 @@ class ErrorListing:
                 path=row_path if in_scene and values is not None and key != "sensor" else path,
                 effect=published[axis],
                 full=full[axis] if flown is None else flown[0],
-                direction=_AXES[axis],
+                direction=_UNIT_VECTORS[axis],
                 equation=equation,
                 no_limit=no_limit,
                 evidence=evidence,
@@ -260,7 +260,7 @@ class ErrorListing:
         """An error of the clock whose unit has these terms t̃₀ … t̃₃. The published model always hears it."""
         clock = terms if is_heard else (0.0,) * 4
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
-        rows = evaluators.published_clock(SPEED_OF_LIGHT, wavelength, T)
+        rows = evaluators.published_clock(SPEED_OF_LIGHT_MPS, wavelength, T)
         of_terms = (
             [term * per_term for per_term in row] for term, row in zip(terms, rows, strict=True) if np.any(term)
         )
@@ -299,7 +299,7 @@ class ErrorListing:
     def _delay_of_the_echo(self) -> tuple[Any, ...]:
         """Terms of the delay of the echo after the direct path, which a wrong clock measures wrong. [s]"""
         exact = self.exact
-        seconds = (sum(exact.ranges) - exact.baselines) / SPEED_OF_LIGHT
+        seconds = (sum(exact.ranges) - exact.baselines) / SPEED_OF_LIGHT_MPS
         powers = np.vander(exact.sampling.places, 4, increasing=True)
         return tuple(
             coefficient / exact.half**power
@@ -458,7 +458,7 @@ class ErrorListing:
             path=("scene", "height_error"),
             effect=published,
             full=full,
-            direction=_AXES[2],
+            direction=_UNIT_VECTORS[2],
             equation="full model",
             no_limit=phrases.no_quadratic_term_of_height(),
             notes=(phrases.held_to_the_total("no platform"),),
@@ -535,7 +535,7 @@ def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:
 def _total(terms: Sequence[Any]) -> Any:
     """Sum of terms. Where terms cancel exactly, the rest is rounding and would give a false limit: it becomes 0."""
     total = sum(terms)
-    return np.where(np.abs(total) > ROUNDING * sum(np.abs(term) for term in terms), total, 0.0)
+    return np.where(np.abs(total) > VECTOR_ROUNDING_FRACTION * sum(np.abs(term) for term in terms), total, 0.0)
 
 
 def _equation(kind: str, axis: int | None) -> str:

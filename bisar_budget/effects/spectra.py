@@ -122,7 +122,7 @@ _STEEP_EXPONENT = 4.0  # slope beyond which straight lines do not flatten an ima
 _FALL_EXPONENT = 6.0  # powers of e by which a steep piece falls from edge to edge
 
 # Nodes and weights of Gauss and Legendre on 0 … 1.
-_NODES, _WEIGHTS = (
+_LEGENDRE_NODES, _LEGENDRE_WEIGHTS = (
     (0.5 + 0.5 * nodes(6).places)[:, None],
     nodes(6).fit[0][:, None],
 )
@@ -258,8 +258,8 @@ def _fast(slope: float, low: Floats, high: Floats) -> Floats:
 def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
     """Parts of x^(−slope) over panels (n,), by their nodes."""
     span = np.log(high / low)
-    x = low * np.exp(span * _NODES)
-    power = x**-slope * x * span * _WEIGHTS
+    x = low * np.exp(span * _LEGENDRE_NODES)
+    power = x**-slope * x * span * _LEGENDRE_WEIGHTS
     return np.asarray((power * squares(x)).sum(axis=1))
 
 
@@ -278,7 +278,7 @@ def squares(angle: Floats) -> Floats:
 _RESOLVED_AGE_CYCLES = (
     24.0  # cycles within the age of the setting up to which aperture and setting are followed together
 )
-_AGES = np.concatenate(
+_GRID_AGES_CYCLES = np.concatenate(
     (np.geomspace(1e-6, 0.125, 18), np.arange(0.25, _RESOLVED_AGE_CYCLES + 0.1, 0.25))
 )  # edges, in cycles
 
@@ -315,12 +315,17 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
     ]
     ends = np.array([edge for piece in pieces for edge in (piece.low, piece.high)])[:, None] * age
     edges = (
-        np.sort(np.concatenate((_AGES[:, None] + 0.0 * age, np.clip(ends, _AGES[0], _RESOLVED_AGE_CYCLES))), axis=0)
+        np.sort(
+            np.concatenate(
+                (_GRID_AGES_CYCLES[:, None] + 0.0 * age, np.clip(ends, _GRID_AGES_CYCLES[0], _RESOLVED_AGE_CYCLES))
+            ),
+            axis=0,
+        )
         / age
     )
     span = np.log(edges[1:] / edges[:-1])
-    f = edges[:-1] * np.exp(span * _NODES[:, None])  # (nodes, panels, cases)
-    weight = density(pieces, f) * f * span * _WEIGHTS[:, None]
+    f = edges[:-1] * np.exp(span * _LEGENDRE_NODES[:, None])  # (nodes, panels, cases)
+    weight = density(pieces, f) * f * span * _LEGENDRE_WEIGHTS[:, None]
     for order_index, square in enumerate(_squares_of_set(f, aperture_time, age, averaging)):
         together[order_index] = together[order_index] + (weight * square).sum(axis=(0, 1))
     constant, linear, both, even, to_cubic, to_quadratic, odd = together
@@ -442,8 +447,8 @@ def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, s
     """Parts of panels (n,)."""
     is_first = low == 0
     span = np.log(high / np.where(is_first, high, low))
-    f = np.where(is_first, high * _NODES, low * np.exp(span * _NODES))
-    width = np.where(is_first, high, f * span) * _WEIGHTS
+    f = np.where(is_first, high * _LEGENDRE_NODES, low * np.exp(span * _LEGENDRE_NODES))
+    width = np.where(is_first, high, f * span) * _LEGENDRE_WEIGHTS
     angle, of_tone = f * scale, np.empty((_INTEGRAL_COUNT, *f.shape))
     is_mean = (low * scale >= _FAST / _SAME_EDGE_RATIO) & ((high - low) * scale > _RESOLVED_TURN_COUNT * math.pi)
     of_tone[..., ~is_mean] = squares(angle[:, ~is_mean])
@@ -493,10 +498,10 @@ def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: f
     begin. Beginnings half a rate before and half a rate behind replace that term.
     """
     low, high = np.array(list(_panels(rate / 2, [rate / 4, *edges]))).T
-    f = low + (high - low) * _NODES
+    f = low + (high - low) * _LEGENDRE_NODES
     aliases = density(pieces, f) + sum((_aliases(piece, f, rate) for piece in pieces), np.zeros_like(f))
     x = f / rate
-    powers = aliases * np.sin(math.pi * x) ** 4 * (high - low) * _WEIGHTS
+    powers = aliases * np.sin(math.pi * x) ** 4 * (high - low) * _LEGENDRE_WEIGHTS
     at_half = 2 * float((powers * (x**2 - x + 1 / 6)).sum())
     integral, last = float(powers.sum()), float(_FOLLOWED_IMAGE_COUNT)
     return [

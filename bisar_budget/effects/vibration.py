@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import phrases
-from bisar_budget.constants import ROUNDING
+from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import Moves, RandomError, SensorCases
 from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, left_parts, tone
@@ -47,7 +47,7 @@ NEAR_CYCLES = 2.5  # per aperture; farther apart, two equal lines raise each oth
 SLOWEST_ECHO_CYCLES = 1.0  # cycles per aperture; a slower vibration makes no echoes
 ECHO_CYCLES = 3.0  # likewise; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
 
-_STEPS = (0.1, 0.02)  # of the search, in cells
+_SEARCH_STEPS_CELLS = (0.1, 0.02)  # coarse, then fine
 _REACH = np.arange(-6, 7)[:, None, None]
 _SEARCH_START_COUNT = 16  # positions around which the search looks
 _MAX_ECHO_COUNT = 200_000  # echoes in one array
@@ -163,7 +163,7 @@ def _count(frequencies: Floats, starts: Floats, reach: int) -> NDArray[np.intp]:
 def _searched(sizes: Floats, frequencies: Floats, starts: Floats) -> tuple[Floats, Floats]:
     """Height and position of the highest echo at the starts and in steps around them."""
     best = starts
-    for step in _STEPS:
+    for step in _SEARCH_STEPS_CELLS:
         tried = best + step * _REACH
         highest = _heights(sizes, frequencies, tried).argmax(axis=0)
         best = best + step * (highest + _REACH[0, 0, 0])
@@ -215,7 +215,7 @@ def seen_of_axes(
     error: MotionError = getattr(mission.platforms, name).motion_error
     ways = getattr(geometry, name).frame(error.frame) if is_vector else [turned.both[platform_index].look]
     mean = sampling.fit[0]
-    floor = ROUNDING * np.sqrt(mean @ sum(component * component for component in sight))
+    floor = VECTOR_ROUNDING_FRACTION * np.sqrt(mean @ sum(component * component for component in sight))
     along = [np.sqrt(mean @ np.square(dot(way, sight))) for way in ways]
     seen = [np.where(component > floor, component, 0.0) for component in along]
     return seen if np.ndim(T) or seen[0].size > 1 else [component.item() for component in seen]

@@ -17,7 +17,7 @@ from textwrap import wrap
 
 import numpy as np
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.faults import printable
 from bisar_budget.formats.containers import Element
 from bisar_budget.geometry import FRAME_AXES, STRAIGHT, Axes, PlatformState, Vector, cross, dot, norm, unit
@@ -300,7 +300,7 @@ def _of_monostatic(mono: Element, seen: Seen) -> FileErrors:
     if sensor is not None:
         remarks += _unused_of_sensor(sensor, ("ClockFreqSF", "TransmitFreqSF", "CollectionStartTime"), "RadarSensor")
         if sensor.maybe("RangeBias") is not None:
-            constant = 2 * sensor.number("RangeBias") / SPEED_OF_LIGHT
+            constant = 2 * sensor.number("RangeBias") / SPEED_OF_LIGHT_MPS
             remarks.append("timing_error.constant is 2 RangeBias/c: the range of a monostatic file is half the way.")
             remarks += _decorrelation(sensor, "range bias")
     for name in ("TropoError", "IonoError"):

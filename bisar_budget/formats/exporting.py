@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from bisar_budget import __version__
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.arrays import Records
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
@@ -162,13 +162,13 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
     flown = collection.flight(errors.smooth(), times)
     measured = sum(np.linalg.norm(path.measured, axis=1) for path in flown.paths)
     actual = sum(np.linalg.norm(path.actual, axis=1) for path in flown.paths)
-    error = actual - measured + SPEED_OF_LIGHT * flown.seen
+    error = actual - measured + SPEED_OF_LIGHT_MPS * flown.seen
     delays, turns = [], []
     for corner in ((half, half), (half, -half), (-half, half), (-half, -half)):
         excess_range = sum(np.linalg.norm(path.measured - (*corner, 0.0), axis=1) for path in flown.paths) - measured
         delays.append(float(np.abs(excess_range).max()))
         turns.append(float(np.abs(np.gradient(excess_range, times)).max()))
-    delay = (max(delays) + float(np.abs(error).max())) / SPEED_OF_LIGHT
+    delay = (max(delays) + float(np.abs(error).max())) / SPEED_OF_LIGHT_MPS
     turn = (max(turns) + float(np.abs(np.gradient(error, times)).max())) / radar.wavelength
     pulses = pulses_for(mission, math.ceil(2 * turn * T))
     if mission.collection.pulses is None:
@@ -222,18 +222,20 @@ def _vectors(
         velocity = velocity + np.gradient(smooth_path.measured - smooth_path.actual, slow_time, axis=0, edge_order=2)
         length = np.linalg.norm(position, axis=1)
         closing = np.sum(position * velocity, axis=1) / length
-        own_velocity = velocity / (1 + sign * closing / SPEED_OF_LIGHT)[:, None]
+        own_velocity = velocity / (1 + sign * closing / SPEED_OF_LIGHT_MPS)[:, None]
         vectors[f"{side}Pos"] = position @ turn + np.array(axes.origin)
         vectors[f"{side}Vel"] = own_velocity @ turn
-        vectors[f"{side}Time"] = slow_time + sign * length / SPEED_OF_LIGHT
+        vectors[f"{side}Time"] = slow_time + sign * length / SPEED_OF_LIGHT_MPS
         ranges.append(length)
         doppler += np.sum(position * own_velocity, axis=1) / length
     # Whole milliseconds, so that a file states the start of the collection exactly.
-    offset = math.ceil((mission.collection.aperture_time / 2 + float(ranges[0].max()) / SPEED_OF_LIGHT) * 1e3) / 1e3
+    offset = (
+        math.ceil((mission.collection.aperture_time / 2 + float(ranges[0].max()) / SPEED_OF_LIGHT_MPS) * 1e3) / 1e3
+    )
     vectors["TxTime"] += offset
     vectors["RcvTime"] += offset
     vectors["SRPPos"] = axes.origin
-    vectors["aFDOP"] = -doppler / SPEED_OF_LIGHT  # −2/c times the mean range rate of both legs
+    vectors["aFDOP"] = -doppler / SPEED_OF_LIGHT_MPS  # −2/c times the mean range rate of both legs
     radar = mission.radar
     vectors["FX1"] = vectors["SC0"] = radar.center_frequency - radar.bandwidth / 2
     vectors["FX2"] = radar.center_frequency + radar.bandwidth / 2

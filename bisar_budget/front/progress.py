@@ -11,7 +11,7 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from bisar_budget.faults import printable
-from bisar_budget.memory import OF_TABLES
+from bisar_budget.memory import TABLES_MEMORY_BYTES
 
 if TYPE_CHECKING:
     from typing import NoReturn
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.workers import Progress
 
-LONG = 60.0  # [s]; work that takes longer is announced
+MIN_ANNOUNCED_S = 60.0  # work that takes longer is announced
 FORMING = "Forming images"  # label of a bar
-_MOMENT = 1.0  # [s]; work that is done earlier has no bar
+_MIN_SHOWN_S = 1.0  # work that is done earlier has no bar
 _LEAST_TRIAL_S = 0.3  # a shorter trial is too short to measure
 _TRIAL_GROWTH_FACTOR = 3  # size of a trial over the size of the trial before
 
@@ -40,7 +40,7 @@ def watched(label: str) -> "Iterator[Progress]":
         if not bars:
             is_notebook = _is_notebook()
             is_seen = is_notebook or (sys.stderr is not None and sys.stderr.isatty())
-            if not is_seen or monotonic() - began < _MOMENT:
+            if not is_seen or monotonic() - began < _MIN_SHOWN_S:
                 return
             bars.append(_bar(label, total, is_notebook))
         bars[0].total = total
@@ -101,7 +101,7 @@ def lasting(seconds: float) -> str:
 
 def foretell(seconds: float, doing: str, advice: str = "") -> None:
     """Tell the user who waits that work will take long, and what to change."""
-    if seconds > LONG:
+    if seconds > MIN_ANNOUNCED_S:
         SAYING.get()(f"{doing} will take about {lasting(seconds)}{'; ' if advice else ''}{advice}.")
 
 
@@ -132,4 +132,4 @@ def hold_to_tables() -> None:
     """Raise an error if the libraries that write parts are not installed."""
     from bisar_budget.cluster.parts_folder import check_libraries
 
-    check_libraries("--resume", OF_TABLES, "tables", "pyarrow")
+    check_libraries("--resume", TABLES_MEMORY_BYTES, "tables", "pyarrow")

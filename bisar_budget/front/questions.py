@@ -129,7 +129,7 @@ def solve(
     QuestionError
         The mission cannot answer the question.
     """
-    from bisar_budget.design.compare import compare_parts, is_of_parts
+    from bisar_budget.design.compare import compare_parts, is_sensor_key
     from bisar_budget.design.solve import solve as solved
 
     today, influences = _judged(mission, model, date, outside)
@@ -141,7 +141,7 @@ def solve(
     hold_to_parts(key, between, scale)
     solution: Solution | Comparison
     with watched_checks(mission.name) as progress:
-        if is_of_parts(key):
+        if is_sensor_key(key):
             solution = compare_parts(mission, key, **arguments, progress=progress)
         else:
             solution = solved(mission, key, between=between, is_scale=scale, **arguments, progress=progress)
@@ -157,9 +157,9 @@ def hold_to_parts(key: str, between: object, scale: bool) -> None:
     QuestionError
         The key names parts.
     """
-    from bisar_budget.design.compare import is_of_parts
+    from bisar_budget.design.compare import is_sensor_key
 
-    if is_of_parts(key) and (between is not None or scale):
+    if is_sensor_key(key) and (between is not None or scale):
         option = "--scale" if scale else "--between"
         raise QuestionError(f"{option}: {key} names parts of the catalogue, which are compared one by one.")
 

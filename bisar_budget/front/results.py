@@ -328,8 +328,8 @@ class SolveResult(_Answer):
         return f"{self.value:.6g} {self.unit}{waived_words}"
 
     def _repr_html_(self) -> str:
-        found, rows = self.found, list[tuple[object, ...]]()
-        if (parts := getattr(found, "parts", None)) is not None:
+        answer, rows = self.found, list[tuple[object, ...]]()
+        if (parts := getattr(answer, "parts", None)) is not None:
             columns = ("part", "status", "worst row", "use")
             for part in parts:
                 standing = part.standing
@@ -340,9 +340,9 @@ class SolveResult(_Answer):
             for crossing in self.crossings:
                 inside, outside = crossing.inside, crossing.outside
                 rows.append((inside.value, inside.row or "", use_words(inside.utilization), outside.row or ""))
-        title = f"{found.key} of {found.name}"
+        title = f"{answer.key} of {answer.name}"
         return notebook.page(
-            notebook.heading(_HEADINGS.get(found.status, "pass"), title, f"{found.status}: {self._summary}"),
+            notebook.heading(_HEADINGS.get(answer.status, "pass"), title, f"{answer.status}: {self._summary}"),
             notebook.table(columns, rows),
         )
 
@@ -443,9 +443,9 @@ class PassesResult(_Answer):
 
     def __repr__(self) -> str:
         """Number of passes that comply, on one line."""
-        found = self.found
-        waived = _waived([each.waived_by for each in found.found if each.status == "waived"])
-        return f"<passes of {found.name!r}: {len(found.complying)} of {len(found.found)} comply{waived}>"
+        answer = self.found
+        waived = _waived([each.waived_by for each in answer.found if each.status == "waived"])
+        return f"<passes of {answer.name!r}: {len(answer.complying)} of {len(answer.found)} comply{waived}>"
 
     def __len__(self) -> int:
         """Number of passes."""
@@ -455,13 +455,13 @@ class PassesResult(_Answer):
         """A pass, counted from 0."""
         return self.found.found[index]
 
-    def mission_text(self, one: "SatellitePass", folder: str | os.PathLike[str]) -> str:
+    def mission_text(self, satellite_pass: "SatellitePass", folder: str | os.PathLike[str]) -> str:
         """Text of a mission file with the aperture in a pass; names of files are relative to a folder."""
         from bisar_budget.design.passes import center_time
         from bisar_budget.mission.edited import in_folder, with_values
 
         of_model = [SetValue("allocation.model", self.model)] if self.model else []
-        at_mid_time = [] if one.center is None else center_time(one.center)
+        at_mid_time = [] if satellite_pass.center is None else center_time(satellite_pass.center)
         changes = [*self.mission.changes, *of_model, *in_folder(self.mission, os.fspath(folder)), *at_mid_time]
         return with_values(self.mission.data.decode("utf-8-sig"), changes)
 
@@ -494,11 +494,11 @@ class MonteCarloResult(_Answer):
 
     def __repr__(self) -> str:
         """Draws and the probability of all requirements, on one line."""
-        found = self.found
-        if found.probability is None:
-            return f"<monte_carlo: {found.draws} draws, no requirement to hold>"
-        interval = f"{found.probability_low:.4g} to {found.probability_high:.4g}"
-        return f"<monte_carlo: {found.draws} draws, all hold in {found.probability:.4g} ({interval})>"
+        answer = self.found
+        if answer.probability is None:
+            return f"<monte_carlo: {answer.draws} draws, no requirement to hold>"
+        interval = f"{answer.probability_low:.4g} to {answer.probability_high:.4g}"
+        return f"<monte_carlo: {answer.draws} draws, all hold in {answer.probability:.4g} ({interval})>"
 
     def to_dict(self) -> JsonDocument:
         """The Monte Carlo part of the document of `check --monte-carlo --format json`."""

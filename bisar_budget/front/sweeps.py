@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bisar_budget import __version__, notebook
-from bisar_budget.design.cases import Cases, Values, some_of
+from bisar_budget.design.cases import Cases, Values, sampled_cases
 from bisar_budget.design.sweep import Asked, Block, part_of
 from bisar_budget.design.table import Part, Question, Swept, listed
 from bisar_budget.faults import ClusterError, printable
@@ -80,11 +80,11 @@ class SweepResult:
             return 0.0
 
         def trial(count: int) -> float:
-            sample = some_of(self.cases, count)
+            sample = sampled_cases(self.cases, count)
             asked = Asked(self.mission, sample, columns=self.more, model=self.model, today=self.day)
-            parts = asked.checked().parts
+            blocks = asked.checked().parts
             began = perf_counter()
-            for _ in parts:
+            for _ in blocks:
                 pass
             return perf_counter() - began
 
@@ -126,9 +126,9 @@ class SweepResult:
                 missing = [start for start in chunks.starts if start not in folder.done]
                 done = sum(chunks.stop(start) - start for start in folder.done)
                 with progress.watched("Checking cases") as report:
-                    for part in asked.shared_out(missing, self.jobs, self.workers.mapped if self.workers else None):
-                        folder.put(part)
-                        done += part.stop - part.start
+                    for block in asked.shared_out(missing, self.jobs, self.workers.mapped if self.workers else None):
+                        folder.put(block)
+                        done += block.stop - block.start
                         report(done, self.cases.count)
                 yield asked.swept(folder.parts(chunks.starts))
             except BaseException:
@@ -142,14 +142,14 @@ class SweepResult:
     def _described(self, swept: Swept) -> Described:
         return Described(swept, self.cases, self.mission, __version__, self.overrides)
 
-    def _counted(self, parts: Iterator[Part], report: Callable[[int, int], None]) -> Iterator[Part]:
+    def _counted(self, blocks: Iterator[Part], report: Callable[[int, int], None]) -> Iterator[Part]:
         self.statuses.clear()
         self.waived_by.clear()
-        for part in parts:
-            self.statuses.update(part.values["status"].tolist())
-            waivers_of_cases = (listed(waivers) for waivers in dict.fromkeys(part.values["waived_by"].tolist()))
+        for block in blocks:
+            self.statuses.update(block.values["status"].tolist())
+            waivers_of_cases = (listed(waivers) for waivers in dict.fromkeys(block.values["waived_by"].tolist()))
             self.waived_by |= dict.fromkeys(waiver for waivers in waivers_of_cases for waiver in waivers)
-            yield part
+            yield block
             report(self.statuses.total(), self.cases.count)
 
     @property
@@ -194,13 +194,13 @@ class SweepResult:
     # ------------------------------------------------------------------ all cases, for a notebook
     @cached_property
     def _parts(self) -> tuple[Swept, tuple[Part, ...]]:
-        with self.checked() as (described, parts):
-            return described.swept, tuple(parts)
+        with self.checked() as (described, blocks):
+            return described.swept, tuple(blocks)
 
     @property
     def _table(self) -> Described:
-        swept, parts = self._parts
-        return self._described(replace(swept, parts=iter(parts)))
+        swept, blocks = self._parts
+        return self._described(replace(swept, parts=iter(blocks)))
 
     @property
     def summary(self) -> str:
@@ -211,8 +211,8 @@ class SweepResult:
     def columns(self) -> Mapping[str, Values]:
         """Values of each column by its name, (cases,); varied keys are in the unit of the question."""
         table = self._table
-        parts = [table.values(part) for part in table.swept.parts]
-        return {column.name: np.concatenate([part[column.name] for part in parts]) for column in table.columns}
+        values = [table.values(block) for block in table.swept.parts]
+        return {column.name: np.concatenate([block[column.name] for block in values]) for column in table.columns}
 
     def __getitem__(self, name: str) -> Values:
         """Values of a column, (cases,)."""
@@ -273,7 +273,7 @@ class SweepResult:
             for column in table.columns:
                 kind = object if column.is_text else float
                 columns[column.name].append(array.from_delayed(values[column.name], (stop - start,), kind))
-        return {name: array.concatenate(parts) for name, parts in columns.items()}
+        return {name: array.concatenate(chunk_arrays) for name, chunk_arrays in columns.items()}
 
     def plot(self, column: str | None = None) -> Picture:
         """Curves of utilization over one key, or a map over two keys of the cases that comply.
@@ -293,8 +293,8 @@ class SweepResult:
         check_plot(self.cases, is_polar=False)
         table = self._table
         gathered_cases = Gathered(table, column=column)
-        for part in table.swept.parts:
-            gathered_cases.add(part)
+        for block in table.swept.parts:
+            gathered_cases.add(block)
         return Picture(
             f"{self._keys(' and ')}, {self.mission.name}", partial(drawing_file, self.drawing(gathered_cases))
         )

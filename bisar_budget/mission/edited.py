@@ -62,7 +62,7 @@ def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
 
 def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
     """Values with which the file of a mission, moved to a folder, names the same files from there."""
-    for key, name in (*path_files(mission), *_parts_beside(mission)):
+    for key, name in (*path_files(mission), *_named_part_files(mission)):
         if os.path.isabs(name):
             continue
         file = os.path.realpath(os.path.join(folder_of(mission.file), name))
@@ -73,7 +73,7 @@ def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
         yield SetValue(key, json.dumps(name.replace(os.sep, "/"), ensure_ascii=False))
 
 
-def _parts_beside(mission: Mission) -> Iterator[tuple[str, str]]:
+def _named_part_files(mission: Mission) -> Iterator[tuple[str, str]]:
     """Keys under which a mission names files of parts, with the names; parts of a catalogue are left out."""
     for owner, platform in mission.platforms._asdict().items():
         sensor = platform.motion_error.sensor
@@ -86,11 +86,11 @@ def _parts_beside(mission: Mission) -> Iterator[tuple[str, str]]:
         yield from ((key, name) for key, name in name_by_key.items() if is_file(name))
 
 
-def _with_value(text: str, parts: tuple[str, ...], value: str) -> str:
+def _with_value(text: str, steps: tuple[str, ...], value: str) -> str:
     """The text with a value at a path of keys."""
     node: Node = yaml.compose(text, Loader=_LOADER)
     while True:
-        key, remaining = _next(node, parts)
+        key, remaining = _next(node, steps)
         inner = _below(node, key)
         if inner is None:
             return _with_entry(text, node, key, remaining, value)
@@ -98,7 +98,7 @@ def _with_value(text: str, parts: tuple[str, ...], value: str) -> str:
             return _replaced(text, inner, value, _end_of_key(node, key))
         if not isinstance(inner, yaml.MappingNode | yaml.SequenceNode):  # an empty section
             return _replaced(text, inner, _nested(remaining, value), _end_of_key(node, key))
-        node, parts = inner, remaining
+        node, steps = inner, remaining
 
 
 def _without_key(text: str, parts: tuple[str, ...]) -> str:

@@ -202,7 +202,7 @@ class _PowerLawReader(Reader[PowerLaw]):
         return {"type": "object", "properties": properties, "additionalProperties": False, "minProperties": 1}
 
 
-FORMS = ("phase_noise", "allan_deviation", "power_law")
+OSCILLATOR_NOISE_FORMS = ("phase_noise", "allan_deviation", "power_law")
 MAX_FALL_DB_PER_DECADE = 60.0  # of a mask; noise of an oscillator falls by 40 at most
 MAX_RISE_DB_PER_DECADE = 20.0  # of a mask; a steeper rise is a tone or a mistake
 _OR_SENSOR = ", or sensor: a part of the catalogue"
@@ -323,11 +323,11 @@ class Oscillator(NamedTuple):
     @staticmethod
     def problems(values: SectionValues, or_else: str = _OR_SENSOR) -> Iterator[Problem]:
         """Require one form, and possible slopes of a mask; `or_else` names what else is accepted."""
-        forms = [form for form in FORMS if values.get(form) is not None]
-        accepted = f"accepted: one of {', '.join(FORMS)}"
+        forms = [form for form in OSCILLATOR_NOISE_FORMS if values.get(form) is not None]
+        accepted = f"accepted: one of {', '.join(OSCILLATOR_NOISE_FORMS)}"
         for form in forms[1:]:
             yield Problem(f"stands beside {forms[0]}", accepted, at=(form,))
-        if values.get("sensor") is None and values.keys() >= set(FORMS):
+        if values.get("sensor") is None and values.keys() >= set(OSCILLATOR_NOISE_FORMS):
             if not forms:
                 yield Problem("says nothing of its noise", f"{accepted}{or_else}")
             if values["phase_noise"] is not None and values.get("frequency", 0.0) is None:

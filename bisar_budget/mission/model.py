@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.arrays import PerCase
-from bisar_budget.constants import GATING_MODELS, SPEED_OF_LIGHT
+from bisar_budget.constants import GATING_MODELS, SPEED_OF_LIGHT_MPS
 from bisar_budget.faults import Changed, KeyPath, ParserEvent, Place, Problem, SetValue, changes_words, shown, upwards
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.json_types import Definitions, JsonObject
@@ -18,11 +18,11 @@ from bisar_budget.mission.readers import (
     COORDINATE,
     DIRECTION,
     DURATION,
-    FREQUENCY,
     HEIGHT,
     LATITUDE,
     PHASE,
     PHASE_REQUIREMENT,
+    RADAR_FREQUENCY,
     RANGE,
     SHARE,
     SIDELOBE_REQUIREMENT,
@@ -67,8 +67,8 @@ class Document(NamedTuple):
 class Radar(NamedTuple):
     """The waveform."""
 
-    center_frequency: Annotated[float, Key(FREQUENCY, "Centre of the band; every phase uses it.")]
-    bandwidth: Annotated[float, Key(FREQUENCY, "Width of the band, for the resolution.")]
+    center_frequency: Annotated[float, Key(RADAR_FREQUENCY, "Centre of the band; every phase uses it.")]
+    bandwidth: Annotated[float, Key(RADAR_FREQUENCY, "Width of the band, for the resolution.")]
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
@@ -82,7 +82,7 @@ class Radar(NamedTuple):
     @property
     def wavelength(self) -> float:
         """Wavelength at the centre frequency. [m]"""
-        return SPEED_OF_LIGHT / self.center_frequency
+        return SPEED_OF_LIGHT_MPS / self.center_frequency
 
 
 class Collection(NamedTuple):
@@ -306,7 +306,7 @@ def _noise_cut_off(values: SectionValues) -> Iterator[Problem]:
             )
 
 
-WHOLE = 1e-6  # largest difference of a sum of shares from 1
+SHARE_SUM_TOLERANCE_FRACTION = 1e-6  # largest difference of a sum of shares from 1
 
 
 class Shares(NamedTuple):
@@ -335,7 +335,7 @@ class Shares(NamedTuple):
         if not values.keys() >= set(Shares._fields):
             return
         total = sum(values[name] or 0.0 for name in Shares._fields)
-        if abs(total - 1) > WHOLE:
+        if abs(total - 1) > SHARE_SUM_TOLERANCE_FRACTION:
             yield Problem(f"shares must sum to 1, these sum to {total:.9g}")
 
 

@@ -24,10 +24,10 @@ from bisar_budget.faults import (
 from bisar_budget.geometry import Vector
 from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.mission.instruments import (
-    FORMS,
     IMU_KINDS,
     NOT_SENSITIVE,
     OSCILLATOR,
+    OSCILLATOR_NOISE_FORMS,
     AccelerationSensitivity,
     AccelerometerBias,
     AccelerometerScaleFactor,
@@ -76,7 +76,7 @@ Find = Callable[[str], tuple[str, bytes]]  # name of a part to the path and the 
 
 MOTION_ERROR = Section(MotionError)
 _TEXT = Text()
-_NAME = Key(_TEXT, "Maker, type, and revision or mode; reports show it.")
+_PART_NAME_KEY = Key(_TEXT, "Maker, type, and revision or mode; reports show it.")
 _SAYS = Key(
     _TEXT, "Meaning of the figures in their source: which statistic, typical or largest, in which conditions."
 )
@@ -84,8 +84,8 @@ _SOURCE = either(dict, TextMap("figure"), _TEXT)
 _SOURCES = Key(_SOURCE, "Document, revision and table of every figure, or of each figure by its key.")
 _IN_ORBIT = Key(YesNo(), "Whether it serves a satellite. `allocate` offers a satellite only such parts of this kind.")
 _KIND = "Kind of the part; it determines the figures."
-_POSITION = "1 sigma east, north, up; a single value means each axis."
-_NOISE = "Position errors that change within an aperture: the residual noise."
+_POSITION_TEXT = "1 sigma east, north, up; a single value means each axis."
+_NOISE_TEXT = "Position errors that change within an aperture: the residual noise."
 _GNSS_KINDS = ("position", "velocity", "random")
 _SUFFIXES = (".yaml", ".yml")
 _MAX_FOLDER_FILES = 1000  # parts that are read of one folder
@@ -95,7 +95,7 @@ class ImuPart(NamedTuple):
     """An inertial sensor, 1 sigma; a single value means each axis."""
 
     kind: Annotated[str, Key(Choice("imu"), _KIND)]
-    name: Annotated[str, _NAME]
+    name: Annotated[str, _PART_NAME_KEY]
     source: Annotated[str | Mapping[str, str], _SOURCES]
     accelerometer_bias: AccelerometerBias = None
     accelerometer_scale_factor: AccelerometerScaleFactor = None
@@ -116,11 +116,11 @@ class GnssPart(NamedTuple):
     """A GNSS receiver in one of its modes: errors of its position and velocity, 1 sigma, east, north, up."""
 
     kind: Annotated[str, Key(Choice("gnss"), _KIND)]
-    name: Annotated[str, _NAME]
+    name: Annotated[str, _PART_NAME_KEY]
     source: Annotated[str | Mapping[str, str], _SOURCES]
-    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), _POSITION)] = None
-    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), _POSITION)] = None
-    random: Annotated[tuple[GaussMarkov, ...], Key(ListOf(GaussMarkov), _NOISE)] = ()
+    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), _POSITION_TEXT)] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), _POSITION_TEXT)] = None
+    random: Annotated[tuple[GaussMarkov, ...], Key(ListOf(GaussMarkov), _NOISE_TEXT)] = ()
     in_orbit: Annotated[bool | None, _IN_ORBIT] = None
     says: Annotated[str | None, _SAYS] = None
 
@@ -135,7 +135,7 @@ class OscillatorPart(NamedTuple):
     """An oscillator, with its noise in one of three forms."""
 
     kind: Annotated[str, Key(Choice("oscillator"), _KIND)]
-    name: Annotated[str, _NAME]
+    name: Annotated[str, _PART_NAME_KEY]
     source: Annotated[str | Mapping[str, str], _SOURCES]
     frequency: Frequency = None
     phase_noise: PhaseNoise = None
@@ -149,18 +149,18 @@ class OscillatorPart(NamedTuple):
     def problems(values: SectionValues) -> Iterator[Problem]:
         """Check the part as an oscillator of a mission, and require noise that is not zero."""
         yield from Oscillator.problems({**values, "sensor": None}, or_else="")
-        if any(values.get(form) is not None for form in FORMS):
-            yield from _without_figure(values, FORMS)
+        if any(values.get(form) is not None for form in OSCILLATOR_NOISE_FORMS):
+            yield from _without_figure(values, OSCILLATOR_NOISE_FORMS)
 
 
 Part = ImuPart | GnssPart | OscillatorPart
-SECTIONS: dict[str, Section[Part]] = {
+PART_SECTIONS: dict[str, Section[Part]] = {
     "imu": Section(ImuPart),
     "gnss": Section(GnssPart),
     "oscillator": Section(OscillatorPart),
 }
 BESIDE_NOISE = ("aging", "acceleration_sensitivity")  # figures of an oscillator in addition to a form of noise
-FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *FORMS, *BESIDE_NOISE)}
+FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *OSCILLATOR_NOISE_FORMS, *BESIDE_NOISE)}
 
 
 class PartError(Exception):
@@ -222,7 +222,7 @@ def entries(places: Sequence[str]) -> Iterator[Entry]:
         One of the files is no part.
     """
     read = [_entry(file, _content(file, DISK)) for file in catalogue(places).values()]
-    yield from sorted(read, key=lambda entry: (list(SECTIONS).index(entry.part.kind), entry.id))
+    yield from sorted(read, key=lambda entry: (list(PART_SECTIONS).index(entry.part.kind), entry.id))
 
 
 def figure_text(value: object) -> str:
@@ -305,14 +305,14 @@ def _part_of(tree: Tree) -> Part | Invalid:
     """
     root = tree.root
     kind = root.get("kind")
-    if not (isinstance(kind, str) and kind in SECTIONS):
-        kind = max(SECTIONS, key=lambda name: len(root.keys() & set(FIGURES[name])))
+    if not (isinstance(kind, str) and kind in PART_SECTIONS):
+        kind = max(PART_SECTIONS, key=lambda name: len(root.keys() & set(FIGURES[name])))
         is_likely = not root.keys().isdisjoint(FIGURES[kind])
         if root.get("kind") is not INVALID:  # an invalid value was reported by the tree
             tree.report(("kind",), _no_kind(root, kind if is_likely else ""))
         if not is_likely:
             return INVALID
-    part = SECTIONS[kind].read({**root, "kind": kind}, (), tree.report)
+    part = PART_SECTIONS[kind].read({**root, "kind": kind}, (), tree.report)
     for problem in _without_source(root, FIGURES[kind]):
         tree.report((), problem)
     return part
@@ -320,13 +320,13 @@ def _part_of(tree: Tree) -> Part | Invalid:
 
 def _no_kind(root: Mapping[str, object], likely: str) -> Problem:
     """The problem with a missing or unknown kind; `likely` is the kind that the figures belong to, or empty."""
-    hint = did_you_mean(root.get("kind", ""), tuple(SECTIONS))
+    hint = did_you_mean(root.get("kind", ""), tuple(PART_SECTIONS))
     if likely:
         hint = f"Its figures are those of kind: {likely}"
     elif "platforms" in root:
         hint = "This seems to be a mission file, which `bisar-budget check` reads"
     missing = "" if "kind" in root else ", and is missing"
-    return Problem(f"must be one of {', '.join(SECTIONS)}{missing}", hint=hint)
+    return Problem(f"must be one of {', '.join(PART_SECTIONS)}{missing}", hint=hint)
 
 
 def _without_figure(values: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
@@ -588,8 +588,8 @@ def _with_sensor(
     entry = entries[oscillator.sensor]
     part: SectionValue = entry.part
     written, overridden, of_parts = entry.figures, [], []
-    own_form = next((form for form in FORMS if getattr(oscillator, form) is not None), None)
-    (form,) = [form for form in FORMS if getattr(part, form) is not None]
+    own_form = next((form for form in OSCILLATOR_NOISE_FORMS if getattr(oscillator, form) is not None), None)
+    (form,) = [form for form in OSCILLATOR_NOISE_FORMS if getattr(part, form) is not None]
     figures: dict[str, SectionValue] = {}
     if own_form is None:
         figures = {form: getattr(part, form), "source": evidence(part, form)}
@@ -636,7 +636,7 @@ def part_schema() -> JsonObject:
     """JSON Schema of the file of a part, with one alternative for each kind; quantities as in `mission_schema`."""
     definitions: Definitions = {}
     kinds = []
-    for kind, section in SECTIONS.items():
+    for kind, section in PART_SECTIONS.items():
         kinds.append(section.schema(definitions))
         definitions[section.kind.__name__] |= _rules(FIGURES[kind])
     return {
@@ -667,6 +667,6 @@ def _rules(figures: Sequence[str]) -> JsonObject:
         }
         for figure in figures
     ]
-    if set(FORMS) <= set(figures):
+    if set(OSCILLATOR_NOISE_FORMS) <= set(figures):
         return {"oneOf": alternatives, "dependencies": {"phase_noise": ["frequency"]}, "allOf": sourced}
     return {"anyOf": alternatives, "allOf": sourced}

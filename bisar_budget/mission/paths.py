@@ -13,7 +13,7 @@ import numpy as np
 from bisar_budget.arrays import Booleans
 from bisar_budget.faults import KeyPath, Problem, printable
 from bisar_budget.geometry import STRAIGHT, PlatformState, UndefinedFrameError
-from bisar_budget.mission.covariance import KINDS, Covariance
+from bisar_budget.mission.covariance import MOTION_KINDS, Covariance
 from bisar_budget.mission.instruments import Overridden
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import (
@@ -60,7 +60,7 @@ from bisar_budget.paths.flight import (
     widest_stretch,
 )
 from bisar_budget.paths.free_fall import fall_of, of_scene
-from bisar_budget.paths.instant import DAY, Instant, later
+from bisar_budget.paths.instant import DAY_S, Instant, later
 from bisar_budget.paths.log_places import LogKeys, filled_sigmas, hold_to_motion
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_earth_rotation
 from bisar_budget.paths.path_formats import ORBIT_FORMATS, hold_to_format, hold_to_log, read_log
@@ -74,9 +74,9 @@ Beside = Callable[[str], bytes]  # name of a file in a mission to the content of
 
 _FILE_KEYS = (*ORBIT_FORMATS, "file", "accuracy")  # keys of orbits and trajectories that name files
 _MAX_FILE_BYTES = 500_000_000
-_MAX_KEPT_LOGS = 2  # the logs of a mission that is read again and again, such as by `solve`
+_KEPT_LOG_COUNT = 2  # the logs of a mission that is read again and again, such as by `solve`
 _logs: dict[tuple[object, ...], Log] = {}  # by the hash of the file and the keys that decide how it is read
-_MAX_KEPT_PATHS = 256  # cases of a sweep have the same path where nothing that decides it changes
+_KEPT_PATH_COUNT = 256  # cases of a sweep have the same path where nothing that decides it changes
 _paths: dict[tuple[object, ...], FlownPath] = {}  # by all values that decide them
 _MAX_ORBIT_RADIUS_M = 4.1e8  # beyond the Moon
 _ROUNDED_CORRELATION_FRACTION = 1e-6  # a correlation this small is a rounding error of turned axes
@@ -296,7 +296,7 @@ def orbits_of(mission: Mission, route: OrbitSource, read: Beside) -> Callable[[I
 
     @lru_cache(maxsize=64)
     def orientation(day: int) -> Orientation:
-        return _orientation(mission, Instant(day, DAY / 2), read)[0]
+        return _orientation(mission, Instant(day, DAY_S / 2), read)[0]
 
     return lambda center: orbit_file.orbit(center, orientation(center.day))
 
@@ -317,7 +317,7 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
             return path._replace(orientation=table) if orbit.is_turned else path
 
         key = (*orbit_file._replace(data=digest.encode()), center, axes, T, orientation, table)
-        path = _kept(_paths, _MAX_KEPT_PATHS, key, orbit_path)
+        path = _kept(_paths, _KEPT_PATH_COUNT, key, orbit_path)
     except PathFileError as error:
         source = getattr(route, _form_of(route))
         file = source if isinstance(source, str) else None
@@ -414,7 +414,7 @@ def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | N
         data = read(route.file)
         digest = hashlib.sha256(data).hexdigest()
         key = (route, digest, mission.collection.center_time, axes, aperture_time)
-        return _kept(_paths, _MAX_KEPT_PATHS, key, lambda: _log_path(mission, route, axes, data, digest))
+        return _kept(_paths, _KEPT_PATH_COUNT, key, lambda: _log_path(mission, route, axes, data, digest))
     except PathFileError as error:
         problem = _file_problem(None if error.key else route.file, error)
         raise _UnusablePathError(("trajectory", error.key or "file"), problem) from None
@@ -468,7 +468,7 @@ def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
         hold_to_log(data, route.file)
         return read_log(data, route.file, route.format, keys)
 
-    return _kept(_logs, _MAX_KEPT_LOGS, key, read_file)
+    return _kept(_logs, _KEPT_LOG_COUNT, key, read_file)
 
 
 def _by_accuracy(
@@ -531,7 +531,7 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
     along = block_turned(np.array(covariance_of_source), axes)
     if error.frame == "ric" and state.fall is not None and len(along) == 6:
         along = with_rate(along, axes @ np.array(state.fall.rotation))  # velocities in `ric` are against the stars
-    kinds = KINDS[: len(along) // 3]
+    kinds = MOTION_KINDS[: len(along) // 3]
     sigmas = np.sqrt(np.diag(along))
     is_complete = error.covariance is None and error.position is None and error.velocity is None
     if is_complete and len(kinds) == 2 and error.distribution == "normal" and _is_correlated(along):
@@ -577,7 +577,7 @@ def _of_position(platform: Platform, axes: earth.SceneAxes, aperture_time_s: flo
         return _flown(fitted, "geodetic place, flight along the geodesic")
 
     key = (position, heading, speed, climb, axes, aperture_time_s)
-    return _kept(_paths, _MAX_KEPT_PATHS, key, path)
+    return _kept(_paths, _KEPT_PATH_COUNT, key, path)
 
 
 def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | None = None) -> FlownPath:

@@ -25,7 +25,7 @@ from bisar_budget.mission.changes import (
     next_name,
     parts_of,
 )
-from bisar_budget.mission.covariance import KINDS, Covariance, error_index
+from bisar_budget.mission.covariance import MOTION_KINDS, Covariance, error_index
 from bisar_budget.mission.instruments import IMU_KINDS, POWERS, Imu, LeverArm
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import MISSION, Mission, Simulation
@@ -48,7 +48,7 @@ from bisar_budget.mission.tree import Content, Tree, read_tree
 from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.units import Dimension, parse_quantity
 
-DIGITS = 8  # of values in answers: both sides of a crossing stay within 1e-6
+ANSWER_DIGITS = 8  # of values in answers: both sides of a crossing stay within 1e-6
 _DECADE_RATIO = 10.0
 Measured = Any
 """A quantity of astropy or pint, which need not be installed, or its magnitude: a number or an array."""
@@ -101,13 +101,13 @@ class Number(NamedTuple):
         return self.dimension.scales.get(self.unit) or (1.0, 1.0)
 
     def text(self, value: float, *, is_up: bool | None = None) -> str:
-        """Text of a value in the number's unit with `DIGITS` digits, rounded up, down, or (None) to the nearest."""
+        """Value in the number's unit with `ANSWER_DIGITS` digits, rounded up, down, or (None) to the nearest."""
         factor, divisor = self.scale
         number = value / factor * divisor
         if is_up is not None:
-            context = Context(prec=DIGITS, rounding=ROUND_CEILING if is_up else ROUND_FLOOR)
+            context = Context(prec=ANSWER_DIGITS, rounding=ROUND_CEILING if is_up else ROUND_FLOOR)
             number = float(context.create_decimal(repr(number)))
-        return f"{number:.{DIGITS}g}{' ' if self.unit else ''}{self.unit}"
+        return f"{number:.{ANSWER_DIGITS}g}{' ' if self.unit else ''}{self.unit}"
 
     def said_like(self, between: str | None) -> "Number":
         """The number in the unit of a range's upper end, if the file has no value whose unit could be used."""
@@ -216,11 +216,11 @@ def _reader_and_value(tree: JsonObject, key: str) -> tuple[Reader[object], Conte
     """Reader of a key, which may be one of several forms, and the file's value, None if it has none."""
     reader: Reader[object] = MISSION
     value: Content = tree
-    parts = parts_of(key)
-    while parts:
+    steps = parts_of(key)
+    while steps:
         reader = form_of(reader, value)
-        name, remaining = next_name(value, parts)
-        child, parts = (parts[0], parts[1:]) if name is None else (str(name), remaining)
+        name, remaining = next_name(value, steps)
+        child, steps = (steps[0], steps[1:]) if name is None else (str(name), remaining)
         inner = reader.below(child)
         if inner is None and isinstance(value, str):
             raise QuestionError(f"{shown(key)}: the file has {shown(value)!r} there, which has no {shown(child)!r}")
@@ -291,7 +291,7 @@ def range_of(number: Number, between: str | None) -> Range:
         low, high = (low * (1 + 1e-9) if low == gt else low), (high * (1 - 1e-9) if high == lt else high)
     else:
         option = f"--between {shown(between)}"
-        first, dots, last = (part.strip() for part in between.partition(".."))
+        first, dots, last = (end.strip() for end in between.partition(".."))
         if not dots:
             example = (1.0, 10.0) if number.value is None else (number.value / 2, number.value * 2)
             example_range = "..".join(map(number.text, example)).replace(" ", "")
@@ -314,7 +314,7 @@ def range_of(number: Number, between: str | None) -> Range:
 
 # ---------------------------------------------------------------- numbers of a mission
 # Sections that a file may omit, and keys whose scalar holds for each of three axes.
-_SECTIONS: Mapping[str, Callable[[], object]] = {
+_OMITTED_SECTIONS: Mapping[str, Callable[[], object]] = {
     "imu": Imu,
     "lever_arm": LeverArm,
     "common_motion_error": CommonMotionError,
@@ -322,7 +322,7 @@ _SECTIONS: Mapping[str, Callable[[], object]] = {
 }
 _TRIPLES = ("position", "velocity", "acceleration", *IMU_KINDS, "uncertainty")
 # Curves of an oscillator, with the dimension of their abscissas, which name the points.
-_CURVES: Mapping[str, Dimension] = {
+_CURVE_ABSCISSAS: Mapping[str, Dimension] = {
     "phase_noise": units.FREQUENCY,
     "spurs": units.FREQUENCY,
     "allan_deviation": units.TIME,
@@ -336,22 +336,22 @@ def with_number(mission: Mission, key: str, number: SectionValue) -> Mission:
     return changed_mission
 
 
-def _with_value(value: SectionValue, parts: Sequence[str], number: SectionValue) -> SectionValue:
+def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue) -> SectionValue:
     """A value with a number at a path below it; at a triple the number goes into all three axes."""
-    if not parts:
+    if not steps:
         return (number, number, number) if isinstance(value, tuple) else number
     if isinstance(value, Covariance):
-        return _with_element(value, parts, number)
-    name, *remaining = parts
+        return _with_element(value, steps, number)
+    name, *remaining = steps
     if name.isdigit():
         index = int(name)
         return (*value[:index], _with_value(value[index], remaining, number), *value[index + 1 :])
-    if name in _CURVES:
+    if name in _CURVE_ABSCISSAS:
         return value._replace(**{name: _with_point(getattr(value, name), name, ".".join(remaining), number)})
     name = POWERS.get(name, name)
     below = getattr(value, name)
     if below is None and remaining:
-        below = _SECTIONS[name]()
+        below = _OMITTED_SECTIONS[name]()
     if below is None and name in _TRIPLES:
         below = ()
     return value._replace(**{name: _with_value(below, remaining, number)})
@@ -361,15 +361,15 @@ def _with_point(curve: SectionValue, name: str, point: str, number: SectionValue
     """A curve with another ordinate at the point that a text names."""
     if isinstance(curve, Spectrum):
         return curve._replace(points=_with_point(curve.points, name, point, number))
-    here = parse_quantity(point, _CURVES[name])
+    here = parse_quantity(point, _CURVE_ABSCISSAS[name])
     return tuple((at, number if at == here else ordinate) for at, ordinate in curve)
 
 
-def _with_element(covariance: Covariance, parts: Sequence[str], number: SectionValue) -> Covariance:
+def _with_element(covariance: Covariance, steps: Sequence[str], number: SectionValue) -> Covariance:
     """A covariance with another sigma of one axis or of all axes, or with another correlation of a pair."""
-    kind, *remaining = parts
-    if kind in KINDS:
-        first = 3 * KINDS.index(kind)
+    kind, *remaining = steps
+    if kind in MOTION_KINDS:
+        first = 3 * MOTION_KINDS.index(kind)
         changed_indices = [first + int(axis) for axis in remaining] or range(first, first + 3)
         sigmas = tuple(number if index in changed_indices else sigma for index, sigma in enumerate(covariance.sigmas))
         return covariance._replace(sigmas=sigmas)
@@ -389,16 +389,16 @@ def value_at(mission: Mission, key: str) -> SectionValue:
     return _value_below(mission, parts_of(key))
 
 
-def _value_below(value: SectionValue, parts: Sequence[str]) -> SectionValue:
+def _value_below(value: SectionValue, steps: Sequence[str]) -> SectionValue:
     """The value at a path below a value; None if there is none."""
-    if not parts or value is None:
+    if not steps or value is None:
         return value
     if isinstance(value, Covariance):
-        return _element(value, parts)
-    name, *remaining = parts
+        return _element(value, steps)
+    name, *remaining = steps
     if name.isdigit():
         return _value_below(value[int(name)], remaining) if int(name) < len(value) else None
-    if name in _CURVES:
+    if name in _CURVE_ABSCISSAS:
         return _point(getattr(value, name), name, ".".join(remaining))
     if isinstance(value, MotionError) and name in ("position", "velocity", "acceleration"):
         return _value_below(value.stated(name), remaining)
@@ -408,14 +408,14 @@ def _value_below(value: SectionValue, parts: Sequence[str]) -> SectionValue:
 def _point(curve: SectionValue, name: str, point: str) -> PerCase | None:
     """Ordinate of a curve at the point that a text names; None if the curve has no such point."""
     points = curve.points if isinstance(curve, Spectrum) else curve or ()
-    here = parse_quantity(point, _CURVES[name])
+    here = parse_quantity(point, _CURVE_ABSCISSAS[name])
     return next((ordinate for at, ordinate in points if at == here), None)
 
 
-def _element(covariance: Covariance, parts: Sequence[str]) -> float | Vector | None:
+def _element(covariance: Covariance, steps: Sequence[str]) -> float | Vector | None:
     """Sigma of an axis, or the three sigmas, of a covariance; None for a correlation."""
-    kind, *axis = parts
-    if kind not in KINDS:
+    kind, *axis = steps
+    if kind not in MOTION_KINDS:
         return None  # a correlation is no size
     return covariance.of(kind)[int(axis[0])] if axis else covariance.of(kind)
 

@@ -44,11 +44,11 @@ OtherForm = TypeVar("OtherForm")
 
 _POINT = "A decimal is written with a point, a comma separates"
 _MAX_TEXT_CHARACTERS = 500
-_MAX_ENTRIES = 1000  # of a list of sections
+_MAX_ENTRY_COUNT = 1000  # of a list of sections
 _MAX_POINTS = 100  # of a curve
-_MAX_NAMES = 8  # of a list of names; a platform has no more parts
-_MAX_IDS = 4000  # of a mapping by row ids; the longest lists make fewer rows
-_MAX_WILDCARDS = 20  # of a pattern; an id has four parts, and fifty wildcards take a second
+_MAX_NAME_COUNT = 8  # of a list of names; a platform has no more parts
+_MAX_ID_COUNT = 4000  # of a mapping by row ids; the longest lists make fewer rows
+_MAX_WILDCARD_COUNT = 20  # of a pattern; an id has four parts, and fifty wildcards take a second
 # Controls, line separators, lone surrogates, byte order mark, and the marks that turn the reading direction.
 _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\u202a-\u202e\u2066-\u2069]")
 
@@ -78,7 +78,7 @@ class Reader(Generic[T_co]):
         """Return the value; raises `InvalidValueError`."""
         raise NotImplementedError
 
-    def below(self, part: str) -> "Reader[object] | None":
+    def below(self, step: str) -> "Reader[object] | None":
         """Reader of the value at a key or an index within this value; None if there is no such key or index."""
         return None
 
@@ -213,9 +213,9 @@ class Triple(Reader[tuple[float, ...]]):
             scalar = self.component.read(value, path, report)
             return scalar if scalar is INVALID else (scalar, scalar, scalar)
         if not isinstance(value, list) or len(value) != 3:
-            given = f", {len(value)} given" if isinstance(value, list) else ""
+            length_words = f", {len(value)} given" if isinstance(value, list) else ""
             hint = _POINT if isinstance(value, list) and len(value) > 3 else bracketed
-            report(path, Problem(f"must be three components{given}", "accepted: [a, b, c]", hint))
+            report(path, Problem(f"must be three components{length_words}", "accepted: [a, b, c]", hint))
             return INVALID
         components = tuple(
             [read_part(self.component, item, (*path, index), report) for index, item in enumerate(value)]
@@ -242,9 +242,9 @@ class Triple(Reader[tuple[float, ...]]):
             return "Write brackets, and the unit of each" if value.count(", ") == 2 else ""
         return f"Did you mean [{', '.join(text.strip() for text in texts)}]?"
 
-    def below(self, part: str) -> Reader[object] | None:
+    def below(self, step: str) -> Reader[object] | None:
         """Reader of one component."""
-        return self.component if is_place(part) else None
+        return self.component if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: array of three, or also a single value."""
@@ -288,10 +288,10 @@ class Glob(Text):
     """An id, or a pattern of ids with `*`, `?` and `[...]`."""
 
     def leaf(self, value: object) -> str:
-        """Refuse a pattern with more than `_MAX_WILDCARDS` wildcards, which takes long to match."""
+        """Refuse a pattern with more than `_MAX_WILDCARD_COUNT` wildcards, which takes long to match."""
         pattern = super().leaf(value)
-        if sum(map(pattern.count, "*?[")) > _MAX_WILDCARDS:
-            raise InvalidValueError(f"must have at most {_MAX_WILDCARDS} wildcards")
+        if sum(map(pattern.count, "*?[")) > _MAX_WILDCARD_COUNT:
+            raise InvalidValueError(f"must have at most {_MAX_WILDCARD_COUNT} wildcards")
         return pattern
 
 
@@ -362,18 +362,18 @@ class Words(Reader[tuple[str, ...]]):
 
 
 class TextList(Words):
-    """A list of 1 to `_MAX_NAMES` names of parts, each at most once."""
+    """A list of 1 to `_MAX_NAME_COUNT` names of parts, each at most once."""
 
     is_word = True
 
     def __init__(self) -> None:
         self.word = Reference()
-        self.problem = Problem(f"must be a list of 1 to {_MAX_NAMES} names")
-        self.fewest, self.most = 1, _MAX_NAMES
+        self.problem = Problem(f"must be a list of 1 to {_MAX_NAME_COUNT} names")
+        self.fewest, self.most = 1, _MAX_NAME_COUNT
 
-    def below(self, part: str) -> Reader[object] | None:
+    def below(self, step: str) -> Reader[object] | None:
         """Reader of one name."""
-        return self.word if is_place(part) else None
+        return self.word if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: array of text."""
@@ -438,12 +438,12 @@ class Day(Reader["date"]):
 def _is_few(
     value: object, kind: type[SizedT] | tuple[type[SizedT], ...], kind_problem: str, path: KeyPath, report: Report
 ) -> TypeGuard[SizedT]:
-    """Whether a value is of a kind and has at most `_MAX_IDS` entries; reports the problem if not."""
+    """Whether a value is of a kind and has at most `_MAX_ID_COUNT` entries; reports the problem if not."""
     if not isinstance(value, kind):
         report(path, Problem(kind_problem))
         return False
-    if len(value) > _MAX_IDS:
-        report(path, Problem(f"must have at most {_MAX_IDS} entries, has {len(value)}"))
+    if len(value) > _MAX_ID_COUNT:
+        report(path, Problem(f"must have at most {_MAX_ID_COUNT} entries, has {len(value)}"))
         return False
     return True
 
@@ -463,7 +463,7 @@ class TextMap(Reader[dict[str, str]]):
 
     def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: object."""
-        return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_IDS}
+        return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_ID_COUNT}
 
 
 class SizeMap(Reader[dict[str, object]]):
@@ -481,7 +481,7 @@ class SizeMap(Reader[dict[str, object]]):
     def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: object of quantities."""
         size = {"type": ["string", "number"]}
-        return {"type": "object", "additionalProperties": size, "maxProperties": _MAX_IDS}
+        return {"type": "object", "additionalProperties": size, "maxProperties": _MAX_ID_COUNT}
 
 
 _WEIGHT = Quantity(units.RATIO, gt=0, ge=1e-6, le=1e6)
@@ -509,8 +509,8 @@ class Weights(Reader[dict[str, float]]):
         label, weight = Text().schema(definitions), _WEIGHT.schema(definitions)
         return {
             "anyOf": [
-                {"type": "object", "additionalProperties": weight, "maxProperties": _MAX_IDS},
-                {"type": "array", "items": label, "maxItems": _MAX_IDS},
+                {"type": "object", "additionalProperties": weight, "maxProperties": _MAX_ID_COUNT},
+                {"type": "array", "items": label, "maxItems": _MAX_ID_COUNT},
             ]
         }
 
@@ -578,9 +578,9 @@ class Section(Reader[T_co]):
             if name in self.keys
         }
 
-    def below(self, part: str) -> Reader[object] | None:
+    def below(self, step: str) -> Reader[object] | None:
         """Reader of a key."""
-        return self.keys[part].reader if part in self.keys else None
+        return self.keys[step].reader if step in self.keys else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: reference to a definition, which is made on first use."""
@@ -624,19 +624,19 @@ class ListOf(Reader[tuple[T_co, ...]]):
         if not isinstance(value, list):
             report(path, Problem("must be a list"))
             return INVALID
-        if len(value) > _MAX_ENTRIES:
-            report(path, Problem(f"must have at most {_MAX_ENTRIES} entries, has {len(value)}"))
+        if len(value) > _MAX_ENTRY_COUNT:
+            report(path, Problem(f"must have at most {_MAX_ENTRY_COUNT} entries, has {len(value)}"))
             return INVALID
         entries = tuple([read_part(self.section, entry, (*path, index), report) for index, entry in enumerate(value)])
         return entries if are_valid(entries) else INVALID
 
-    def below(self, part: str) -> Reader[object] | None:
+    def below(self, step: str) -> Reader[object] | None:
         """Reader of one entry."""
-        return self.section if is_place(part) else None
+        return self.section if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: array of the section."""
-        return {"type": "array", "items": self.section.schema(definitions), "maxItems": _MAX_ENTRIES}
+        return {"type": "array", "items": self.section.schema(definitions), "maxItems": _MAX_ENTRY_COUNT}
 
 
 class OneOf(Reader[T_co]):
@@ -670,9 +670,10 @@ class PointsReader(Reader[T_co]):
     def points(self, value: object, path: KeyPath, report: Report) -> Points | Invalid:
         """Read each point, in rising order; a problem is reported at its own path."""
         if not isinstance(value, dict) or not self.fewest <= len(value) <= _MAX_POINTS:
-            given = f", {len(value)} given" if isinstance(value, dict) else ""
+            length_words = f", {len(value)} given" if isinstance(value, dict) else ""
             report(
-                path, Problem(f"must be {self.fewest} to {_MAX_POINTS} points{given}", f"accepted: {self.accepted}")
+                path,
+                Problem(f"must be {self.fewest} to {_MAX_POINTS} points{length_words}", f"accepted: {self.accepted}"),
             )
             return INVALID
         points: dict[float, float | Invalid] = {}
@@ -728,9 +729,9 @@ def is_empty(item: object) -> bool:
     return isinstance(item, list) and all(map(is_empty, item))
 
 
-def is_place(part: str) -> bool:
-    """Whether a part of a key is the index of an entry."""
-    return part.isascii() and part.isdigit() and len(part) < 9
+def is_index(step: str) -> bool:
+    """Whether a step of a path is the index of an entry."""
+    return step.isascii() and step.isdigit() and len(step) < 9
 
 
 def read_part(reader: Reader[T], value: object, path: KeyPath, report: Report) -> T | Invalid:
@@ -762,17 +763,17 @@ def did_you_mean(word: object, known_words: tuple[str, ...]) -> str:
 
 # ---------------------------------------------------------------------- bounds
 # Real values stay far inside these bounds, and squares stay finite.
-FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
+RADAR_FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
 VIBRATION_FREQUENCY = Quantity(units.FREQUENCY, gt=0, le=1e9)
 DURATION = Quantity(units.TIME, gt=0, ge=1e-6, le=1e6)
 COORDINATE = Quantity(units.LENGTH, ge=-1e9, le=1e9)
 RANGE = Quantity(units.LENGTH, gt=0, le=1e9)
 SIZE = Quantity(units.LENGTH, ge=0, le=1e9)
 VELOCITY = Quantity(units.SPEED, ge=-1e6, le=1e6)
-SPEED = Quantity(units.SPEED, ge=0, le=1e6)
-ACCELERATION = Quantity(units.ACCELERATION, ge=-1e6, le=1e6)
-JERK = Quantity(units.JERK, ge=-1e6, le=1e6)
-SNAP = Quantity(units.SNAP, ge=-1e6, le=1e6)
+GROUND_SPEED = Quantity(units.SPEED, ge=0, le=1e6)
+ACCELERATION_COMPONENT = Quantity(units.ACCELERATION, ge=-1e6, le=1e6)
+JERK_COMPONENT = Quantity(units.JERK, ge=-1e6, le=1e6)
+SNAP_COMPONENT = Quantity(units.SNAP, ge=-1e6, le=1e6)
 DIRECTION = Quantity(units.ANGLE, ge=-2 * math.pi, le=2 * math.pi)
 LATITUDE = Quantity(units.ANGLE, ge=-math.pi / 2, le=math.pi / 2)
 HEIGHT = Quantity(units.LENGTH, ge=-1e4, le=1e9)
@@ -783,5 +784,5 @@ PHASE_REQUIREMENT = Quantity(units.ANGLE, gt=0, ge=1e-6, le=2 * math.pi)
 SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
 SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)
 DISTRIBUTION = Choice("normal", "uniform", "bound")
-DISTRIBUTIONS = "normal: the values are one sigma; uniform, bound: they are not exceeded."
+DISTRIBUTION_TEXT = "normal: the values are one sigma; uniform, bound: they are not exceeded."
 Source = Annotated[str | None, Key(Text(), "Source of the values; shown as evidence.")]

@@ -28,10 +28,10 @@ from bisar_budget.mission.readers import INVALID, MISSING
 from bisar_budget.units import unit_behind
 
 MAX_BYTES = 1 << 20  # of a file; a mission file has a few kilobytes
-MAX_DEPTH = 20  # containers inside each other; the schema needs 9
-TOO_DEEP = f"is nested more than {MAX_DEPTH} deep"
-MAX_VALUES = 100_000  # of a file; the longest lists that the schema accepts have a third of it
-MAX_FAULTS = 200  # of a file; nobody mends more at once, and each fault costs a line of every report
+MAX_NESTING_LEVEL = 20  # containers inside each other; the schema needs 9
+TOO_DEEP = f"is nested more than {MAX_NESTING_LEVEL} deep"
+MAX_FILE_VALUE_COUNT = 100_000  # of a file; the longest lists that the schema accepts have a third of it
+MAX_FAULT_COUNT = 200  # of a file; nobody mends more at once, and each fault costs a line of every report
 
 _PARSER = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 _NUMERAL = re.compile(r"[+-]?\.?\d", re.ASCII)  # begins a number
@@ -95,7 +95,7 @@ class Tree:
 
     def fault(self, mark: ParserEvent, path: KeyPath, problem: str, **details: str) -> None:
         """Note a fault at a mark of the file, or at the start of the file without a mark.
-        Raises `UnusableError` when the file has `MAX_FAULTS` faults.
+        Raises `UnusableError` when the file has `MAX_FAULT_COUNT` faults.
         """
         change = self._change_at(path)
         if change is not None:
@@ -106,8 +106,8 @@ class Tree:
         else:
             line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
             self.faults.append(Fault(line=line, column=column, key=_dotted(path), problem=problem, **details))
-        if len(self.faults) >= MAX_FAULTS:
-            self.faults.append(file_fault(f"has {MAX_FAULTS} faults or more; what follows them was not read"))
+        if len(self.faults) >= MAX_FAULT_COUNT:
+            self.faults.append(file_fault(f"has {MAX_FAULT_COUNT} faults or more; what follows them was not read"))
             raise UnusableError
 
     def _change_at(self, path: KeyPath) -> SetValue | None:
@@ -152,10 +152,12 @@ class Tree:
         return value
 
     def node(self, next_event: Callable[[], ParserEvent], event: ParserEvent, path: KeyPath) -> Content:
-        """Read one value; the depth of the recursion is bounded by `MAX_DEPTH`."""
+        """Read one value; the depth of the recursion is bounded by `MAX_NESTING_LEVEL`."""
         self.values[path] = event
-        if len(self.values) > MAX_VALUES:
-            self.faults.append(file_fault(f"has more than {MAX_VALUES} values, so no {self.file_kind} file"))
+        if len(self.values) > MAX_FILE_VALUE_COUNT:
+            self.faults.append(
+                file_fault(f"has more than {MAX_FILE_VALUE_COUNT} values, so no {self.file_kind} file")
+            )
             raise UnusableError
         mark = event.start_mark
         kind = type(event)
@@ -168,7 +170,7 @@ class Tree:
         elif kind is AliasEvent:
             self.fault(mark, path, "is an alias (*)", accepted="write the value out")
             return INVALID
-        elif len(path) >= MAX_DEPTH:
+        elif len(path) >= MAX_NESTING_LEVEL:
             self.fault(mark, (), TOO_DEEP)
             raise UnusableError
         elif kind is yaml.MappingStartEvent:

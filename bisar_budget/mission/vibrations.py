@@ -56,9 +56,9 @@ class _Displacement(Quantity):
 _ACCELERATION_SIZE = Quantity(units.ACCELERATION, ge=0, le=1e6)
 _AMPLITUDE = _Displacement("Write it in g or m/s^2", "; or its acceleration in g, mg, ug, m/s^2")
 _RMS = _Displacement("Noise of acceleration is a spectrum, in g^2/Hz")
-_DISPLACEMENT = either(list, Triple(_AMPLITUDE), _AMPLITUDE)
-_NOISE = either(list, Triple(_RMS), _RMS)
-_ACCELERATION = either(list, Triple(_ACCELERATION_SIZE), _ACCELERATION_SIZE)
+_DISPLACEMENT_BY_AXIS = either(list, Triple(_AMPLITUDE), _AMPLITUDE)
+_NOISE_BY_AXIS = either(list, Triple(_RMS), _RMS)
+_ACCELERATION_BY_AXIS = either(list, Triple(_ACCELERATION_SIZE), _ACCELERATION_SIZE)
 _ALONG = "along the line of sight; a vector: along each axis"
 
 
@@ -76,7 +76,7 @@ class Sinusoid(NamedTuple):
     amplitude: Annotated[
         float | Vector,
         Key(
-            _DISPLACEMENT,
+            _DISPLACEMENT_BY_AXIS,
             "0 to peak, along the line of sight; a vector: along each axis of the frame. In g it is an acceleration.",
         ),
     ]
@@ -101,7 +101,9 @@ class Sinusoid(NamedTuple):
 class AcceleratedSinusoid(NamedTuple):
     """One sinusoidal vibration by its acceleration, which is constant if the frequency changes."""
 
-    amplitude: Annotated[float | Vector, Key(_ACCELERATION, f"Amplitude of the acceleration, 0 to peak, {_ALONG}.")]
+    amplitude: Annotated[
+        float | Vector, Key(_ACCELERATION_BY_AXIS, f"Amplitude of the acceleration, 0 to peak, {_ALONG}.")
+    ]
     frequency: Annotated[float, Key(VIBRATION_FREQUENCY)]
 
     @property
@@ -137,7 +139,7 @@ SINUSOIDS = ListOf(OneOf(_form_of_sinusoid, (_SINUSOID, _ACCELERATED)))
 class Wideband(NamedTuple):
     """Noise-like vibration."""
 
-    rms: Annotated[float | Vector, Key(_NOISE, f"Root mean square, {_ALONG}.")]
+    rms: Annotated[float | Vector, Key(_NOISE_BY_AXIS, f"Root mean square, {_ALONG}.")]
 
 
 class Spectrum(NamedTuple):

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER
+from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2
 from bisar_budget.geometry import Vector
-from bisar_budget.paths.earth import ROTATION_RATE, Floats
+from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S, Floats
 from bisar_budget.paths.instant import Instant, utc
 
 Matrix = tuple[tuple[float, ...], ...]
@@ -183,7 +183,8 @@ class OrbitState(NamedTuple):
         if name == "RTN":
             return momentum / float(position @ position)
         # The velocity turns by gravity across it: |v × a|/v² with a = −μr/r³.
-        return EARTH_GRAVITATIONAL_PARAMETER * momentum / float(np.linalg.norm(position) ** 3 * (velocity @ velocity))
+        turned = EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 * momentum / float(np.linalg.norm(position)) ** 3
+        return turned / float(velocity @ velocity)
 
 
 def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: tuple[Instant, Instant]) -> OrbitState:
@@ -192,7 +193,7 @@ def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: t
     last = min(instant.after(_VELOCITY_STEP_S), span[1])
     position_before, position, position_after = (np.array(position_at(time)) for time in (first, instant, last))
     velocity = (position_after - position_before) / last.since(first)
-    against_stars = velocity + np.cross((0.0, 0.0, ROTATION_RATE), position)
+    against_stars = velocity + np.cross((0.0, 0.0, ROTATION_RATE_RAD_PER_S), position)
     (x, y, z), (u, v, w) = position.tolist(), against_stars.tolist()
     return OrbitState((x, y, z), (u, v, w))
 
@@ -241,7 +242,7 @@ def stated_of_orbit(
         interpolated = at_epochs[0]
     state = state_of(place, instant, span)
     along_stars = block_turned(interpolated, state.axes("RTN").T)
-    return StatedAccuracy(words, as_matrix(with_rate(along_stars, (0.0, 0.0, -ROTATION_RATE))))
+    return StatedAccuracy(words, as_matrix(with_rate(along_stars, (0.0, 0.0, -ROTATION_RATE_RAD_PER_S))))
 
 
 def _covariance_along_orbit(covariance: EpochCovariance, state: OrbitState, instant: Instant) -> Floats:
@@ -255,5 +256,5 @@ def _covariance_along_orbit(covariance: EpochCovariance, state: OrbitState, inst
         turned_axes = [covariance.turn(axis, instant) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
         fixed = block_turned(covariance.values, np.array(turned_axes).T)
     else:
-        fixed = with_rate(covariance.values, (0.0, 0.0, ROTATION_RATE))
+        fixed = with_rate(covariance.values, (0.0, 0.0, ROTATION_RATE_RAD_PER_S))
     return block_turned(fixed, state.axes("RTN"))

@@ -26,7 +26,7 @@ from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.accuracy import EpochCovariance, StatedAccuracy, stated_of_orbit
 from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample, interpolate
-from bisar_budget.paths.instant import DAY, Instant, day_of_year, later, tai, tai_less_utc
+from bisar_budget.paths.instant import DAY_S, Instant, day_of_year, later, tai, tai_less_utc
 from bisar_budget.paths.messages import (
     FIRST_ORBIT_DAY,
     LAST_ORBIT_DAY,
@@ -119,7 +119,7 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
     except ImportError:
         raise PathFileError(f"{elements.where}: needs the package sgp4: {install_command('orbits')}") from None
     satellite = Satrec()
-    epoch = elements.epoch.day - _SGP4_EPOCH_DAY + elements.epoch.seconds / DAY
+    epoch = elements.epoch.day - _SGP4_EPOCH_DAY + elements.epoch.seconds / DAY_S
     # SGP4 does not use the derivatives of the mean motion, nor the catalogue number.
     shape = (elements.eccentricity, elements.perigee, elements.inclination, elements.anomaly)
     satellite.sgp4init(WGS72, "i", 0, epoch, elements.drag, 0.0, 0.0, *shape, elements.mean_motion, elements.node)
@@ -128,7 +128,7 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
 
     def place(instant: Instant) -> Vector:
         elapsed = instant.since(elements.epoch) + tai_less_utc(instant.day) - tai_less_utc(elements.epoch.day)
-        if abs(elapsed) > _MAX_AGE_DAYS * DAY:
+        if abs(elapsed) > _MAX_AGE_DAYS * DAY_S:
             raise PathFileError(
                 f"{elements.where}: the elements of {elements.object} are of {elements.epoch.as_text()}, more than a"
                 " century from the aperture"
@@ -200,12 +200,12 @@ def orbit_of(
     inertial(elements.epoch)  # raises now if SGP4 refuses the elements
 
     def doubt(instant: Instant) -> PathDoubt:
-        days = abs(instant.since(elements.epoch)) / DAY
+        days = abs(instant.since(elements.epoch)) / DAY_S
         words = f"elements {days:.3g} days from their epoch: {_EPOCH_ERROR_KM} km there, {_DAILY_ERROR_KM:g} km a day"
         return PathDoubt(1e3 * (_EPOCH_ERROR_KM + _DAILY_ERROR_KM * days), words)
 
     def doubts(instant: Instant) -> Sequence[str]:
-        days = instant.since(elements.epoch) / DAY
+        days = instant.since(elements.epoch) / DAY_S
         if abs(days) <= _MAX_FRESH_DAYS:
             return ()
         smallest_km, largest_km = (_EPOCH_ERROR_KM + abs(days) * daily_km for daily_km in _DAILY_ERRORS_KM)
@@ -407,7 +407,7 @@ def _epoch(line: str, location: str) -> Instant:
     julian_day = day_of_year(year, int(day))
     if julian_day is None:
         raise PathFileError(f"{location}: {quantity} must be from 1 to {365 + isleap(year)} (got {day}.{fraction})")
-    return Instant(julian_day, float(f"0.{fraction}") * DAY)
+    return Instant(julian_day, float(f"0.{fraction}") * DAY_S)
 
 
 def _drag(line: str, location: str) -> float:

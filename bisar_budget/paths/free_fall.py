@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.arrays import Floats, PerCase
-from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS, LEAST_FALLING_HEIGHT
+from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2, EARTH_RADIUS_M, LEAST_FALLING_HEIGHT_M
 from bisar_budget.geometry import PlatformState, Vectors, cross, norm
-from bisar_budget.paths.earth import ROTATION_RATE, SceneAxes, free_fall
+from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S, SceneAxes, free_fall
 
 FREE_FALL_FRACTION = 0.05  # of gravity, by which the acceleration of a path in free fall may differ from free fall
 _NODE_COUNT = 12  # of the collocation; over half a radian of an orbit its error is 1e-12 of the motion
@@ -92,7 +92,7 @@ class FreeFall:
         )
         distance = np.linalg.norm(offset, axis=-1)[..., None, None]
         outer = offset[..., :, None] * offset[..., None, :]
-        gradient = EARTH_GRAVITATIONAL_PARAMETER / distance**3 * (3 * outer / distance**2 - np.eye(3))
+        gradient = EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**3 * (3 * outer / distance**2 - np.eye(3))
         x, y, z = (np.broadcast_to(component, (cases,)) * share for component in self.rotation)
         zero = np.zeros(cases)
         spin = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
@@ -128,8 +128,8 @@ class FreeFall:
 def of_scene(axes: SceneAxes | None) -> FreeFall:
     """Free fall in the axes of a scene; without a place on the Earth it is above the centre and does not turn."""
     if axes is None:
-        return FreeFall((0.0, 0.0, -EARTH_RADIUS), (0.0, 0.0, 0.0))
-    return FreeFall(axes.place((0.0, 0.0, 0.0)), axes.turned((0.0, 0.0, ROTATION_RATE)))
+        return FreeFall((0.0, 0.0, -EARTH_RADIUS_M), (0.0, 0.0, 0.0))
+    return FreeFall(axes.place((0.0, 0.0, 0.0)), axes.turned((0.0, 0.0, ROTATION_RATE_RAD_PER_S)))
 
 
 def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
@@ -140,12 +140,12 @@ def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
     fall = of_scene(axes)
     offset = tuple(x - c for x, c in zip(path.position, fall.centre, strict=True))
     distance = norm(offset)
-    is_high = distance - EARTH_RADIUS > LEAST_FALLING_HEIGHT
+    is_high = distance - EARTH_RADIUS_M > LEAST_FALLING_HEIGHT_M
     if not np.any(is_high):
         return None
     falling = free_fall(path.position, path.velocity, axes)
     apart = norm(tuple(a - b for a, b in zip(path.acceleration, falling, strict=True)))
-    falls = is_high & (apart <= FREE_FALL_FRACTION * EARTH_GRAVITATIONAL_PARAMETER / distance**2)
+    falls = is_high & (apart <= FREE_FALL_FRACTION * EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**2)
     if not np.any(falls):
         return None
     return fall if np.all(falls) else FreeFall(fall.centre, fall.rotation, np.asarray(falls, dtype=float))

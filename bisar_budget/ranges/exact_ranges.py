@@ -36,9 +36,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.geometry import GroundVector, PlatformState, Vectors, dot, norm
-from bisar_budget.image_plane import FEWEST_NODES, LEADING, GroundMatrix, Sampling, band_variance, nodes
+from bisar_budget.image_plane import FEWEST_PATH_NODES, LEGENDRE_LEADING, GroundMatrix, Sampling, band_variance, nodes
 
 if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
@@ -54,7 +54,7 @@ MAX_TURN_RAD = 1.0  # turn of a line of sight within the aperture up to which Le
 # A quadratic phase φ at the aperture edge leaves the phase with a variance of 4φ²/45.
 QUADRATIC_OF_VARIANCE = math.sqrt(45 / 4)
 
-STILL = [np.zeros((1, 1))] * 3  # shifts of a platform that no error moves
+NO_SHIFTS = [np.zeros((1, 1))] * 3  # shifts of a platform that no error moves
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class PointSettings:
     samples_at_once: int = 1 << 16
 
 
-SETTINGS = PointSettings()
+POINT_SETTINGS = PointSettings()
 
 # Number of arrays of both platforms that hold measured paths, and the number together with the arrays of a step.
 _MEASURED_ARRAY_COUNT, _ARRAY_COUNT = 5, 9
@@ -438,13 +438,13 @@ class ExactRanges:
     @cached_property
     def near_fold(self) -> Floats:
         """Determinant of H below which a point is near a fold, (n,)."""
-        return np.asarray(SETTINGS.near_fold_fraction**2 * self.matrix.determinant)
+        return np.asarray(POINT_SETTINGS.near_fold_fraction**2 * self.matrix.determinant)
 
     @cached_property
     def is_turned(self) -> Truths:
         """Whether a line of sight turns by more than `MAX_TURN_RAD` between two times of the aperture, (n,)."""
         least = np.full(self.half.shape, math.inf)
-        if self.fit.shape[1] > FEWEST_NODES:  # with fewer nodes no line of sight turns that far
+        if self.fit.shape[1] > FEWEST_PATH_NODES:  # with fewer nodes no line of sight turns that far
             for track, ranges in zip(self.tracks, self.ranges, strict=True):
                 looks = np.stack(np.broadcast_arrays(*(component / ranges for component in track)))
                 looks = np.concatenate((looks, self.sampling.to_ends @ looks), axis=1)
@@ -498,7 +498,7 @@ class ExactRanges:
         seconds = np.zeros_like(self.times)
         for term in reversed(terms):
             seconds = seconds * self.times + term
-        return SPEED_OF_LIGHT * seconds
+        return SPEED_OF_LIGHT_MPS * seconds
 
     def along(self, platform: int, direction: Vectors) -> Floats:
         """Change of a platform's range at the nodes per metre along a direction: −u·d, or −(u − b)·d if heard."""
@@ -530,7 +530,7 @@ class ExactRanges:
         for error_index, ways in errors.turning.items():
             phase[error_index] = np.einsum("np,wnp,wnp->p", weights, ways, along)
             seen[error_index] = np.einsum("np,wnp->p", np.abs(weights), np.abs(ways))
-        return np.where(np.abs(phase) > ROUNDING * seen, phase, 0.0)
+        return np.where(np.abs(phase) > VECTOR_ROUNDING_FRACTION * seen, phase, 0.0)
 
     @cached_property
     def place_weights(self) -> tuple[Floats, Floats]:
@@ -608,7 +608,7 @@ class ExactRanges:
     @cached_property
     def _legendre(self) -> Floats:
         """Orders 0 to 3 at the nodes, each with its leading term equal to 1 at the edge, (nodes, 4)."""
-        return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEADING)
+        return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEGENDRE_LEADING)
 
     # ------------------------------------------------------------------ errors of any size
     def phases(self, lanes: Lanes, size: Floats, near: tuple[Any, Any], *, is_at_fold: bool = False) -> ImagePoints:
@@ -674,7 +674,7 @@ class ExactRanges:
         [m], `near` the start of the search [m], and `case` the cases of the lanes.
         """
         lanes = clock.shape[1]
-        size = max(1, min(lanes, SETTINGS.samples_at_once // self.fit.shape[1]))
+        size = max(1, min(lanes, POINT_SETTINGS.samples_at_once // self.fit.shape[1]))
         points = ImagePoints(np.zeros(lanes, dtype=bool), *np.full((7, lanes), math.nan))
         start = np.empty((2, lanes))
         start[0], start[1] = near
@@ -745,7 +745,7 @@ class _PointSearch:
     def run(self) -> None:
         """Search with the slopes of each point."""
         before = np.full(self.lane.size, math.inf)
-        for _ in range(SETTINGS.max_newton_iterations):
+        for _ in range(POINT_SETTINGS.max_newton_iterations):
             view = self._view()
             step = view.step(view.slope)
             self.point = self.point + step
@@ -753,7 +753,7 @@ class _PointSearch:
             is_apart = view.nearest >= self.least_range
             is_done = is_apart & (square < self._last_step(view) * view.nearest)
             self._keep(np.flatnonzero(is_done), view, step)
-            going = np.flatnonzero(~is_done & (square < SETTINGS.shrinking_ratio * before) & is_apart)
+            going = np.flatnonzero(~is_done & (square < POINT_SETTINGS.shrinking_ratio * before) & is_apart)
             if not going.size:
                 return
             before = square
@@ -765,21 +765,21 @@ class _PointSearch:
         """Search by damped steps that only go down V. It is slower, and safe where V hardly bends, as near a fold."""
         exact, count = self.exact, self.lane.size
         (trace,) = _take_cases([exact.matrix.xx + exact.matrix.yy], self.of)
-        damping, is_going = SETTINGS.damping_fraction * trace, np.ones(count, dtype=bool)
+        damping, is_going = POINT_SETTINGS.damping_fraction * trace, np.ones(count, dtype=bool)
         least, best_point, slope, bends = np.full(count, math.inf), self.point, *np.zeros((2, 3, count))
         slope = slope[:2]
-        for _ in range(SETTINGS.max_descent_steps):
+        for _ in range(POINT_SETTINGS.max_descent_steps):
             view = self._view()
             falls = view.variance <= least
             least = np.minimum(least, view.variance)
-            damping = damping * np.where(falls, 1 / SETTINGS.damping_ratio, SETTINGS.damping_ratio)
+            damping = damping * np.where(falls, 1 / POINT_SETTINGS.damping_ratio, POINT_SETTINGS.damping_ratio)
             best_point = np.where(falls, self.point, best_point)
             xx, xy, yy = bends = np.where(falls, view.bends, bends)
             slope = np.where(falls, view.slope, slope)
             flattest = (xx + yy) / 2 - np.hypot((xx - yy) / 2, xy)
             more = np.maximum(damping, -2 * flattest)
             step = _solved((xx + more, xy, yy + more), slope)
-            last_step = SETTINGS.last_step_near_fold_fraction * SETTINGS.last_step_rad / self.k
+            last_step = POINT_SETTINGS.last_step_near_fold_fraction * POINT_SETTINGS.last_step_rad / self.k
             is_done = falls & (np.einsum("ac,ac->c", step, step) < last_step * view.nearest)
             is_done &= view.nearest >= self.least_range
             self._keep(np.flatnonzero(is_going & is_done), view, step)
@@ -806,7 +806,7 @@ class _PointSearch:
         hidden, beyond_cubic = _unresolved(orders, exact.mean_squares(remaining, orders), k, band, is_turned)
         phases = np.array((k * orders[2], k * orders[3], hidden, beyond_cubic))
         phases = np.where(np.abs(phases) > rounding, phases, 0.0)
-        is_ahead = turn > -SETTINGS.folded_fraction
+        is_ahead = turn > -POINT_SETTINGS.folded_fraction
         lanes = lanes[is_ahead]
         points.is_settled[lanes] = True
         for kept, values in zip(points[1:], (*self.last_point[:, self.is_settled], *phases, turn), strict=True):
@@ -825,13 +825,16 @@ class _PointSearch:
     def _last_step(self, view: "_GroundView") -> Floats:
         """Square of a step after which a lane has settled, over the distance to the nearer platform. [m]"""
         is_near_fold = view.determinant < self.near_fold
-        smaller, usual = SETTINGS.last_step_near_fold_fraction * SETTINGS.last_step_rad, SETTINGS.last_step_rad
+        smaller, usual = (
+            POINT_SETTINGS.last_step_near_fold_fraction * POINT_SETTINGS.last_step_rad,
+            POINT_SETTINGS.last_step_rad,
+        )
         return np.asarray(np.where(is_near_fold, smaller, usual) / self.k)
 
     def _set_cases(self) -> None:
         """Numbers of the cases of the lanes."""
         exact = self.exact
-        of_cases = [exact.k, SETTINGS.nearest_fraction * exact.nearest, exact.near_fold, exact.product_weights]
+        of_cases = [exact.k, POINT_SETTINGS.nearest_fraction * exact.nearest, exact.near_fold, exact.product_weights]
         self.k, self.least_range, self.near_fold, self.weights = _take_cases(of_cases, self.of)
 
     def _go_on(self, going: Indices) -> None:
@@ -904,7 +907,7 @@ class _GroundView:
     def step(self, slope: Floats) -> Floats:
         """Step that removes half a slope of V, by its second derivative; where V is no bowl, by H alone. [m]"""
         xx, xy, yy = self.bends
-        is_bowl = (xx * yy - xy * xy > SETTINGS.bowl_fraction * self.determinant) & (xx > 0)
+        is_bowl = (xx * yy - xy * xy > POINT_SETTINGS.bowl_fraction * self.determinant) & (xx > 0)
         if not is_bowl.all():
             (h_xx, h_xy), (_, h_yy) = self.matrix
             xx, xy, yy = np.where(is_bowl, self.bends, (h_xx, h_xy, h_yy))
@@ -929,7 +932,7 @@ def _unresolved(
 
 
 def _unless_rounding(value: Floats, seen: Floats) -> Floats:
-    return np.where(np.abs(value) <= ROUNDING * seen, 0.0, value)
+    return np.where(np.abs(value) <= VECTOR_ROUNDING_FRACTION * seen, 0.0, value)
 
 
 def _grown(measured: Floats, point: Floats, room: Floats) -> tuple[Floats, Floats, Floats]:
@@ -972,7 +975,7 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Ind
         of `point_paths`, no point has it if half a cycle is hidden and the gradients of V span little.
     """
     points = _within_ends(exact.settled(clock, shifts, (0.0, 0.0), case))
-    for steps in SETTINGS.course_steps:
+    for steps in POINT_SETTINGS.course_steps:
         missed = np.flatnonzero(~points.is_settled)
         if not missed.size:
             break
@@ -985,7 +988,7 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Ind
             near = np.array((there.east, there.north)) * ((step + 2) / (step + 1))  # NaN from the first lost point on
         for column, later in zip(points, there, strict=True):
             column[missed] = later
-    has_ended = (np.abs(points.turn) < SETTINGS.folded_fraction) & (points.hidden > SETTINGS.end_rad)
+    has_ended = (np.abs(points.turn) < POINT_SETTINGS.folded_fraction) & (points.hidden > POINT_SETTINGS.end_rad)
     points.is_settled[has_ended] = False
     for values in points[1:]:
         values[has_ended] = math.nan
@@ -994,7 +997,7 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Ind
 
 def _within_ends(points: ImagePoints) -> ImagePoints:
     """The points, without points beyond the end of the image."""
-    is_gone = (np.abs(points.turn) < SETTINGS.folded_fraction) & (points.hidden > SETTINGS.end_rad)
+    is_gone = (np.abs(points.turn) < POINT_SETTINGS.folded_fraction) & (points.hidden > POINT_SETTINGS.end_rad)
     return ImagePoints(points.is_settled & ~is_gone, *(np.where(is_gone, math.nan, column) for column in points[1:]))
 
 

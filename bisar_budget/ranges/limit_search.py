@@ -70,13 +70,13 @@ class SearchSettings:
     max_rounds: int = 100
 
 
-SETTINGS = SearchSettings()
+SEARCH_SETTINGS = SearchSettings()
 
 # Sizes that a few searches try in addition: fractions of the first size, factors around the size where a limit is
 # expected, and factors of a size while the search looks for the limit.
 FIRST_SIZE_FRACTIONS = np.array((0.25, 0.5, 0.75, 1.3, 2.0))
 NEIGHBOUR_FACTORS = np.array((0.98, 0.996, 1.004, 1.02))
-GROWTH_FACTORS = SETTINGS.growth_factor ** np.arange(1, 5)
+GROWTH_FACTORS = SEARCH_SETTINGS.growth_factor ** np.arange(1, 5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +146,7 @@ def find_first_sizes(paths: PointPaths, searches: LimitSearches, smallest: Float
         The smallest sizes known so far; the sizes that are found replace larger ones. [unit]
     """
     tries = np.zeros(searches.lane.shape, dtype=int)
-    for _ in range(SETTINGS.max_rounds):
+    for _ in range(SEARCH_SETTINGS.max_rounds):
         of_group = smallest[:, searches.group]
         bound = np.where(searches.is_alone, np.choose(searches.requirement, of_group), of_group.min(axis=0))
         state = _SearchState(paths, searches, np.minimum(searches.largest, bound), tries)
@@ -219,9 +219,9 @@ class _SearchState:
         rise, slope_low, slope_high = stop - start, self.slope[:, :-1] * width, self.slope[:, 1:] * width
         expected_rise = slope_low.copy()
         expected_rise[:, 0] = (width[:, 0] / self.searches.first) ** 2  # the rise of a small error
-        is_wide = width > SETTINGS.trusted_interval_fraction * self.size[:, 1:]
-        threshold = np.where(is_wide, (1 - SETTINGS.crest_fraction) ** 2, 1.0)
-        departs = np.abs(rise - expected_rise) > SETTINGS.departure_fraction
+        is_wide = width > SEARCH_SETTINGS.trusted_interval_fraction * self.size[:, 1:]
+        threshold = np.where(is_wide, (1 - SEARCH_SETTINGS.crest_fraction) ** 2, 1.0)
+        departs = np.abs(rise - expected_rise) > SEARCH_SETTINGS.departure_fraction
         size = np.where(is_wide & departs, low + width / 2, math.nan)
         for position in reversed(_crests(slope_low, rise, slope_high)):
             height = _on_cubic(position, start, rise, slope_low, slope_high)
@@ -240,7 +240,7 @@ class _SearchState:
         position = chord = (1 - start) / (stop - start)
         square_term = 2 * (3 * (stop - start) - 2 * slope_low - slope_high)
         cube_term = 3 * (slope_low + slope_high - 2 * (stop - start))
-        for _ in range(SETTINGS.newton_steps):
+        for _ in range(SEARCH_SETTINGS.newton_steps):
             steepness = slope_low + position * (square_term + cube_term * position)
             height = _on_cubic(position, start, stop - start, slope_low, slope_high)
             position = position - (height - 1) / steepness
@@ -250,15 +250,15 @@ class _SearchState:
         rise = np.sqrt(stop) - np.sqrt(start)  # of the value itself, whose slope a straight line keeps
         value_slope_low = np.where(start > 0, slope_low / (2 * np.sqrt(start)), rise)
         bend = np.abs(value_slope_low - slope_high / (2 * np.sqrt(stop)))
-        is_bent = bend > SETTINGS.bent_fraction * np.abs(rise)
-        trusted = np.where(is_bent, SETTINGS.trusted_bent_fraction, SETTINGS.trusted_fraction)
+        is_bent = bend > SEARCH_SETTINGS.bent_fraction * np.abs(rise)
+        trusted = np.where(is_bent, SEARCH_SETTINGS.trusted_bent_fraction, SEARCH_SETTINGS.trusted_fraction)
         is_close = (stop - 1 < 2 * trusted) & (self.high - size < 2 * trusted * self.high)
         is_close |= (1 - start < 2 * trusted) & (size - (self.high - width) < 2 * trusted * self.high)
         # Every fourth try halves the interval, so that no search is slow.
         position = np.where(self.tries % 4 == 3, 0.5, np.minimum(np.maximum(position, 0.01), 0.99))
         self.inside = self.high - (1 - position) * width
         by_power = self._by_power(every, low, high)
-        is_steep = (stop > SETTINGS.steep_ratio) & (by_power > self.size[every, low]) & (by_power < self.high)
+        is_steep = (stop > SEARCH_SETTINGS.steep_ratio) & (by_power > self.size[every, low]) & (by_power < self.high)
         self.inside = np.where(is_steep, by_power, self.inside)
         return np.where(is_narrow, self.high - width, size), is_close | is_narrow
 
@@ -286,14 +286,14 @@ class _SearchState:
         ahead = np.where(is_rising, self.low + 2 * missing / steepness, math.inf)
         value, value_before = np.sqrt(self.square[every, last]), np.sqrt(self.square[every, before])
         rise, expected_rise = value - value_before, slope / (2 * value) * self.width[every, before]
-        is_bent = np.abs(expected_rise - rise) > SETTINGS.bent_fraction / 2 * np.abs(rise)
-        trusted = np.where(is_bent, SETTINGS.trusted_bent_fraction, SETTINGS.trusted_fraction)
+        is_bent = np.abs(expected_rise - rise) > SEARCH_SETTINGS.bent_fraction / 2 * np.abs(rise)
+        trusted = np.where(is_bent, SEARCH_SETTINGS.trusted_bent_fraction, SEARCH_SETTINGS.trusted_fraction)
         is_close = (missing < 2 * trusted) & (ahead < (1 + 1.5 * trusted) * self.low) & (self.area > 0.5)
         return ahead, is_close
 
     def next_sizes(self, going: Indices, *, is_several: bool) -> tuple[Indices, Floats]:
         """Searches that go on and the sizes that they try next: one per lane, or several."""
-        growth = SETTINGS.growth_factor
+        growth = SEARCH_SETTINGS.growth_factor
         low, bound, is_between = self.low[going], self.bound[going], self.is_between[going]
         grown = np.minimum(np.maximum(self.ahead[going], 1.01 * low), growth * low)
         is_first = low < self.searches.first[going]

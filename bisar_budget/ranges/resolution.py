@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.image_plane import Band, nodes
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
@@ -51,9 +51,9 @@ def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aper
         ahead, across = np.array((np.cos(azimuth), np.sin(azimuth))), np.array((-np.sin(azimuth), np.cos(azimuth)))
         x, y = matrix.xy * across[0] + matrix.yy * across[1], -matrix.xx * across[0] - matrix.xy * across[1]
         conjugate = np.array((x, y)) / (x * ahead[0] + y * ahead[1])
-        wavelength = SPEED_OF_LIGHT / radar.center_frequency
+        wavelength = SPEED_OF_LIGHT_MPS / radar.center_frequency
         nulls = (
-            geometry.range_resolution(radar.bandwidth, SPEED_OF_LIGHT) * np.ones(cases),
+            geometry.range_resolution(radar.bandwidth, SPEED_OF_LIGHT_MPS) * np.ones(cases),
             geometry.cross_range_resolution(wavelength, aperture_time_s) * np.ones(cases),
         )
     widths = np.array((*nulls, *(_HALF_POWER_OF_NULL_RATIO * null for null in nulls)))
@@ -76,7 +76,7 @@ def cells_of_support(sight: Floats, axes: Floats, radar: Band) -> Floats:
     """
     band = radar.center_frequency + np.array((-0.5, 0.5)) * radar.bandwidth
     extent: Floats = np.ptp(np.multiply.outer(band, sight @ axes), axis=(0, 1))
-    return SPEED_OF_LIGHT / extent
+    return SPEED_OF_LIGHT_MPS / extent
 
 
 def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, across: Floats) -> Any:

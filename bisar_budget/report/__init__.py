@@ -32,7 +32,7 @@ class Format(NamedTuple):
     has_pictures: bool = False
 
 
-_FORMATS = (
+_FORMAT_ENTRIES = (
     Format("text", "formats.text_table", (".txt",), is_piecewise=True),
     Format("json", "formats.json_document", (".json",), is_piecewise=True),
     Format("csv", "formats.csv_table", (".csv",), is_piecewise=True),
@@ -48,7 +48,7 @@ _FORMATS = (
         is_illustrated=True, has_pictures=True,
     ),
 )  # fmt: skip
-FORMATS = {entry.name: entry for entry in _FORMATS}
+FORMATS = {entry.name: entry for entry in _FORMAT_ENTRIES}
 
 
 def format_of(name: str) -> str | None:
@@ -58,7 +58,7 @@ def format_of(name: str) -> str | None:
     if ending.count(".") == 1:
         return None
     matches = [
-        (len(suffix), entry.name) for entry in _FORMATS for suffix in entry.suffixes if ending.endswith(suffix)
+        (len(suffix), entry.name) for entry in _FORMAT_ENTRIES for suffix in entry.suffixes if ending.endswith(suffix)
     ]
     return max(matches)[1] if matches else None
 

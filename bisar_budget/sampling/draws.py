@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.faults import printable
 from bisar_budget.geometry import PlatformState
 from bisar_budget.memory import is_spacious
-from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Floats, ImagePoints, followed
+from bisar_budget.ranges.exact_ranges import NO_SHIFTS, ExactRanges, Floats, ImagePoints, followed
 
 if TYPE_CHECKING:
     from bisar_budget.workers import MapBlocks
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 BLOCK_DRAWS = 1 << 15
 CHUNK_DRAWS = 1 << 22  # draws of one stream; a second or so
 EXACT_PIECE_DRAWS = 1 << 18  # of a chunk, which it divides, where each draw goes through exact ranges: as long
-_SAMPLE = 512  # draws that decide whether exact ranges are needed
-_DIFFERENT = 0.01  # of a limit
+_LINEARITY_DRAWS = 512  # that decide whether exact ranges are needed
+_LINEARITY_TOLERANCE_FRACTION = 0.01  # of a limit
 _AFTER_BYTES = 256
 _MIN_COMPILED_DRAWS = 1 << 30  # normal numbers; then Numba saves more seconds than it takes
 
@@ -266,12 +266,12 @@ class Sums:
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> ImagePoints:
         times = self.exact.times[:, 0]
         powers = times[:, None] ** np.arange(3) / (1, 1, 2)  # of (22)
-        clock_powers = SPEED_OF_LIGHT * times[:, None] ** np.arange(4)
+        clock_powers = SPEED_OF_LIGHT_MPS * times[:, None] ** np.arange(4)
         motion = _sum(self.motion, owners, np.broadcast_to(0.0, (2, 3, 3, self.size)))
         tags = _sum(self.tags, owners, np.broadcast_to(0.0, (2, self.size)))
         clock = _sum(self.clock, owners, np.broadcast_to(0.0, (4, self.size)))
         shifts: list[Floats | Sequence[Floats]] = [
-            powers @ shift.swapaxes(0, 1) if shift.any() else STILL for shift in motion
+            powers @ shift.swapaxes(0, 1) if shift.any() else NO_SHIFTS for shift in motion
         ]
         for platform, path in enumerate(self.paths):
             if path.fall is not None and motion[platform].any():
@@ -320,7 +320,7 @@ class Drawer:
             for index, requirement in enumerate(drawing.judged):
                 square = sums.exact_square(requirement) if drawing.is_exact else sums.square(requirement)
                 # What has no image holds nothing: it is not a number.
-                holds_in_draw = square <= (requirement.limit * (1 + UTILIZATION_TOLERANCE)) ** 2
+                holds_in_draw = square <= (requirement.limit * (1 + UTILIZATION_TOLERANCE_FRACTION)) ** 2
                 holds[index] += int(np.count_nonzero(holds_in_draw))
                 if drawing.is_exact:
                     square = square[np.isfinite(square)]
@@ -357,14 +357,14 @@ def _needs_exact_ranges(drawing: Drawing) -> bool:
 
     The linear model has no hidden phase: where band and turn hide more than that part, draws need exact ranges.
     """
-    sums = Sums(drawing, _SAMPLE, adds=True, keeps_motion=True)
-    drawn = np.empty(_SAMPLE)
+    sums = Sums(drawing, _LINEARITY_DRAWS, adds=True, keeps_motion=True)
+    drawn = np.empty(_LINEARITY_DRAWS)
     for variable in drawing.variables:
         _Stream(variable, drawing.seed).fill(drawn)
         sums.add(variable, drawn)
     for requirement in drawing.judged:
         linear, exact = np.sqrt(sums.square(requirement)), np.sqrt(sums.exact_square(requirement))
-        if not np.all(np.abs(exact - linear) <= _DIFFERENT * requirement.limit):
+        if not np.all(np.abs(exact - linear) <= _LINEARITY_TOLERANCE_FRACTION * requirement.limit):
             return True
     return False
 
@@ -434,7 +434,7 @@ class _Stream:
 
 
 # ---------------------------------------------------------------------- eigenvectors
-_SWEEPS = 30  # of a Jacobi method: convergence is quadratic, a 6 x 6 takes about five
+_JACOBI_ROUNDS = 30  # of a Jacobi method: convergence is quadratic, a 6 x 6 takes about five
 
 
 def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[list[float]]]:
@@ -447,7 +447,7 @@ def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[li
     v = [[float(i == j) for j in range(n)] for i in range(n)]
     # Below this an element moves no eigenvalue by more than rounding does.
     negligible = 1e-17 * max((abs(x) for row in a for x in row), default=0.0)
-    for _ in range(_SWEEPS):
+    for _ in range(_JACOBI_ROUNDS):
         is_done = True
         for p in range(n - 1):
             for q in range(p + 1, n):

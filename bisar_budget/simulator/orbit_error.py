@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bisar_budget.arrays import Floats
-from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER
+from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2
 from bisar_budget.geometry import PlatformState
 
 _STEP_COUNT = 64  # of the method of Runge and Kutta, on each side of mid-aperture
@@ -56,7 +56,9 @@ def orbit_error(
     def rates(time: float, states: Floats) -> Floats:
         """Velocity and acceleration of both orbits against the stars, in the axes of mid-aperture, (2, 2, 3)."""
         places = states[:, 0]
-        fallen = -EARTH_GRAVITATIONAL_PARAMETER * places / np.linalg.norm(places, axis=1, keepdims=True) ** 3
+        fallen = (
+            -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 * places / np.linalg.norm(places, axis=1, keepdims=True) ** 3
+        )
         fallen[1] += _turned_by(rotation, time) @ push
         return np.stack((states[:, 1], fallen), axis=1)
 

@@ -12,9 +12,9 @@ from typing import NamedTuple, TypedDict, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector, Vectors
-from bisar_budget.image_plane import LEADING, Sampling, band_variance
+from bisar_budget.image_plane import LEGENDRE_LEADING, Sampling, band_variance
 from bisar_budget.mission.model import Radar
 from bisar_budget.ranges.exact_ranges import ExactEffect, ExactRanges, followed
 from bisar_budget.simulator.orbit_error import orbit_error
@@ -23,7 +23,7 @@ _BLOCK_SAMPLES = 1 << 18  # complex numbers held at once
 _MIN_SIGHT_RATIO = 1e-20  # square of the change of the range by a metre of a platform; a smaller square is rounding
 SMOOTH_ORDER = 12  # of the polynomial that is the smooth part of a history
 _FIT_ORDER = 12  # of the fit to samples anywhere over the aperture
-_ROUNDING_FRACTION = 1e-14  # of a frequency: rounding of numpy.linspace
+_FREQUENCY_ROUNDING_FRACTION = 1e-14  # of a frequency: rounding of numpy.linspace
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -208,7 +208,7 @@ class Flight:
             total += np.linalg.norm(path.actual - scatterer_position, axis=1) - np.linalg.norm(
                 path.measured - seen_position, axis=1
             )
-        return total + SPEED_OF_LIGHT * self.seen
+        return total + SPEED_OF_LIGHT_MPS * self.seen
 
     def record(
         self,
@@ -263,7 +263,7 @@ def cell_centres(length: float, count: int) -> Floats:
 
 def is_even(frequency: Floats) -> bool:
     """Whether frequencies are evenly spaced, to rounding. Over kilometres of range, rounding gives no phase."""
-    return frequency.size > 2 and float(np.ptp(np.diff(frequency))) <= _ROUNDING_FRACTION * float(
+    return frequency.size > 2 and float(np.ptp(np.diff(frequency))) <= _FREQUENCY_ROUNDING_FRACTION * float(
         np.abs(frequency).max()
     )
 
@@ -391,7 +391,7 @@ def direct_path_error(paths: tuple[Path, Path]) -> Floats:
     excess_range: Floats = np.linalg.norm(transmitter.measured - receiver.measured, axis=-1) - np.linalg.norm(
         transmitter.actual - receiver.actual, axis=-1
     )
-    return excess_range / SPEED_OF_LIGHT
+    return excess_range / SPEED_OF_LIGHT_MPS
 
 
 def phase_history(
@@ -439,9 +439,9 @@ def phase_history(
     ValueError
         Noise without a generator, or not one amplitude for each scatterer.
     """
-    wavenumber = 2 * math.pi * frequency / SPEED_OF_LIGHT
+    wavenumber = 2 * math.pi * frequency / SPEED_OF_LIGHT_MPS
     reference = np.linalg.norm(transmitter.measured, axis=1) + np.linalg.norm(receiver.measured, axis=1)
-    clock = SPEED_OF_LIGHT * np.broadcast_to(np.asarray(clock_error, dtype=float), slow_time.shape)
+    clock = SPEED_OF_LIGHT_MPS * np.broadcast_to(np.asarray(clock_error, dtype=float), slow_time.shape)
     samples = np.zeros((slow_time.size, frequency.size), dtype=complex)
     scatterers, amplitudes = np.atleast_2d(scatterers), np.atleast_1d(amplitudes)
     if len(scatterers) != len(amplitudes):
@@ -508,7 +508,7 @@ def exact_effect(
         [_columns(path.actual) for path in paths],
         [_columns(path.actual[slow_time.size // 2]) for path in paths],
     )
-    clock = np.broadcast_to(SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float), slow_time.shape)[:, None]
+    clock = np.broadcast_to(SPEED_OF_LIGHT_MPS * np.asarray(clock_error, dtype=float), slow_time.shape)[:, None]
     shifts = [_columns(path.measured - path.actual) for path in paths]
     solution = followed(exact, clock, shifts, np.zeros(1, dtype=int))
     if not solution.is_settled[0]:
@@ -526,4 +526,4 @@ def _columns(positions: Floats) -> Vectors:
 def _sampling(nodes: Floats) -> Sampling:
     """Sampling at any nodes in −1 … 1, by a polynomial fitted through them."""
     legendre = np.polynomial.legendre.legvander(nodes, min(_FIT_ORDER, max(3, nodes.size // 4)))
-    return Sampling(nodes, LEADING[:, None] * np.linalg.pinv(legendre)[:4])
+    return Sampling(nodes, LEGENDRE_LEADING[:, None] * np.linalg.pinv(legendre)[:4])

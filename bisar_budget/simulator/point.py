@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.combined import correlated_errors, likely_error
 from bisar_budget.effects.effect import PLATFORMS, LinePiece, gradients_of, indicated_point
 from bisar_budget.effects.vibration import counted, lines_of, sight_of
@@ -48,7 +48,7 @@ from bisar_budget.workers import Progress, unseen
 _MARGIN_CELLS = 16  # of the patch beyond the smear, on each side
 _SAMPLES_PER_CELL = 3
 _MIN_PULSES, _MAX_PULSES = 256, 1 << 15
-_MIN_FREQUENCIES = 64
+_MIN_FREQUENCY_COUNT = 64
 _TRIAL_PULSES = 64  # pulses of the trial that foresees the time
 _MAX_ECHO_CELLS = 256  # from the peak; paired echoes farther away are named, not shown
 _SCENE_PIXELS = 1 << 18  # of the image in (x, y)
@@ -470,7 +470,7 @@ def _plan(
     # Cycles over the aperture are cells of cross range. The walk of the range error is in cells of c/B.
     reach = float(np.abs(slope).max()) * T / radar.wavelength
     time = cell_centres(T, remaining_range.size)
-    walk = float(np.abs(remaining_range - slope * time).max()) * radar.bandwidth / SPEED_OF_LIGHT
+    walk = float(np.abs(remaining_range - slope * time).max()) * radar.bandwidth / SPEED_OF_LIGHT_MPS
     farthest_cells = np.abs(former.offsets(shown, centre)).max(axis=0)
     echoes = sorted({line.frequency * T for line in _flown_lines(mission)})
     mission_pulses = mission.collection.pulses
@@ -516,7 +516,7 @@ def _plan(
         cells[0] / finer + cells[1] * relative,
         diagonal / scene_former.cells(scene_centre)[0] + diagonal / scene_cell[1] * relative,
     )
-    frequencies = max(_MIN_FREQUENCIES, math.ceil(2 * longest))
+    frequencies = max(_MIN_FREQUENCY_COUNT, math.ceil(2 * longest))
     own_cells = 2 * math.ceil(reach + _MARGIN_CELLS)
     bytes_held = max(former.bytes_held, scene_former.bytes_held)
     return Plan(rotated, in_scene, pulses, frequencies, own_cells, finer, outside, bytes_held)

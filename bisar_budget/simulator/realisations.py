@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.air_delays import CONTENT, DELAY, correlation_time_of, group_delay, legs_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import (
@@ -163,7 +163,7 @@ def group_delays(mission: Mission, error: RandomError, times: Floats, at_zenith:
 
 def electrons_at_1_hz(mission: Mission, times: Floats, group: Floats) -> Course:
     """Convert group delays by free electrons at the centre frequency, (times,) [m], to `Errors.electrons`. [s·Hz²]"""
-    return Course(times, group / SPEED_OF_LIGHT * mission.radar.center_frequency**2)
+    return Course(times, group / SPEED_OF_LIGHT_MPS * mission.radar.center_frequency**2)
 
 
 def has_unset_clocks(mission: Mission) -> bool:
@@ -226,7 +226,7 @@ def drawn_errors(analysis: Analysis) -> Errors:
     )
     seconds = clock_seconds(phase, mission.radar.wavelength)
     if air[DELAY].any():
-        seconds = seconds + np.interp(noise_times, times, air[DELAY]) / SPEED_OF_LIGHT
+        seconds = seconds + np.interp(noise_times, times, air[DELAY]) / SPEED_OF_LIGHT_MPS
     clock = Course(noise_times, seconds) if seconds.any() else None
     electrons = electrons_at_1_hz(mission, times, air[CONTENT]) if air[CONTENT].any() else None
     return Errors(transmitter, receiver, clock_course=clock, electrons=electrons)
@@ -675,4 +675,4 @@ class _Setting:
 
 def clock_seconds(phase: Floats, wavelength_m: float) -> Floats:
     """Clock error with a given phase at the centre frequency. [s]"""
-    return phase * wavelength_m / (2 * math.pi * SPEED_OF_LIGHT)
+    return phase * wavelength_m / (2 * math.pi * SPEED_OF_LIGHT_MPS)

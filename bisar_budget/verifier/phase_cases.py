@@ -11,7 +11,7 @@ from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import ExactEffect
-from bisar_budget.simulator.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS
+from bisar_budget.simulator.collection import CUT_CELLS, MAX_CELLS, OVERSAMPLING_FACTOR, RANGE_CELLS
 from bisar_budget.simulator.impulse_response import highest, impulse_response, line_at, row_of_peak
 from bisar_budget.simulator.phase_history import Errors, NoGroundPointError, PathError, PathSinusoid
 from bisar_budget.simulator.point import sinusoids_of
@@ -21,7 +21,7 @@ from bisar_budget.verifier.study import Responses, Sizes, Study, VerdictFields
 
 TOLERANCE_FRACTION = 0.05  # of the budget, within which a limit is confirmed
 INSIDE_FRACTION, BEYOND_FACTOR = 0.9, 1.1  # of the limit; between these sizes the phase must grow with the error
-FOCUSED_CELLS, FOCUSED_RAD = 2 * CELLS, 12.0  # of a small patch, and the largest phase that is read in it
+FOCUSED_CELLS, FOCUSED_RAD = 2 * CUT_CELLS, 12.0  # of a small patch, and the largest phase that is read in it
 _PEAK_CELLS = 3  # of range around the lines that autofocus reads: the peak is between two lines
 _LOCATION_FRACTION = 1e-6  # of the requirement of the location, to which errors are scaled
 _MAX_SMEAR_CELLS = 64  # with a longer smear, no images are formed on both sides of a limit
@@ -197,7 +197,7 @@ def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool =
         if room * spread.smear > MAX_CELLS:
             reason = reasons.patch_too_large(room * spread.smear, MAX_CELLS)
             return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
-        across = math.ceil(2 * study.shared_lines(spread) / (OVERSAMPLING * spread.finer)) + _PEAK_CELLS
+        across = math.ceil(2 * study.shared_lines(spread) / (OVERSAMPLING_FACTOR * spread.finer)) + _PEAK_CELLS
         focused = study.focused(study.images(errors, min(RANGE_CELLS, across), room))
         residual = abs(_read_focused(study, focused).quadratic)
         hidden = focused.effect.hidden if holds_hidden else 0.0  # autofocus does not correct it

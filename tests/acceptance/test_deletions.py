@@ -234,7 +234,7 @@ def orbit_breaks(covariance_m: float | None, limit_m: float, position: str | Non
         platforms__transmitter={"orbit": {"oem": "a.oem"}, "motion_error": error},
         requirements=requirements,
     )
-    found = check_mission(parse_mission(mission, beside={"a.oem": text.encode()}.__getitem__), TODAY)
+    found = check_mission(parse_mission(mission, read_path={"a.oem": text.encode()}.__getitem__), TODAY)
     return STATUS[found.status].fails
 
 

@@ -11,7 +11,7 @@ import yaml
 from numpy.polynomial import legendre
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
@@ -128,7 +128,7 @@ class TestTheReferenceItself:
                 place = (*responses.place[sign, index], 0.0)
                 if math.isnan(place[0]):  # no ground point
                     continue
-                left = size * SPEED_OF_LIGHT * sum(t * tau**n for n, t in enumerate(error.clock))
+                left = size * SPEED_OF_LIGHT_MPS * sum(t * tau**n for n, t in enumerate(error.clock))
                 slopes = np.zeros((2, len(x)))
                 for state, paths in zip(states, error.paths, strict=True):
                     true = path(state, tau)

@@ -19,7 +19,7 @@ from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError, with_number
 from bisar_budget.mission.stacked import stacked
-from bisar_budget.ranges.exact_ranges import SETTINGS as POINT_SETTINGS
+from bisar_budget.ranges.exact_ranges import POINT_SETTINGS
 from bisar_budget.ranges.limit_search import LIMIT_FRACTION
 from tests.conftest import ROOT, mission_text, seeds
 from tests.families import FAMILIES

@@ -709,7 +709,7 @@ def test_figures_of_a_vibration_vary(key) -> None:
 
 def test_processes_find_the_same(monkeypatch) -> None:
     """Many cases are shared out, and come back in their order."""
-    monkeypatch.setattr("bisar_budget.design.sweep._MANY", 2)  # parts, from which processes are started
+    monkeypatch.setattr("bisar_budget.design.sweep._MIN_SHARED_PART_COUNT", 2)
     mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
     cases = grid(mission, collection__aperture_time=np.linspace(1, 9, 200))
     column = ["receiver.acceleration.x.allowable_full"]
@@ -840,7 +840,7 @@ class TestWords:
             assert alone["utilization"].tolist() == whole["utilization"][some].tolist()
 
     def test_processes_find_the_same(self, monkeypatch) -> None:
-        monkeypatch.setattr("bisar_budget.design.sweep._MANY", 2)
+        monkeypatch.setattr("bisar_budget.design.sweep._MIN_SHARED_PART_COUNT", 2)
         texts = ["platforms.receiver.motion_error.sensor.0=stim300,imx5", "collection.aperture_time=1:3s:75"]
         mission = load_mission(str(MISSIONS / "uav_stim300.yaml"))
         cases = cases_of(tree_of(mission), texts)

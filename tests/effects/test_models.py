@@ -340,7 +340,7 @@ def test_of_few_lanes_and_of_many_the_same_is_found(family: str, monkeypatch: py
         return np.array((allowed.smallest, allowed.quadratic))
 
     of_few = found()
-    monkeypatch.setattr(point_paths, "SETTINGS", replace(point_paths.SETTINGS, few_lanes_count=0))
+    monkeypatch.setattr(point_paths, "PATH_SETTINGS", replace(point_paths.PATH_SETTINGS, few_lanes_count=0))
     assert np.isfinite(of_few).sum() > 30
     assert found() == pytest.approx(of_few, rel=1e-4, nan_ok=True)
 

@@ -264,7 +264,7 @@ def test_any_value_anywhere(key: str, value, place) -> None:
 
 
 def test_recursion_limit_is_far_away() -> None:
-    assert sys.getrecursionlimit() > tree.MAX_DEPTH * 10
+    assert sys.getrecursionlimit() > tree.MAX_NESTING_LEVEL * 10
 
 
 @pytest.mark.parametrize(

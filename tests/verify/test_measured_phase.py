@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.image_plane import nodes
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.ranges.exact_ranges import ExactEffect
@@ -128,7 +128,7 @@ def brute_force_phase(c: PointCollection, errors: Errors, order: int) -> float:
     def left(point, times):
         flown = c.flight(errors, times).paths
         legs = [np.linalg.norm(p.actual, axis=1) - np.linalg.norm(p.measured - [*point, 0.0], axis=1) for p in flown]
-        return sum(legs) + SPEED_OF_LIGHT * c.flight(errors, times).clock
+        return sum(legs) + SPEED_OF_LIGHT_MPS * c.flight(errors, times).clock
 
     place = cell_centres(2.0, 4001)
     times, point = half * place, np.zeros(2)

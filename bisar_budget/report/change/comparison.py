@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 from operator import attrgetter
 from typing import NamedTuple
 
-from bisar_budget.constants import GATING_MODELS, UTILIZATION_TOLERANCE
+from bisar_budget.constants import GATING_MODELS, UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
@@ -124,7 +124,7 @@ _COMPUTED_KINDS = (
     "dispersion",
 )  # kinds of rows with a computed size, so that a zero is a result
 # Rules in the order of their strictness, the strictest last.
-_RULES = {"combine": ("each", "rss", "sum"), "model": GATING_MODELS}
+_RULES_BY_STRICTNESS = {"combine": ("each", "rss", "sum"), "model": GATING_MODELS}
 
 _WIDEST_FIRST = ("normal", "bound", "uniform")
 _NAMED_KINDS = ("other", "random")  # kinds of error that a file may state several times, each with a name
@@ -221,7 +221,7 @@ def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened
         yield from _shares(before, after)
     words = {"combine": (before.combine, after.combine), "model": (before.model, after.model)}
     for key, (old_rule, new_rule) in words.items():
-        if _RULES[key].index(new_rule) < _RULES[key].index(old_rule):
+        if _RULES_BY_STRICTNESS[key].index(new_rule) < _RULES_BY_STRICTNESS[key].index(old_rule):
             yield Loosened(f"allocation.{key}", old_rule, new_rule)
 
 
@@ -377,7 +377,7 @@ class Change(NamedTuple):
         if before == after:
             return 0.0
         remaining = 1 - before
-        return (after - before) / remaining if remaining > UTILIZATION_TOLERANCE else after / before - 1
+        return (after - before) / remaining if remaining > UTILIZATION_TOLERANCE_FRACTION else after / before - 1
 
     @property
     def is_newly_failing(self) -> bool:
@@ -390,7 +390,7 @@ class Change(NamedTuple):
         if self.is_newly_failing:
             return _worse(_status(self.after))
         before, after = self.use
-        if 1 - before <= UTILIZATION_TOLERANCE:
+        if 1 - before <= UTILIZATION_TOLERANCE_FRACTION:
             return f"had used up its limit and uses more: {percent(before)} -> {percent(after)}"
         return f"uses up {percent(self.erosion)} of what was left of its limit"
 
@@ -414,7 +414,7 @@ class Change(NamedTuple):
         """
         is_judged = self.after is not None and STATUS[self.after.status].is_held
         is_judged = is_judged or _status(self.before) == _status(self.after) == "waived"
-        return self.is_newly_failing or (is_judged and self.erosion > tolerated + UTILIZATION_TOLERANCE)
+        return self.is_newly_failing or (is_judged and self.erosion > tolerated + UTILIZATION_TOLERANCE_FRACTION)
 
 
 class RequirementMove(NamedTuple):

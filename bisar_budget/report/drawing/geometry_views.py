@@ -28,7 +28,7 @@ _VELOCITY_PX, _LOOK_PX, _SMEAR_PX = 44.0, 62.0, 40.0  # lengths of arrows
 _END_ON_RATIO = 0.3  # component of a velocity in the plane of the drawing, below which its arrow is drawn end on
 _MIN_PATH_PX = 20.0  # shorter paths are hidden by marker and arrow
 _NOTE_CHARACTERS = 88
-_SCENE: PlanePoint = (0.0, 0.0)
+_SCENE_CENTRE: PlanePoint = (0.0, 0.0)
 _PATH_STEPS, _STEPS_PER_PIECE = 32, 4
 _ENLARGEMENT_HEIGHT_RATIO = 0.75  # largest height of an enlargement over the largest height of the main panel
 # Smallest and largest height of a panel, and its margins around the points: left and right, above, below. [px]
@@ -251,9 +251,9 @@ def _drawing(view: _View, kind: str, side: str, description: str, note: str = ""
 
 def _main_panel(view: _View) -> _Panel:
     """Panel with the platforms and the scene. A scene far larger than the collection is clipped."""
-    points = [_SCENE, *(p.at for p in view.platforms), *(point for p in view.platforms for point in p.path)]
+    points = [_SCENE_CENTRE, *(p.at for p in view.platforms), *(point for p in view.platforms for point in p.path)]
     if view.radius <= 2 * max(math.hypot(*point) for point in points):
-        points += _extent(view, _SCENE, view.radius)
+        points += _extent(view, _SCENE_CENTRE, view.radius)
     return _fitted(view, points, _VIEW_EDGE_PX)
 
 
@@ -268,15 +268,15 @@ def _enlargement(view: _View, main: _Panel) -> _Panel | None:
     separation = math.dist(first.state.position, second.state.position)
     if platforms_at_scene := _platforms_at_scene(view, main):
         reach = max(p.state.slant_range for p in platforms_at_scene)
-        points = [_SCENE, *(place for p in platforms_at_scene for place in (p.at, *p.path))]
-        points += _extent(view, _SCENE, view.radius if view.radius <= 2 * reach else 0.0)
+        points = [_SCENE_CENTRE, *(place for p in platforms_at_scene for place in (p.at, *p.path))]
+        points += _extent(view, _SCENE_CENTRE, view.radius if view.radius <= 2 * reach else 0.0)
     elif _COINCIDENT_PX < separation * main.scale < _ENLARGED_PX and _pixels_apart(main, first, second) < _SPOT_PX:
         reach = separation
         points = [first.at, second.at]
     else:
         return None
     east, north = ((min(values) + max(values)) / 2 for values in zip(*points, strict=True))
-    middle = _SCENE if platforms_at_scene else (east, north)
+    middle = _SCENE_CENTRE if platforms_at_scene else (east, north)
     panel = _fitted(
         view, [*points, *_extent(view, middle, _MIN_SPREAD_RATIO * reach)], top, _ENLARGEMENT_HEIGHT_RATIO
     )
@@ -363,7 +363,7 @@ def _outline(canvas: svg.Canvas, panel: _Panel) -> None:
 
 def _draw_panel(canvas: svg.Canvas, panel: _Panel, view: _View, is_detail: bool, enlarged: _Panel | None) -> None:
     """Draw lines, then markers, then labels, which are placed in the remaining space."""
-    frame, scene = panel.frame, panel.pixel(_SCENE)
+    frame, scene = panel.frame, panel.pixel(_SCENE_CENTRE)
     if view.is_plan:
         if view.radius * panel.scale >= 3:
             radius = view.radius * panel.scale
@@ -403,7 +403,7 @@ def _labels(
     panel: _Panel, view: _View, visible: Sequence[_Platform], has_scene: bool, enlarged: _Panel | None
 ) -> Iterator[svg.DrawnLabel]:
     """Labels of platforms and scene. Objects on one spot share a label."""
-    frame, scene = panel.frame, panel.pixel(_SCENE)
+    frame, scene = panel.frame, panel.pixel(_SCENE_CENTRE)
     # From the side, labels of platforms are above the ground.
     above = frame if view.is_plan else frame._replace(bottom=min(frame.bottom, scene[1]))
     at_scene = [p for p in visible if has_scene and math.dist(panel.pixel(p.at), scene) < _SPOT_PX]
@@ -442,7 +442,7 @@ def _range(view: _View, platform: _Platform) -> str:
 
 def _directions(canvas: svg.Canvas, panel: _Panel, view: _View) -> Iterator[svg.DrawnLabel]:
     """Draw φ_b of (11), and perpendicular to it the line along which errors smear, (31)."""
-    scene, look = panel.pixel(_SCENE), view.findings.geometry.look_azimuth
+    scene, look = panel.pixel(_SCENE_CENTRE), view.findings.geometry.look_azimuth
     tip = _turned(scene, _LOOK_PX, look)
     ends = [_turned(scene, sign * _SMEAR_PX, look + math.pi / 2) for sign in (-1, 1)]
     canvas.arrow(scene, tip)
@@ -457,7 +457,7 @@ def _turned(origin: svg.Point, length: float, azimuth: float) -> svg.Point:
 
 def _arc(canvas: svg.Canvas, panel: _Panel, platform: _Platform, radius: float) -> None:
     """Draw the elevation angle at the scene as an arc."""
-    scene = panel.pixel(_SCENE)
+    scene = panel.pixel(_SCENE_CENTRE)
     end = math.atan2(platform.at[1], platform.at[0])
     start = 0.0 if end <= math.pi / 2 else math.pi
     steps = [start + (end - start) * index / 16 for index in range(17)]

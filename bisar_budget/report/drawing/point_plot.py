@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-FLOOR_DB = -35.0
+PICTURE_FLOOR_DB = -35.0
 _FINE_FACTOR, _CUT_FACTOR = 4, 8  # largest interpolation of a picture, and that of a cut, to resolve a mainlobe
 _MAX_PICTURE_PIXELS = 3e5
 _DRAWN_DB = -20.0  # level above which pixels are within the pictures
@@ -438,7 +438,7 @@ def _image(panel: "Axes", picture: ImagePanel, *, with_points: bool = False) -> 
         picture.corners[..., 0],
         picture.corners[..., 1],
         picture.level_db,
-        vmin=FLOOR_DB,
+        vmin=PICTURE_FLOOR_DB,
         vmax=0,
         cmap="magma",
         shading="flat",

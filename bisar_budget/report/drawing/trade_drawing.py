@@ -36,7 +36,7 @@ _CURVE_COLOURS = ("transmitter", "receiver", "clock", "pass", "mission", "doubt"
 _CURVE_DASHES = ("", "7 3", "2 3", "9 3 2 3", "5 5", "1 4", "12 4")
 _MAX_WORD_CELLS = 60  # of a map with words in each cell
 _MAX_DOTTED_SAMPLES = 40  # of a curve with a dot for each sample
-_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_REGION_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _HEAD_LINES = ((60, 2), (88, 3))  # characters and lines of the name above a drawing, and of its subtitle
 _CURVE_STEP_RAD = math.radians(3)  # angle of a segment of a curved line
 _VIRIDIS = ("440154", "482878", "3e4989", "31688e", "26828e", "1f9e89", "35b779", "6ece58", "b5de2b", "fde725")
@@ -448,7 +448,7 @@ def _names(
             canvas.upright_text((x + 4, min(max(y, min(lines) + half), max(lines) - half)), row, "")
             continue
         if region.size[0] * cell[0] < 2 * half:
-            row = letters.setdefault(region.row, _LETTERS[len(letters) % len(_LETTERS)])
+            row = letters.setdefault(region.row, _REGION_LETTERS[len(letters) % len(_REGION_LETTERS)])
             half = 8.0
         canvas.text((min(max(x, columns[0] + half), columns[-1] - half), y + 4), [row], "", "middle")
     entries = [

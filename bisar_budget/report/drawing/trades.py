@@ -17,7 +17,7 @@ from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.report.drawing.svg import Point
 from bisar_budget.report.tables import Described
 
-MAX_CASES = 4_000_000  # of a plot, about as many as a screen has pixels
+MAX_PLOT_CASES = 4_000_000  # of a plot, about as many as a screen has pixels
 MAX_ROWS = 7  # rows with a curve each
 _LABELLED_FRACTION = 0.02  # of the area of a map: smaller regions have no name
 _MAX_MAP_CELLS = 500  # along an axis of a map, about as many as a drawing has pixels
@@ -40,8 +40,8 @@ def check_plot(cases: Cases, *, is_polar: bool) -> None:
     varying = varying_keys(cases)
     if not 1 <= len(varying) <= 2:
         raise QuestionError(f"--plot draws one axis or two, and {len(varying)} keys vary; {accepted}")
-    if cases.count > MAX_CASES:
-        raise QuestionError(f"--plot draws up to {MAX_CASES} cases, and there are {cases.count}")
+    if cases.count > MAX_PLOT_CASES:
+        raise QuestionError(f"--plot draws up to {MAX_PLOT_CASES} cases, and there are {cases.count}")
     if not is_polar:
         return
     if len(varying) != 2 or not any(varied.reader is DIRECTION for varied in varying):

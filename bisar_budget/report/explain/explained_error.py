@@ -8,13 +8,13 @@ import numpy as np
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS, ErrorSource, subject
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState
-from bisar_budget.image_plane import LEADING
+from bisar_budget.image_plane import LEGENDRE_LEADING
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.report.explain import notation
@@ -37,7 +37,7 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     elif platform in PLATFORMS:
         error = getattr(mission.platforms, platform).motion_error
         values = error.stated(kind)
-        if error.frame != "scene" and axis in notation.AXES:
+        if error.frame != "scene" and axis in notation.AXIS_LETTERS:
             yield from _rotated_declaration(mission, source, axis)
             return
         if error.covariance is not None and error.covariance.is_matrix and kind != "acceleration":
@@ -59,7 +59,7 @@ def _rotated_declaration(mission: Mission, source: ErrorSource, axis: str) -> It
     covariance = error.covariance if kind != "acceleration" else None
     k = mission.allocation.coverage_factor
     products = [
-        f"{number(k * value)}*{number(direction[notation.AXES.index(axis)])}"
+        f"{number(k * value)}*{number(direction[notation.AXIS_LETTERS.index(axis)])}"
         for value, direction in zip(error.stated(kind), axes, strict=True)
     ]
     if covariance is not None:
@@ -112,7 +112,7 @@ def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterat
         yield step("Published model: a height error moves the image, no quadratic term")
     elif source.clock is not None:
         yield from _clock_effect(analysis.mission, source, signed, each)
-    elif axis in notation.AXES:
+    elif axis in notation.AXIS_LETTERS:
         values = _motion_values(analysis, platform, kind, axis, signed)
         for order, formula in notation.motion_coefficients(kind, axis, platform).items():
             result = signed * _coefficient(analysis.mission, source, order)
@@ -142,7 +142,7 @@ def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
 
 def _motion_values(analysis: Analysis, platform: str, kind: str, axis: str, size: float) -> dict[str, float]:
     state: PlatformState = getattr(analysis.geometry, platform)
-    index, s = notation.AXES.index(axis), platform[0]
+    index, s = notation.AXIS_LETTERS.index(axis), platform[0]
     return {
         "T": analysis.mission.collection.aperture_time,
         "λ": analysis.mission.radar.wavelength,
@@ -165,7 +165,7 @@ _TERM_UNITS = tuple(CLOCK_UNITS.values())
 def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     kind, sync = source.subject.kind, mission.synchronization
     values = {
-        "c": SPEED_OF_LIGHT,
+        "c": SPEED_OF_LIGHT_MPS,
         "T": mission.collection.aperture_time,
         "f_0": mission.radar.center_frequency,
     }
@@ -190,7 +190,7 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
                 )
         yield step(f"{title}{each}", *lines)
     for order, term in terms.items():
-        known_values, result = {**values, f"t̃_{order}": term}, SPEED_OF_LIGHT * term
+        known_values, result = {**values, f"t̃_{order}": term}, SPEED_OF_LIGHT_MPS * term
         formula = notation.clock_coefficient(order)
         yield step(f"Table I row 1{each}", WorkedEquation(f"β̃_{order}", formula, known_values, result, RATES[order]))
         if order == 2:
@@ -200,7 +200,7 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
 
 
 def _table_i(kind: str, axis: str) -> str:
-    return f"Table I row {2 + 3 * notation.AXES.index(axis) + list(MOTION_UNITS).index(kind)}"
+    return f"Table I row {2 + 3 * notation.AXIS_LETTERS.index(axis) + list(MOTION_UNITS).index(kind)}"
 
 
 def _source_of(analysis: Analysis, platform: str, kind: str, axis: str) -> ErrorSource:
@@ -266,7 +266,7 @@ def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[
     _, _, kind, axis, frame, _ = source.subject
     state: PlatformState = getattr(analysis.geometry, platform)
     direction = state.frame(frame)[FRAME_AXES[frame].index(axis)]
-    effects = [_source_of(analysis, platform, kind, letter).effect.qpe for letter in notation.AXES]
+    effects = [_source_of(analysis, platform, kind, letter).effect.qpe for letter in notation.AXIS_LETTERS]
     pairs = list(zip(effects, direction, strict=True))
     return " + ".join(f"{number(q)}*{number(d)}" for q, d in pairs), math.fsum(q * d for q, d in pairs)
 
@@ -352,7 +352,7 @@ def as_written(mission: Mission, path: KeyPath) -> str:
 
 
 RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
-_SLOPE, _QUADRATIC, _CUBIC = 1, 2, 3  # rows of a fit
+_SLOPE_ORDER, _QUADRATIC_ORDER, _CUBIC_ORDER = 1, 2, 3  # rows of a fit
 _SAME_PHASE_FRACTION = 1e-6  # difference between the phases of both signs that may be rounding
 _MIN_SHOWN_BEYOND_RAD = 1e-6  # rms phase beyond the cubic that may be rounding
 
@@ -393,7 +393,9 @@ class Residual:
     @cached_property
     def beyond(self) -> list[float]:
         """Range error at the nodes less orders 0 to 3. [m]"""
-        fitted_orders = np.polynomial.legendre.legvander(self.exact.sampling.places, _CUBIC) @ (self.orders / LEADING)
+        fitted_orders = np.polynomial.legendre.legvander(self.exact.sampling.places, _CUBIC_ORDER) @ (
+            self.orders / LEGENDRE_LEADING
+        )
         return _without_rounding((np.array(self.ranges) - fitted_orders).tolist(), self.rms(self.ranges))
 
     def rms(self, values: Sequence[float]) -> float:
@@ -422,15 +424,15 @@ class Residual:
     @property
     def hidden(self) -> float:
         """Quadratic phase with the same loss of peak as the range errors that band and turn hide. [rad]"""
-        square = float(self.exact.band[0]) * self.rms(self.ranges) ** 2 + self.orders[_SLOPE] ** 2 / 3
+        square = float(self.exact.band[0]) * self.rms(self.ranges) ** 2 + self.orders[_SLOPE_ORDER] ** 2 / 3
         if self.is_turned:
-            square += 4 * self.orders[_CUBIC] ** 2 / 175 + self.rms(self.beyond) ** 2
+            square += 4 * self.orders[_CUBIC_ORDER] ** 2 / 175 + self.rms(self.beyond) ** 2
         return self.k * math.sqrt(45 / 4 * square)
 
     @property
     def judged(self) -> float:
         """Phase that is compared with a limit, which contains the gain of autofocus. [rad]"""
-        return math.hypot(self.phase(_QUADRATIC), self.gain * self.hidden)
+        return math.hypot(self.phase(_QUADRATIC_ORDER), self.gain * self.hidden)
 
     def sum(self, symbol: str, order: int) -> Sum:
         """The sum that gives the phase of an order."""
@@ -446,17 +448,22 @@ class Residual:
         orders: list[WorkedEquation | str] = [
             WorkedEquation("b", "B/(sqrt(12)*f_0)", values, b, ""),
             self._squares("ρ_rms", self.ranges),
-            Sum(f"ρ_1 = {self._terms(_SLOPE)} = {with_unit(self.orders[_SLOPE], 'm')}"),
+            Sum(f"ρ_1 = {self._terms(_SLOPE_ORDER)} = {with_unit(self.orders[_SLOPE_ORDER], 'm')}"),
         ]
         formula, turn_words = "b^2*ρ_rms^2 + ρ_1^2/3", ""
-        values = {"λ": self.radar.wavelength, "b": b, "ρ_rms": self.rms(self.ranges), "ρ_1": self.orders[_SLOPE]}
+        values = {
+            "λ": self.radar.wavelength,
+            "b": b,
+            "ρ_rms": self.rms(self.ranges),
+            "ρ_1": self.orders[_SLOPE_ORDER],
+        }
         if self.is_turned:
             orders += [
-                Sum(f"ρ_3 = {self._terms(_CUBIC)} = {with_unit(self.orders[_CUBIC], 'm')}"),
+                Sum(f"ρ_3 = {self._terms(_CUBIC_ORDER)} = {with_unit(self.orders[_CUBIC_ORDER], 'm')}"),
                 self._squares("ρ_rest", self.beyond),
             ]
             formula += " + 4*ρ_3^2/175 + ρ_rest^2"
-            values |= {"ρ_3": self.orders[_CUBIC], "ρ_rest": self.rms(self.beyond)}
+            values |= {"ρ_3": self.orders[_CUBIC_ORDER], "ρ_rest": self.rms(self.beyond)}
             turn_words = "; a line of sight turns by more than a radian, so that cubic and rest are in it too"
         yield step(
             "Rms of what is left, ρ_1 its slope at the aperture edge (P₁): what the band and the turn leave of them",
@@ -465,8 +472,8 @@ class Residual:
         symbol = f"hidden_{mark}"
         hidden = WorkedEquation(symbol, f"2*π/λ*sqrt(45/4*({formula}))", values, self.hidden, "rad")
         yield step(f"Hidden phase: a quadratic one that costs the peak as much{turn_words}", hidden)
-        values = {f"QPE_{mark}": self.phase(_QUADRATIC), symbol: self.hidden}
-        equal_loss = math.hypot(self.phase(_QUADRATIC), self.hidden)
+        values = {f"QPE_{mark}": self.phase(_QUADRATIC_ORDER), symbol: self.hidden}
+        equal_loss = math.hypot(self.phase(_QUADRATIC_ORDER), self.hidden)
         yield step(
             "Quadratic phase of equal loss" + ("" if self.gain > 1 else ", which is judged"),
             WorkedEquation(f"equal_{mark}", f"sqrt(QPE_{mark}^2 + {symbol}^2)", values, equal_loss, "rad"),
@@ -508,7 +515,7 @@ class Residual:
 
 def _without_rounding(values: Sequence[float], full_size: float) -> list[float]:
     """Values, with 0 for those that are rounding errors of differences of numbers of `full_size`."""
-    return [value if abs(value) > ROUNDING * full_size else 0.0 for value in values]
+    return [value if abs(value) > VECTOR_ROUNDING_FRACTION * full_size else 0.0 for value in values]
 
 
 def _judged(residual: Residual) -> float:
@@ -560,15 +567,17 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
     )
     yield step(
         "Quadratic phase at the aperture edge, 3/2 of P₂: weights of the fit times what is left",
-        residual.sum("QPE_full", _QUADRATIC),
+        residual.sum("QPE_full", _QUADRATIC_ORDER),
     )
     yield from residual.steps()
-    by_quadratic = worse_sign(analysis, source, size, _of_order(_QUADRATIC))
+    by_quadratic = worse_sign(analysis, source, size, _of_order(_QUADRATIC_ORDER))
     if by_quadratic.size != residual.size:
-        yield step("Quadratic phase by the other sign, which is larger", by_quadratic.sum("QPE_full", _QUADRATIC))
+        yield step(
+            "Quadratic phase by the other sign, which is larger", by_quadratic.sum("QPE_full", _QUADRATIC_ORDER)
+        )
     if source.is_motion and analysis.mission.requirements.cubic_phase_error is not None:
-        by_cubic = worse_sign(analysis, source, size, _of_order(_CUBIC))
-        yield step("Cubic phase there, 5/2 of P₃", by_cubic.sum("cubic_full", _CUBIC))
+        by_cubic = worse_sign(analysis, source, size, _of_order(_CUBIC_ORDER))
+        yield step("Cubic phase there, 5/2 of P₃", by_cubic.sum("cubic_full", _CUBIC_ORDER))
     by_rest = worse_sign(analysis, source, size, _beyond_phase)
     if by_rest.beyond_phase > max(_MIN_SHOWN_BEYOND_RAD, float(by_rest.exact.rounding[0])):
         yield from by_rest.rest_steps()
@@ -602,13 +611,13 @@ def _residual_formula(exact: ExactRanges) -> str:
 
 def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """Step with the result of the full model for an error that the published model judges."""
-    residual = worse_sign(analysis, source, size, _of_order(_QUADRATIC))
+    residual = worse_sign(analysis, source, size, _of_order(_QUADRATIC_ORDER))
     if not residual.ranges:
         yield step(f"Full model{each}, for comparison: no ground point has the range history")
         return
     yield step(
         f"Full model{each}, for comparison: weights of the fit times the range error left (--model full lists it)",
-        residual.sum("QPE_full", _QUADRATIC),
+        residual.sum("QPE_full", _QUADRATIC_ORDER),
     )
 
 
@@ -619,7 +628,7 @@ def at_the_allowable(
     sizes = [Residual(analysis, source, signed) for signed in (allowable, -allowable)]
     if not all(residual.ranges for residual in sizes):
         return
-    measure = {LOCATION: _displacement_of, CUBIC: _of_order(_CUBIC), QUADRATIC: _judged}[requirement]
+    measure = {LOCATION: _displacement_of, CUBIC: _of_order(_CUBIC_ORDER), QUADRATIC: _judged}[requirement]
     residual = max(sizes, key=measure)
     size = f"{number(residual.size)} {source.unit.replace('^2', '²')}"
     title = f"At {size}, the smallest size of either sign that reaches the limit, exact ranges give"
@@ -627,9 +636,9 @@ def at_the_allowable(
         x, y = residual.image_point or (0.0, 0.0)
         yield step(title, Sum(f"moved = sqrt({number(x)}^2 + {number(y)}^2) = {with_unit(math.hypot(x, y), 'm')}"))
     elif requirement == CUBIC:
-        yield step(title, residual.sum("cubic_there", _CUBIC))
+        yield step(title, residual.sum("cubic_there", _CUBIC_ORDER))
     else:
-        yield step(title, residual.sum("QPE_there", _QUADRATIC))
+        yield step(title, residual.sum("QPE_there", _QUADRATIC_ORDER))
         yield from residual.steps("there")
 
 
@@ -676,7 +685,7 @@ def _image_point_lines(residual: Residual) -> Sequence[str]:
     return (f"x̂ = {with_unit(east, 'm')} east", f"ŷ = {with_unit(north, 'm')} north")
 
 
-RULES = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-square"}
+RULE_WORDS = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-square"}
 
 
 def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
@@ -716,10 +725,12 @@ def combined(
     unit: str = "rad",
 ) -> Iterator[Step]:
     """Step of the total of errors by a rule: names and sizes of the errors, and their sum. `total` may be None."""
-    title = f"{title}, {RULES[rule]}"
+    title = f"{title}, {RULE_WORDS[rule]}"
     # The remainder of terms that cancel exactly is rounding.
     largest = max((abs(size) for _, size in sizes_by_name), default=0.0)
-    members = [(name, abs(size) if abs(size) > ROUNDING * largest else 0.0) for name, size in sizes_by_name]
+    members = [
+        (name, abs(size) if abs(size) > VECTOR_ROUNDING_FRACTION * largest else 0.0) for name, size in sizes_by_name
+    ]
     width = max((len(name) for name, _ in members), default=0)
     lines = [f"{printable(name):<{width}}  {size:.6g} {unit}" for name, size in members if size] or ["none"]
     if total is None or not members:

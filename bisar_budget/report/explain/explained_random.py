@@ -10,7 +10,7 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import mainlobe_energy, spread_phase
 from bisar_budget.budget.random_rows import held_effect, no_effect
-from bisar_budget.constants import EARTH_RADIUS, SPEED_OF_LIGHT, STANDARD_GRAVITY
+from bisar_budget.constants import EARTH_RADIUS_M, SPEED_OF_LIGHT_MPS, STANDARD_GRAVITY_MPS2
 from bisar_budget.effects.air_delays import (
     CONTENT,
     DELAY,
@@ -62,7 +62,7 @@ from bisar_budget.findings.row import Row
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.instruments import Synchronization
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.propagation import ABOVE_THE_AIR, height_of
+from bisar_budget.mission.propagation import AIR_TOP_M, height_of
 from bisar_budget.mission.vibrations import FeltVibration, Spectrum, Vibration
 from bisar_budget.report.explain.explained_error import limit_steps, smallest_size, stated
 from bisar_budget.report.explain.explained_spreading import allowed_variance, effect_from_elsewhere
@@ -130,7 +130,7 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
     if error.declared is None:
         return
     if error.unit == "s^2/m":
-        yield step(f"Per g is per {STANDARD_GRAVITY:g} m/s²: 1 /g = {1 / STANDARD_GRAVITY:.6g} s²/m")
+        yield step(f"Per g is per {STANDARD_GRAVITY_MPS2:g} m/s²: 1 /g = {1 / STANDARD_GRAVITY_MPS2:.6g} s²/m")
     k = mission.allocation.coverage_factor
     if error.unit != "dB" and error.is_covered:
         worked = WorkedEquation(
@@ -441,7 +441,7 @@ def _integrals(
         geometry, delay = mission.geometry, mission.geometry.echo_delay
         ways = [float(path.slant_range) for path in (*geometry.both, geometry.apart)]
         piece_parts, density = [heard_parts((piece,), T, delay) for piece in pieces], "S_left"
-        values = dict(zip(("R_t", "R_r", "b"), ways, strict=True)) | {"c": SPEED_OF_LIGHT}
+        values = dict(zip(("R_t", "R_r", "b"), ways, strict=True)) | {"c": SPEED_OF_LIGHT_MPS}
         yield step(
             "Heard over the baseline b, and a delay Δt later by the echo: S_left = S·4·sin²(πf·Δt)",
             WorkedEquation("delay", "(R_t + R_r - b)/c", values, delay, "s"),
@@ -487,7 +487,7 @@ def _link(mission: Mission, error: RandomError) -> Iterator[Step]:
 def _spectrum_steps(vibration: Vibration | FeltVibration, spectrum: Spectrum) -> Iterator[Step]:
     """Steps with the points of a spectrum of acceleration or displacement, and with its level."""
     quantity, unit = ("acceleration", "g²/Hz") if spectrum.is_accelerated else ("displacement", "m²/Hz")
-    scale = STANDARD_GRAVITY**2 if spectrum.is_accelerated else 1.0
+    scale = STANDARD_GRAVITY_MPS2**2 if spectrum.is_accelerated else 1.0
     points = [f"{f:.6g} Hz: {density / scale:.6g} {unit}" for f, density in spectrum.points]
     yield step(f"One-sided spectrum of {quantity}, straight over logarithms, nothing beside its points", *points)
     if vibration.spectrum_level:
@@ -552,11 +552,11 @@ def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
     if flies_a_turn(mission, name):
         state: PlatformState = getattr(mission.platforms, name).state
         acceleration = float(np.linalg.norm(state.acceleration))
-        values = {"c": SPEED_OF_LIGHT, "a": acceleration}
+        values = {"c": SPEED_OF_LIGHT_MPS, "a": acceleration}
         yield step(
             "Turn: the range error is c·Γ·(v(τ) − v(0)); the acceleration at mid-aperture is a frequency, which "
             "displaces, and its change bends. Of three axes the root-sum-square is the most that a Γ does",
-            WorkedEquation("drift/unit", "c*a", values, SPEED_OF_LIGHT * acceleration, "m/s per s²/m"),
+            WorkedEquation("drift/unit", "c*a", values, SPEED_OF_LIGHT_MPS * acceleration, "m/s per s²/m"),
         )
     spread_per_unit = error.published.spread * mission.allocation.coverage_factor
     yield step(
@@ -570,15 +570,15 @@ def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterat
     mission, delay = analysis.mission, error.subject.axis
     path: PlatformState = getattr(analysis.geometry, name)
     (x, y, z), height = path.position, float(height_of(path.position))
-    if delay == CONTENT and height < ABOVE_THE_AIR:
+    if delay == CONTENT and height < AIR_TOP_M:
         yield step(f"The {name} flies at {height:.6g} m, below the ionosphere: no electrons on its leg")
         return
     values = {"R": path.slant_range, "z": z}
-    if height < ABOVE_THE_AIR:
+    if height < AIR_TOP_M:
         title, formula = "Within the air, over a flat Earth: 1 over the sine of the elevation", "R/z"
     else:
         shell = TROPOSPHERE_HEIGHT_M if delay == DELAY else min(IONOSPHERE_HEIGHT_M, height)
-        values = {"p": (x * x + y * y) ** 0.5, "R": path.slant_range, "h": shell, "R_E": EARTH_RADIUS}
+        values = {"p": (x * x + y * y) ** 0.5, "R": path.slant_range, "h": shell, "R_E": EARTH_RADIUS_M}
         title = "Above the air, through a spherical shell at height h; p is the distance along the ground's plane"
         formula = "1/sqrt(1 - (p/R)^2/(1 + h/R_E)^2)"
     factor = float(leg_factor(delay, path.position, path.position))

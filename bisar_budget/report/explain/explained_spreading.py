@@ -18,7 +18,7 @@ from bisar_budget.analysis.spread import (
 )
 from bisar_budget.analysis.tone_displacement import TonePart
 from bisar_budget.analysis.vibration_limits import (
-    LARGEST_ECHO,
+    MAX_ECHO_PHASE_RAD,
     Echo,
     VibrationLimits,
     bessel,
@@ -26,7 +26,7 @@ from bisar_budget.analysis.vibration_limits import (
     quadratures,
     tone_limits,
 )
-from bisar_budget.constants import ROUNDING
+from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import subject
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt
@@ -156,9 +156,9 @@ def _with_its_pair(tone: Tone, pair_tone: Tone | None) -> str:
 
 
 def _echo_level(echo: Echo) -> Iterator[Step]:
-    if echo.phase > LARGEST_ECHO:
+    if echo.phase > MAX_ECHO_PHASE_RAD:
         worked = WorkedEquation("l", "φ/2", {"φ": echo.phase}, echo.level, "")
-        yield step(f"Amplitude over that of the response; above {LARGEST_ECHO:g} rad half the phase", worked)
+        yield step(f"Amplitude over that of the response; above {MAX_ECHO_PHASE_RAD:g} rad half the phase", worked)
         return
     j0, j1 = bessel(echo.phase)
     yield step(
@@ -189,7 +189,9 @@ def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) ->
         for name, metre_effects, size in zip(
             ("east", "north"), tone_part.per_metre[..., 0].T, tone_part.displacement[:, 0], strict=True
         ):
-            p = np.where(np.abs(metre_effects) > ROUNDING * np.abs(metre_effects).max(), metre_effects, 0.0).tolist()
+            p = np.where(
+                np.abs(metre_effects) > VECTOR_ROUNDING_FRACTION * np.abs(metre_effects).max(), metre_effects, 0.0
+            ).tolist()
             values = {f"{symbol}{n}": order[n] for symbol, order in (("c_", c), ("p_", p)) for n in range(4)}
             formula = (
                 "sqrt((c_0*p_0 - c_2*p_2)^2 + (c_1*p_1 - c_3*p_3)^2)"

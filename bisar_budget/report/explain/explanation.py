@@ -27,7 +27,7 @@ from bisar_budget.budget.judged_requirements import (
     SMALL_RAD,
     UntakenEffect,
 )
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.air_delays import CONTENT, ELECTRON_DELAY_M3_PER_S2, dispersed_legs, leg_factor
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
@@ -48,7 +48,7 @@ from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explained_error import (
-    RULES,
+    RULE_WORDS,
     as_written,
     at_the_allowable,
     combined,
@@ -521,7 +521,7 @@ def _dispersion(analysis: Analysis, findings: MissionFindings, row: Row) -> Iter
         content = (propagation.content(name) or 0.0) * findings.coverage_factor
         values = {
             "K": ELECTRON_DELAY_M3_PER_S2 * content * float(leg_factor(CONTENT, path.position, path.position)),
-            "c": SPEED_OF_LIGHT,
+            "c": SPEED_OF_LIGHT_MPS,
             "f_0": mission.radar.center_frequency,
             "B": mission.radar.bandwidth,
         }
@@ -553,7 +553,9 @@ def _spatial_variance(analysis: Analysis, findings: MissionFindings, row: Row) -
 
 
 def _location_aggregate(mission: Mission, together: Together, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    rule = "the longest sum over all signs of the vectors" if findings.combine == "sum" else RULES[findings.combine]
+    rule = (
+        "the longest sum over all signs of the vectors" if findings.combine == "sum" else RULE_WORDS[findings.combine]
+    )
     moves = together.displacement_parts()
     title = "(25), (30)" if row.model == "published" else "Full model, each by the sign that moves farther"
     if findings.combine == "sum":
@@ -584,7 +586,7 @@ def _verdict(row: Row, findings: MissionFindings) -> Iterator[str]:
     yield from (f"    {printable(text)}" for text in texts)
 
 
-_EFFECTS = {"cubic": "Cubic phase", "spread": "Rms phase that spreads", "tone": "Peak phase of the tones"}
+_EFFECT_TITLES = {"cubic": "Cubic phase", "spread": "Rms phase that spreads", "tone": "Peak phase of the tones"}
 
 
 def finding_of(mission: Mission, findings: MissionFindings, requirement: JudgedRequirement) -> Iterator[Step]:
@@ -672,7 +674,9 @@ def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[S
             (float(together.combined(sizes_by_name, rule)[0]), rule, together.phase_parts(sizes_by_name, rule))
         )
     total, rule, sizes_by_name = max(totals, key=lambda candidate: candidate[0])
-    yield from combined(f"{_EFFECTS[kind]}: no requirement takes it", rule, sizes_by_name, total, symbol="total")
+    yield from combined(
+        f"{_EFFECT_TITLES[kind]}: no requirement takes it", rule, sizes_by_name, total, symbol="total"
+    )
     required = analysis.mission.requirements.quadratic_phase_error
     values = {"required": required}
     level = min(NEGLIGIBLE_FRACTION * required, SMALL_RAD)

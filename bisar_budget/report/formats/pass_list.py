@@ -9,9 +9,9 @@ from datetime import UTC, date, datetime
 from bisar_budget import __version__
 from bisar_budget.design.passes import Passes, SatellitePass
 from bisar_budget.faults import printable
-from bisar_budget.findings.requirement import NAMES
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.status import STATUS
-from bisar_budget.paths.instant import DAY, Instant
+from bisar_budget.paths.instant import DAY_S, Instant
 from bisar_budget.report import Style
 from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.json_document import document_text, outside_item
@@ -289,7 +289,7 @@ def _notes(passes: Passes) -> Iterator[str]:
 def _decided(overpass: SatellitePass) -> str:
     if overpass.requirement is None:
         return ""
-    name = NAMES.get(overpass.requirement, overpass.requirement.replace("_", " "))
+    name = REQUIREMENT_NAMES.get(overpass.requirement, overpass.requirement.replace("_", " "))
     waived = f", not met but waived ({waiver_names(overpass.waived_by)})" if overpass.waived_by else ""
     return f"{name} decides" + (f", by {printable(overpass.row)}" if overpass.row else "") + waived
 
@@ -340,7 +340,7 @@ def as_ics(passes: Passes, stamp: date) -> str:
     seen: Counter[str] = Counter()
     timestamp = _stamp(datetime(stamp.year, stamp.month, stamp.day, tzinfo=UTC))
     for overpass in passes.found:
-        half_hours = math.floor((overpass.culmination.day * DAY + overpass.culmination.seconds) / _UID_PERIOD_S)
+        half_hours = math.floor((overpass.culmination.day * DAY_S + overpass.culmination.seconds) / _UID_PERIOD_S)
         start, stop = overpass.start, overpass.stop
         uid = digest(passes.name, passes.platform, str(half_hours))[:32]
         seen[uid] += 1

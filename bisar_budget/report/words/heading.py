@@ -16,8 +16,8 @@ from bisar_budget.report import Style
 from bisar_budget.report.words.sentences import TEXT_WIDTH, phase_limit, sentence, wrapped
 from bisar_budget.units import format_quantity
 
-_MODELS = {"published": "published model", "full": "full model", "strictest": "stricter of both models"}
-_RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
+_MODEL_WORDS = {"published": "published model", "full": "full model", "strictest": "stricter of both models"}
+_COMBINATION_WORDS = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
 _MODELS_AT_LENGTH = {
     "published": "published (Rigling & Moses, Tables I and II)",
     "full": "full (exact ranges, displacement included)",
@@ -49,7 +49,7 @@ class AboutMission(Protocol):
 
 def rule_words(mission: MissionFindings) -> str:
     """Model and rule of combination that judge a mission."""
-    return f"{_MODELS[mission.model]}, {_RULES[mission.combine]}"
+    return f"{_MODEL_WORDS[mission.model]}, {_COMBINATION_WORDS[mission.combine]}"
 
 
 def overrides_words(mission: AboutMission, *, with_changes: bool = True) -> str:
@@ -157,7 +157,7 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
             f"{allocation.autofocus_gain:.3g}"
         )
     yield "Budget", f"quadratic phase error (QPE) {phase_limit(allocation.qpe_total, mission)}: {shares}{gain}"
-    yield "Model", f"{_MODELS_AT_LENGTH[mission.model]}, {_RULES[mission.combine]}"
+    yield "Model", f"{_MODELS_AT_LENGTH[mission.model]}, {_COMBINATION_WORDS[mission.combine]}"
     if mission.scene is not None and not mission.scene.degeneracy:
         radius = format_quantity(mission.scene.radius, "m")
         yield (
