@@ -1,6 +1,7 @@
 """Shared test helpers: missions built from a base by replacement, rows found by id."""
 
 import copy
+import gc
 import math
 import os
 import signal
@@ -81,9 +82,10 @@ def name_of(value: Any) -> str | None:
 
 # Files that take longest; begun last, one core would wait for them. The first waits more than it computes.
 _FIRST = (
-    *("test_scheduler.py", "test_compliance_page.py", "test_hostile.py", "test_gate.py"),
-    *("test_report_explanation.py", "test_sweep.py", "test_allocate.py", "test_random_errors.py"),
-    *("test_cphd.py", "test_point.py", "test_navigation_sweep.py", "test_report_compliance.py", "test_symmetries.py"),
+    *("test_scheduler.py", "test_compliance_page.py", "test_hostile.py", "test_gate.py", "test_cphd.py"),
+    *("test_sweep.py", "test_scene_edge.py", "test_processors.py", "test_allocate.py", "test_point.py"),
+    *("test_front_door.py", "test_navigation_sweep.py", "test_any_size.py", "test_symmetries.py"),
+    *("test_report_explanation.py", "test_fallen_effects.py", "test_random_errors.py", "test_report_compliance.py"),
 )
 
 
@@ -119,6 +121,12 @@ def _is_thorough(config: pytest.Config) -> bool:
 def pytest_xdist_auto_num_workers() -> int | None:
     """One process more than cores: some tests wait for a browser, a scheduler or a command."""
     return None if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ else (os.cpu_count() or 1) + 1
+
+
+def pytest_collection_finish() -> None:
+    """Leave what was imported and collected out of every later collection of garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 _is_patched = False  # whether the test of now may put something into the package

@@ -5,7 +5,7 @@ import pytest
 from bisar_budget.design.sensitivity import sensitivity
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.mission.load import parse_mission
-from tests.conftest import TODAY
+from tests.conftest import TODAY, by_turns
 from tests.design.test_sweep import assert_as_checked, grid, swept
 from tests.effects.test_navigation_frames import TURN
 from tests.families import FAMILIES
@@ -61,8 +61,7 @@ EXTRAS = {
 DIRECT_PATH = {"synchronization": "{error: 1 deg, method: direct_path}"}
 
 
-@pytest.mark.parametrize("others", [{}, DIRECT_PATH], ids=["", "direct_path"])
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize(("family", "others"), by_turns(FAMILIES, ({}, DIRECT_PATH)))
 @pytest.mark.parametrize("place", [0, pytest.param(1, marks=pytest.mark.thorough)], ids=["first", "second"])
 def test_random_missions(family: str, others: dict[str, str], place: int) -> None:
     """With a scene's edge, of errors of any size, also where the direct path is the clock."""
