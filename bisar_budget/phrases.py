@@ -152,20 +152,20 @@ def no_requirement() -> str:
 @phrase
 def no_requirement_of(metric: str) -> str:
     """Said of a vibration, or a tone."""
-    return f"no requirements.{metric} to hold it to"
+    return f"no requirements.{metric} in the file: computed, not judged"
 
 
 _SHOWN_EFFECTS = {
     "cubic": "cubic phase of {} rad at the aperture edge",
-    "spread": "{} rad rms of phase that spreads",
+    "spread": "phase of {} rad rms that adds to the ISLR",
     "tone": "tone of {} rad",
 }
 _NEEDED_DECLARATIONS = {
     "quadratic_phase_error": "has a quadratic phase (velocity, acceleration, imu, random, oscillator, timing)",
     "cubic_phase_error": "has a cubic phase (velocity, acceleration, imu, random, oscillator, timing)",
     "location_error": "displaces the image (position, velocity, time_tag, lever_arm, random, timing, propagation)",
-    "pslr": "makes echoes (vibration.sinusoidal, oscillator.spurs, oscillator.acceleration_sensitivity)",
-    "islr": "spreads (vibration, random, oscillator, synchronization, propagation with a correlation_time)",
+    "pslr": "makes paired echoes (vibration.sinusoidal, oscillator.spurs, oscillator.acceleration_sensitivity)",
+    "islr": "adds to the ISLR (vibration, random, oscillator, synchronization, propagation with a correlation_time)",
 }
 
 
@@ -194,19 +194,19 @@ _AIR_MAKES = {
     "quadratic_phase_error": ("have a quadratic phase of", "rad"),
     "cubic_phase_error": ("have a cubic phase of", "rad"),
     "location_error": ("move the image by another", "m"),
-    "islr": ("spread", "dB"),
+    "islr": ("add an ISLR of", "dB"),
 }
 
 
 def _air_that_stays(aperture_time: float, correlation_time: float) -> str:
     return (
-        f"without correlation_time the delays of propagation stay over {aperture_time:.4g} s, and say nothing of air "
-        f"that changes: in {correlation_time / 60:g} min it would"
+        f"without correlation_time the delays of propagation are constant over {aperture_time:.4g} s; with a "
+        f"correlation time of {correlation_time / 60:g} min they would"
     )
 
 
 def _add_correlation_time(keys: Sequence[str]) -> str:
-    return f"add {' and '.join(keys)}, 1e9 s for a delay that stays"
+    return f"add {' and '.join(keys)}, 1e9 s for a constant delay"
 
 
 @phrase
@@ -241,23 +241,23 @@ def air_that_stays_is_negligible(
     """Said of a mission with delays of the air that stay in a long aperture, where no verdict rests on it. [s, s]"""
     return (
         f"negligible: {_air_that_stays(aperture_time, correlation_time)} use {100 * use:.2g} % of a requirement at "
-        f"most ({' and '.join(keys)} states how fast it changes)"
+        f"most ({' and '.join(keys)} states how fast they change)"
     )
 
 
 @phrase
 def nothing_judges(key: str) -> str:
     """Said of a requirement without a row that judges it."""
-    return f"nothing declared that {_NEEDED_DECLARATIONS[key]}"
+    return f"no declared error {_NEEDED_DECLARATIONS[key]}"
 
 
 @phrase
 def clocks_are_not_set(row_ids: Sequence[str]) -> str:
     """Said of the location, beside free oscillators."""
     return (
-        f"{', '.join(row_ids)}: the image moves by what free oscillators drift since they were set, which the file "
-        "does not say; add synchronization.method holdover with age and averaging, or timing_error.constant and "
-        "timing_error.linear, the clock error that is left at mid-aperture"
+        f"{', '.join(row_ids)}: free-running oscillators displace the image as they drift after they were set, and "
+        "the file does not state how they were set; add synchronization.method holdover with age and averaging, or "
+        "timing_error.constant and timing_error.linear, the residual clock error at mid-aperture"
     )
 
 
@@ -265,28 +265,28 @@ def clocks_are_not_set(row_ids: Sequence[str]) -> str:
 def drift_is_not_stated(platforms: Sequence[str]) -> str:
     """Said of what rests on clocks in holdover, of which the file does not state every oscillator."""
     keys = " and ".join(f"platforms.{name}.oscillator" for name in platforms)
-    return f"in holdover a clock drifts as its oscillator does, and the file does not state it: add {keys}"
+    return f"in holdover a clock drifts with its oscillator, whose noise the file does not state: add {keys}"
 
 
 @phrase
 def noise_between_pulses_is_not_stated(platforms: Sequence[str]) -> str:
     """Said of two clocks that exchange pulses, of which the file states one oscillator."""
     keys = " and ".join(f"platforms.{name}.oscillator" for name in platforms)
-    return f"between exchanged pulses both clocks run free, and the file states one oscillator: add {keys}"
+    return f"between exchanged pulses both clocks run free, but the file states only one oscillator: add {keys}"
 
 
 @phrase
 def felt_vibration_lacks(platform: str, key: str) -> str:
     """Said of an oscillator that is said to feel half of what its airframe does."""
     own = f"platforms.{platform}.oscillator.vibration"
-    return f"{own} takes the place of the airframe's vibration, and has no {key} as the airframe has: add {own}.{key}"
+    return f"{own} replaces the airframe's vibration, but has no {key}, which the airframe has: add {own}.{key}"
 
 
 @phrase
 def not_declared_as_required(key: str, lacks: str = "") -> str:
     """Said of an error that the file should declare; `lacks` is what half of it needs to have an effect."""
     if lacks:
-        return f"requirements.declare asks for {key}, and half of it is declared: the file has no {lacks}"
+        return f"requirements.declare asks for {key}, which is declared in part: the file has no {lacks}"
     return f"the file has no {key}, which requirements.declare asks for"
 
 
@@ -308,7 +308,7 @@ def declared_off_its_source(key: str, level: str, off: str) -> str:
 def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -> str:
     """Said of a position error that is less than the doubt of the platform's path. [m]"""
     stated = "no position error is declared" if declared is None else f"{_size(declared, 'm')} is declared"
-    return f"the path may be {_size(doubt, 'm')} off ({words}), {stated}: state it in {key}"
+    return f"the path may be {_size(doubt, 'm')} off ({words}), but {stated}: declare the error in {key}"
 
 
 @dataclass(frozen=True)
@@ -340,15 +340,15 @@ def input_states_more(error: StatedError) -> str:
     """Said of a declared error that is less than the one which the source of the path states. [m], [m/s]"""
     within = f" ({_axes(error.axes)})" if error.axes else ""
     stated = f"a {error.kind} error of {_sizes(error.stated, error.unit)}{within} is stated"
-    return f"{error.words}: {stated}, {error.declared_words}: state at least that in {error.key}"
+    return f"{error.words}: {stated}, but {error.declared_words}: declare at least that in {error.key}"
 
 
 @phrase
 def log_leaves_too_much(phase: float, most: float, key: str) -> str:
     """Said of a log of which a smooth path leaves much, where the file does not say which one is flown. [rad]"""
     return (
-        f"the smooth path leaves {phase:.3g} rad rms of the log along the line of sight, more than {most:g} rad:"
-        f" state {key}: smoothed where the processor flies the smooth path, raw where it flies the fixes"
+        f"the residual of the smoothed log is {phase:.3g} rad rms along the line of sight, more than {most:g} rad:"
+        f" state {key}: smoothed if the processor uses the smoothed path, raw if it uses the fixes"
     )
 
 
@@ -356,8 +356,8 @@ def log_leaves_too_much(phase: float, most: float, key: str) -> str:
 def log_is_flown_as_it_is(figure: str) -> str:
     """Said of the rows of a log whose processor flies the fixes."""
     if figure == "grid":
-        return "the fixes of the log are written to a step: a uniform error, constant over the aperture at worst"
-    return "the processor flies the fixes of the log: what a smooth path leaves of them spreads"
+        return "the log quantises its fixes: a uniform error, constant over the aperture at worst"
+    return "the processor uses the fixes of the log: their residual from the smoothed path adds to the ISLR"
 
 
 @phrase
@@ -365,10 +365,10 @@ def log_is_coarse(step: float, declared: float | None, axis: str, key: str) -> s
     """Said of a log whose fixes are written to a step that is large beside the declared position error. [m]"""
     beside = "no position error is declared"
     if declared is not None:
-        beside = f"more than a tenth of the {_size(declared, 'm')} that are declared"
+        beside = f"more than a tenth of the declared {_size(declared, 'm')}"
     return (
-        f"the log writes its fixes to steps of {_size(step, 'm')} ({axis}), {beside}: state {key}: smoothed where the"
-        " processor flies a smooth path through them, raw where it flies the fixes"
+        f"the log quantises its fixes in steps of {_size(step, 'm')} ({axis}), {beside}: state {key}: smoothed if the"
+        " processor uses a smoothed path, raw if it uses the fixes"
     )
 
 
@@ -377,7 +377,7 @@ def input_usually_has_more(error: StatedError) -> str:
     """Said of a declared error that is less than a third of the usual one of a log's quality. [m]"""
     return (
         f"{error.words} usually have an error of {_size(max(error.stated), error.unit)} on each axis,"
-        f" {error.declared_words}: state at least a third of the usual error in {error.key}"
+        f" but {error.declared_words}: declare at least a third of the usual error in {error.key}"
     )
 
 
@@ -401,7 +401,7 @@ def quadratic_phase_over(phase: float, limit: float, equation: str = "", quadrat
     text = _by(f"QPE {_against(phase, limit, 'rad')}", equation)
     if quadratic is None or quadratic >= SHOWN_PART * phase:  # both are infinite where there is no image
         return text
-    return f"{text}: the quadratic phase of equal loss, of which {quadratic:.3g} rad are quadratic"
+    return f"{text}: quadratic phase of equal peak loss, with a quadratic part of {quadratic:.3g} rad"
 
 
 @phrase
@@ -427,7 +427,7 @@ def no_gain() -> str:
 @phrase
 def location_over(moved: float | None, limit: float, equation: str) -> str:
     """Said of one error; None: there is no image of it. [m]"""
-    where = "out of sight" if moved is None else f"by {format_quantity(moved, 'm')}"
+    where = "beyond every ground point" if moved is None else f"by {format_quantity(moved, 'm')}"
     return f"moves the image {where}, {format_limit(limit, 'm')} allowed ({equation})"
 
 
@@ -456,8 +456,8 @@ def one_total() -> str:
 def all_together_over(what: str, size: float, limit: float, unit: str) -> str:
     """Said of errors that are judged one by one."""
     return (
-        f"each error alone is judged. All declared errors together have a root-sum-square {what} of "
-        f"{_against(size, limit, unit)}: combine: rss judges that"
+        f"each error is judged alone. Together the declared errors have a root-sum-square {what} of "
+        f"{_against(size, limit, unit)}: combine: rss judges it"
     )
 
 
@@ -470,7 +470,7 @@ def edge_over() -> str:
 @phrase
 def no_autofocus_helps(hidden: float, limit: float) -> str:
     """Said of an error whose loss is no quadratic phase that autofocus could correct. [rad]"""
-    return f"no autofocus helps: it leaves a loss of {_against(hidden, limit, 'rad')}"
+    return f"autofocus does not help: the loss that it leaves is that of a QPE of {_against(hidden, limit, 'rad')}"
 
 
 @phrase
@@ -489,26 +489,26 @@ def beyond_autofocus(n_pull: str, allowed: str) -> str:
 @phrase
 def other_model_fails(model: str, size: float, limit: float, unit: str, what: str = "", equation: str = "") -> str:
     """Said of a row, or an aggregate, that the gating model passes."""
-    text = f"the {model} model says fail: {what}".rstrip()
+    text = f"fails by the {model} model: {what}".rstrip()
     return _by(f"{text} {_against(size, limit, unit)}", equation)
 
 
 @phrase
 def other_model_is_beyond(model: str, phase: float, limit: float, unit: str) -> str:
     """Said of the pull-in range."""
-    return f"the {model} model says beyond it: QPE {_against(phase, limit, unit)}"
+    return f"beyond it by the {model} model: QPE {_against(phase, limit, unit)}"
 
 
 @phrase
 def other_model_allows(model: str, limit: float, unit: str) -> str:
     """Said of a vibration, a tone, or a power."""
-    return f"the {model} model says fail: {format_quantity(limit, unit, 3, 'down')} allowed"
+    return f"fails by the {model} model: {format_quantity(limit, unit, 3, 'down')} allowed"
 
 
 @phrase
 def other_model_spreads(model: str, level_db: float) -> str:
     """Said of noise."""
-    return f"the {model} model says fail: it spreads {_level(level_db)}"
+    return f"fails by the {model} model: ISLR of {_level(level_db)}"
 
 
 @phrase
@@ -519,11 +519,11 @@ def published_model_does_not_hold(
     by_published, by_full = (
         "without limit" if size is None else format_limit(size, unit) for size in (published, full)
     )
-    text = f"the published model does not hold here: it allows {row_id} {by_published}, the full model {by_full}"
+    text = f"the published model does not hold here: for {row_id} it allows {by_published}, the full model {by_full}"
     if not others:
         return text
-    more = "1 other declared error is" if others == 1 else f"{others} other declared errors are"
-    return f"{text}; {more} over 5 % apart too"
+    more = "1 other declared error" if others == 1 else f"{others} other declared errors"
+    return f"{text}; for {more} the models differ by more than 5 % too"
 
 
 @phrase
@@ -535,7 +535,7 @@ def wrong_height_defocuses() -> str:
 @phrase
 def position_defocuses() -> str:
     """Why the full model fails a position."""
-    return "the line of sight turns over a position error, and its displacement defocuses"
+    return "the line of sight turns, and the image displaced by a position error defocuses"
 
 
 @phrase
@@ -572,7 +572,7 @@ def no_common_component(cause: str, axis: str) -> str:
 @phrase
 def no_quadratic_term_of_time_tag() -> str:
     """Said of a time tag by Tables I and II: a straight path is moved along itself."""
-    return "a path that is straight, or still, is displaced along itself: no quadratic term"
+    return "a straight path is displaced along itself: no quadratic term"
 
 
 @phrase
@@ -596,7 +596,7 @@ def aging_is_followed() -> str:
 @phrase
 def no_quadratic_term_of_height() -> str:
     """Said of the terrain, by the published model."""
-    return "no quadratic term: to the published model a height error moves the image"
+    return "no quadratic term: in the published model a height error moves the image"
 
 
 @phrase
@@ -632,7 +632,7 @@ def no_phase_noise() -> str:
 @phrase
 def across_the_line_of_sight() -> str:
     """Said of a sensor."""
-    return "the line of sight has no part in it: no phase"
+    return "no component along the line of sight: no phase"
 
 
 @phrase
@@ -647,16 +647,16 @@ def below_the_ionosphere(platform: str) -> str:
 def runs_along_the_ground(platform: str) -> str:
     """Said of the delay on a leg that is seen too low, and of which nothing may be stated."""
     if platform == "mission":
-        return "both legs run along the ground: no delay follows from that of the zenith"
-    return f"the leg of the {platform} runs along the ground: no delay follows from that of the zenith"
+        return "both legs run along the ground: the delay at the zenith does not give theirs"
+    return f"the leg of the {platform} runs along the ground: the delay at the zenith does not give its delay"
 
 
 @phrase
 def dispersion_over(phase: float, limit: float) -> str:
     """Said of the electrons of the air. [rad]"""
     return (
-        f"at the edges of the band the phase is bent by {_against(phase, limit, 'rad')}; autofocus corrects a phase "
-        "over slow time, and does not take it out"
+        f"quadratic phase at the edges of the band {_against(phase, limit, 'rad')}; autofocus corrects phase over "
+        "slow time, not over the band"
     )
 
 
@@ -669,7 +669,7 @@ def content_allowed(content: float) -> str:
 @phrase
 def nothing_spreads() -> str:
     """Said of a clock's error that does nothing."""
-    return "no quadratic phase, no cubic phase and nothing that spreads"
+    return "no quadratic phase, no cubic phase and no ISLR"
 
 
 @phrase
@@ -681,19 +681,19 @@ def no_requirement_limits(effects: Sequence[str]) -> str:
 @phrase
 def same_all_over_the_scene() -> str:
     """Said of the scene's edge, by the published model."""
-    return "to the published model an error is the same all over the scene"
+    return "in the published model an error has the same effect all over the scene"
 
 
 @phrase
 def no_ground_point() -> str:
     """Said of an aggregate that has no value."""
-    return "a declared error leaves no ground point with its range history"
+    return "with a declared error no ground point has the recorded range history"
 
 
 @phrase
 def no_image() -> str:
     """Said of the scene's edge."""
-    return "a declared error leaves no ground point with its range history: there is no image"
+    return "with a declared error no ground point has the recorded range history: no image"
 
 
 @phrase
@@ -706,7 +706,7 @@ def no_image_to_place() -> str:
 def no_displacement(degrees: float) -> str:
     """Said of an image plane whose gradients are nearly parallel. [deg]"""
     return (
-        f"(25) has no displacement here: with the range held constant, range and Doppler gradients are "
+        f"(25) gives no displacement here: with the range held constant, range and Doppler gradients are "
         f"{degrees:.2g} deg from parallel"
     )
 
@@ -714,7 +714,7 @@ def no_displacement(degrees: float) -> str:
 @phrase
 def no_displacement_across(gradient: float) -> str:
     """Said of look vectors that all but cancel on the ground at mid-aperture. [m/m]"""
-    return f"(25) has no displacement here: the look vectors cancel to {gradient:.2g} on the ground at mid-aperture"
+    return f"(25) gives no displacement here: the look vectors cancel to {gradient:.2g} on the ground at mid-aperture"
 
 
 @phrase
@@ -746,8 +746,8 @@ def same_at_the_edge() -> str:
 def drift_is_open_at_the_edge(row_ids: Sequence[str]) -> str:
     """Said of the scene's edge, beside free oscillators."""
     return (
-        f"{', '.join(row_ids)}: what free oscillators drift since they were set, which the file leaves open, is not "
-        "counted"
+        f"{', '.join(row_ids)}: the drift of free-running oscillators since they were set is not counted: the file "
+        "does not state how they were set"
     )
 
 
@@ -760,7 +760,7 @@ def largest_at_the_edge(azimuth_deg: float, radius: float) -> str:
 @phrase
 def one_correction_serves(how_far: str, total: float) -> str:
     """Within which radius one autofocus correction serves. [rad]"""
-    return f"one autofocus correction serves {how_far}, by the total of {format_limit(total, 'rad')}"
+    return f"autofocus correction valid {how_far}, within the total of {format_limit(total, 'rad')}"
 
 
 @phrase
@@ -773,13 +773,13 @@ def over_at_the_edge(row_id: str, phase: float, limit: float) -> str:
 @phrase
 def held_to_the_total(owners: str) -> str:
     """Said of an error of both platforms, or of none."""
-    return f"held to the total budget: it belongs to {owners}"
+    return f"limited by the total budget: it belongs to {owners}"
 
 
 @phrase
 def counted_in_another_row(row_id: str) -> str:
     """Said of a part of what an error does: the row of all of it judges."""
-    return f"a part of {row_id}, which has all that the attitude does: this row counts nowhere again"
+    return f"part of {row_id}, which includes every effect of the attitude: not counted again"
 
 
 @phrase
@@ -797,32 +797,34 @@ def correlations_unused(group: str) -> str:
 @phrase
 def one_point_of_allan_deviation() -> str:
     """Said of an oscillator."""
-    return "one point of an Allan deviation tells no kind of noise: it is the worst for this aperture"
+    return "one point of an Allan deviation does not give the kind of noise: the worst for this aperture is assumed"
 
 
 @phrase
 def flicker_is_assumed() -> str:
     """Said of an oscillator."""
-    return "an Allan deviation does not tell white from flicker phase noise: flicker is assumed"
+    return "an Allan deviation does not distinguish white from flicker phase noise: flicker is assumed"
 
 
 @phrase
 def allan_deviation_begins(time: float) -> str:
     """Said of an oscillator. [s]"""
-    return f"the Allan deviation begins at {time:g} s; down to the aperture time its power law continues"
+    return f"the Allan deviation begins at {time:g} s; its power law is continued down to the aperture time"
 
 
 @phrase
 def allan_deviation_ends(time: float) -> str:
     """Said of an oscillator. [s]"""
-    return f"the Allan deviation ends at {time:g} s; up to the aperture time its power law continues"
+    return f"the Allan deviation ends at {time:g} s; its power law is continued up to the aperture time"
 
 
 @phrase
 def mask_is_cut(bandwidth: float, last: float, beyond: float) -> str:
     """Said of an oscillator whose bandwidth ends below the last point of its mask. [Hz, Hz, rad]"""
     end, whole = (format_quantity(frequency, "Hz", 4) for frequency in (bandwidth, last))
-    return f"phase noise counts to `bandwidth`, {end}; the mask goes to {whole}, with {beyond:.3g} rad rms beyond"
+    return (
+        f"phase noise counts up to `bandwidth`, {end}; the mask extends to {whole}, with {beyond:.3g} rad rms above"
+    )
 
 
 @phrase
@@ -836,8 +838,8 @@ def rests_on_the_continuation(platforms: Sequence[str], percent: float, least: f
     """Said of a row that rests on noise below the first points of masks. [Hz]"""
     keys = " and ".join(f"platforms.{name}.oscillator" for name in platforms)
     return (
-        f"{percent:.0f} % of its power lies below the first point of the mask of {keys}, where the noise is taken to "
-        f"continue as f^-3: a mask down to {format_quantity(least, 'Hz', 2, 'down')} would say it"
+        f"{percent:.0f} % of its power lies below the first point of the mask of {keys}, where the noise is assumed "
+        f"to continue as f^-3: a mask down to {format_quantity(least, 'Hz', 2, 'down')} would state it"
     )
 
 
@@ -845,7 +847,7 @@ def rests_on_the_continuation(platforms: Sequence[str], percent: float, least: f
 def mask_at_the_frequency_of_a_part(platform: str, frequency: str, part: str) -> str:
     """Said of phase noise that the file states without a frequency, beside a part."""
     return (
-        f"platforms.{platform}.oscillator.phase_noise: states no frequency, and is taken at {frequency}, that of "
+        f"platforms.{platform}.oscillator.phase_noise: states no frequency, and is assumed at {frequency}, that of "
         f"{part}: add oscillator.frequency"
     )
 
@@ -874,28 +876,28 @@ def noise_is_shifted(level_db: float) -> str:
 @phrase
 def left_by_exchanges(interval: float) -> str:
     """Said of an oscillator. [s]"""
-    return f"only what synchronisation every {format_quantity(interval, 's')} leaves of it counts"
+    return f"after synchronisation every {format_quantity(interval, 's')}"
 
 
 @phrase
 def points_are_sorted() -> str:
     """Said of a mask or a spectrum whose points do not rise in the file."""
-    return "the file has its points in another order: they are read in rising order"
+    return "the points of the file are not in rising order: they are sorted"
 
 
 @phrase
 def setting_is_perfect(missing: Sequence[str]) -> str:
     """Said of clocks in holdover whose setting has no error in the file."""
     keys = " and ".join(f"synchronization.{one}" for one in missing)
-    return f"the file has no {keys}: the clocks are taken to be set without that error"
+    return f"the file has no {keys}: the clocks are assumed to be set without that error"
 
 
 @phrase
 def mask_ends_within_the_band(last: float, bandwidth: float) -> str:
     """Said of a mask that ends below the bandwidth beside it. [Hz]"""
     return (
-        f"counts up to the mask's last point, {format_quantity(last, 'Hz')}: beyond it, up to the bandwidth of "
-        f"{format_quantity(bandwidth, 'Hz')}, nothing is stated"
+        f"phase noise counts up to the mask's last point, {format_quantity(last, 'Hz')}: above it, up to the "
+        f"bandwidth of {format_quantity(bandwidth, 'Hz')}, none is stated"
     )
 
 
@@ -903,7 +905,7 @@ def mask_ends_within_the_band(last: float, bandwidth: float) -> str:
 def left_since_setting(age: float, averaging: float) -> str:
     """Said of an oscillator in holdover. [s]"""
     return (
-        f"counts from its setting on, {format_quantity(age, 's')} before mid-aperture, by a line over "
+        f"drift since the clock was set {format_quantity(age, 's')} before mid-aperture, by a line fitted over "
         f"{format_quantity(averaging, 's')}"
     )
 
@@ -911,27 +913,27 @@ def left_since_setting(age: float, averaging: float) -> str:
 @phrase
 def heard_twice(delay: float) -> str:
     """Said of a receiver's oscillator under a direct path. [s]"""
-    return f"only what it changes by in the {format_quantity(delay, 's')} from the direct path to the echo counts"
+    return f"only its change in the {format_quantity(delay, 's')} between the direct path and the echo counts"
 
 
 @phrase
 def another_for_each_pulse() -> str:
     """Said of the error of a link."""
-    return "the error is another one for each pulse: all of it spreads"
+    return "the error is independent from pulse to pulse: all of it adds to the ISLR"
 
 
 # ---------------------------------------------------------------------- noise and tones
 @phrase
 def spreads_too_much(level_db: float, limit_db: float) -> str:
     """Said of noise."""
-    return f"spreads {_level(level_db)}, {_level(limit_db, 'down')} allowed"
+    return f"ISLR of {_level(level_db)}, {_level(limit_db, 'down')} allowed"
 
 
 @phrase
 def noise_spreads_too_much(level_db: float, limit_db: float, row_id: str, largest_db: float) -> str:
     """Said of all noise together."""
     return (
-        f"noise spreads {_level(level_db)}, {_level(limit_db, 'down')} allowed; largest: {row_id}, "
+        f"ISLR of {_level(level_db)} by noise, {_level(limit_db, 'down')} allowed; largest: {row_id}, "
         f"{_level(largest_db)}"
     )
 
@@ -969,22 +971,22 @@ def tone_lies(frequency: float, cells: float) -> str:
 @phrase
 def echo_is_folded(frequency: float, reason: Note) -> str:
     """Said of an echo of a tone between exchanges, and what follows. [Hz]"""
-    return f"straight lines between exchanges fold it to {format_quantity(frequency, 'Hz')}; {reason}"
+    return f"interpolation between exchanges folds it to {format_quantity(frequency, 'Hz')}; {reason}"
 
 
 @phrase
 def tone_is_folded(frequency: float, cycles: float, qpe: float, cubic: float, row_id: str) -> str:
     """Said of a tone of an oscillator between exchanges. [Hz]"""
     return (
-        f"straight lines between exchanges fold it to {format_quantity(frequency, 'Hz')}, {cycles:.3g} cycles per "
-        f"aperture: QPE {qpe:.3g} rad, cubic phase {cubic:.3g} rad at most, which count in {row_id}"
+        f"interpolation between exchanges folds it to {format_quantity(frequency, 'Hz')}, {cycles:.3g} cycles per "
+        f"aperture: QPE of at most {qpe:.3g} rad and cubic phase of {cubic:.3g} rad, counted in {row_id}"
     )
 
 
 @phrase
 def folded_spurs_count() -> str:
     """Said of the row of an oscillator."""
-    return "spurs that exchanges fold below one cycle per aperture count in it; a level does not shift them"
+    return "includes spurs that exchanges fold below one cycle per aperture; `level` does not shift them"
 
 
 @phrase
@@ -1036,8 +1038,8 @@ def slower_than_three_cycles(
 ) -> str:
     """Said of a vibration. [rad]"""
     return (
-        f"{cycles_below(cycles)} cycles per aperture: below three it also is "
-        f"{_in_the_worst_phase(quadratic, limit, cubic, cubic_limit)}; it is the same motion, so no sum counts it"
+        f"{cycles_below(cycles)} cycles per aperture: below three there is also "
+        f"{_in_the_worst_phase(quadratic, limit, cubic, cubic_limit)}; the same motion, not counted again in a sum"
     )
 
 
@@ -1062,8 +1064,8 @@ def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: b
 @phrase
 def published_rule_is_off(margin_db: float) -> str:
     """Said of a limit of a vibration."""
-    side = "inside" if margin_db >= 0 else "beyond"
-    return f"the published rule is {abs(margin_db):.2f} dB {side} first principles"
+    comparison = "stricter" if margin_db >= 0 else "more lenient"
+    return f"the published rule is {abs(margin_db):.2f} dB {comparison} than first principles"
 
 
 @phrase
@@ -1077,7 +1079,7 @@ def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
 def does_as_much_as_along_the_sight(stated: str, along: float, has_direct_path: bool) -> str:
     """Said of a slow vibration of which the line of sight sees a part, that turns. [m]"""
     where = "in the range less the direct path" if has_direct_path else "along the line of sight"
-    return f"{stated}: in the worst phase it does as much as {format_quantity(along, 'm')} {where}"
+    return f"{stated}: in the worst phase equivalent to {format_quantity(along, 'm')} {where}"
 
 
 # ---------------------------------------------------------------------- vibration by its spectrum, and of oscillators
@@ -1098,8 +1100,8 @@ def amplitude_of_acceleration(amplitude: float) -> str:
 def vibration_of_the_platform() -> str:
     """Said of an oscillator without a vibration of its own."""
     return (
-        "the oscillator is taken to feel motion_error.vibration, which is what navigation does not sense; it feels "
-        "all of it: oscillator.vibration states that"
+        "the oscillator is assumed to feel motion_error.vibration, the part that navigation does not sense; it feels "
+        "the whole vibration, which oscillator.vibration states"
     )
 
 
@@ -1114,8 +1116,8 @@ def oscillator_does_not_vibrate(turns: bool) -> str:
 def wideband_has_no_spectrum(platform: str) -> str:
     """Said of an oscillator whose platform has a wideband vibration."""
     return (
-        "what wideband vibration does to the oscillator depends on its frequencies, which an rms does not say: state "
-        f"platforms.{platform}.oscillator.vibration, or motion_error.vibration.spectrum in place of wideband"
+        "the effect of wideband vibration on the oscillator depends on its spectrum, which an rms does not give: "
+        f"state platforms.{platform}.oscillator.vibration, or motion_error.vibration.spectrum in place of wideband"
     )
 
 
@@ -1134,7 +1136,7 @@ def shakes_an_oscillator(acceleration: float, phase: float) -> str:
 @phrase
 def no_acceleration() -> str:
     """Said of an oscillator that feels nothing."""
-    return "no vibration at random, no slow one and no turn, or nothing is left of them: no phase"
+    return "no random or slow vibration and no turn, or no residual of them: no phase"
 
 
 # ---------------------------------------------------------------------- images
@@ -1171,7 +1173,7 @@ def images_formed(conditions: str) -> str:
 @phrase
 def overrides_a_part(key: str, text: str, part: str) -> str:
     """Said of a figure of a part that the file replaces; of its rows and of a mission."""
-    return f"{key} stands in place of {text} of {part}"
+    return f"{key} replaces {text} of {part}"
 
 
 # ---------------------------------------------------------------------- the collection
@@ -1190,15 +1192,15 @@ def orbit_errors_are_independent(platform: str, position_m: float, rate: float, 
 @phrase
 def path_curves(platform: str) -> str:
     """Said of a collection."""
-    return f"the {platform}'s path curves: the published model takes it for straight, the full model does not"
+    return f"the {platform}'s path is curved: the published model assumes a straight path, the full model does not"
 
 
 @phrase
 def sight_turns(platform: str, half_turn: float) -> str:
     """Said of a collection. [rad]"""
     return (
-        f"the {platform}'s line of sight turns by ±{half_turn:.2g} rad: the published model takes the phase for a "
-        "quadratic, the full model does not"
+        f"the {platform}'s line of sight turns by ±{half_turn:.2g} rad: the published model assumes a quadratic "
+        "phase, the full model does not"
     )
 
 
@@ -1215,8 +1217,8 @@ def image_may_have_several_peaks(loss_db: float) -> str:
 def direct_path_is_the_clock() -> str:
     """Said of a collection."""
     return (
-        "the direct path is the clock: the full model takes ranges less the distance of the platforms, and "
-        "timing errors have no effect; values of the published model are those without it"
+        "the direct path is the clock: the full model uses ranges less the distance between the platforms, and "
+        "timing errors have no effect; the published model ignores the direct path"
     )
 
 
@@ -1230,7 +1232,7 @@ def keys_not_used(keys: Sequence[str]) -> str:
 @phrase
 def drawn_through_exact_ranges() -> str:
     """Said of Monte Carlo."""
-    return "every draw goes through exact ranges: the declared errors are too large for sums of their effects"
+    return "every draw uses exact ranges: the declared errors are too large for sums of their effects"
 
 
 @phrase
@@ -1242,7 +1244,7 @@ def drawn_by_the_full_model(model: str) -> str:
 @phrase
 def drawn_all_at_once() -> str:
     """Said of Monte Carlo."""
-    return "a draw is the sum of all errors at once; the rows are judged one by one, allocation.combine being each"
+    return "a draw is the sum of all errors; the rows are judged one by one (allocation.combine: each)"
 
 
 @phrase
@@ -1254,7 +1256,7 @@ def drawn_as_bounds(row_ids: Sequence[str]) -> str:
 @phrase
 def vibration_is_not_drawn() -> str:
     """Said of Monte Carlo."""
-    return "what vibrations and tones do is not drawn: it is in check alone"
+    return "the effects of vibrations and tones are not drawn: only check has them"
 
 
 @phrase
@@ -1276,19 +1278,19 @@ def hidden_phase_is_not_drawn(row_ids: Sequence[str]) -> str:
 @phrase
 def mean_power_is_not_drawn() -> str:
     """Said of Monte Carlo."""
-    return "what sensors and clocks spread is a mean power: ISLR is not drawn"
+    return "the ISLR of sensors and clocks is a mean power: ISLR is not drawn"
 
 
 @phrase
 def unset_clocks_are_not_drawn() -> str:
     """Said of Monte Carlo, of a location beside free oscillators."""
-    return "the file does not say how the oscillators are set: the location is not drawn"
+    return "the file does not state how the oscillators were set: the location is not drawn"
 
 
 @phrase
 def drawn_without_coverage() -> str:
     """Said of Monte Carlo."""
-    return "the coverage factor is in sum and rss, not in the draws"
+    return "the coverage factor applies to sum and rss, not to the draws"
 
 
 # ---------------------------------------------------------------------- waivers

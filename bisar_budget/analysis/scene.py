@@ -823,8 +823,8 @@ class SceneEdge(NamedTuple):
     def served(self) -> str:
         """How far one correction serves, in words."""
         if self.autofocus_radius is None:
-            return f"farther than {format_quantity(self.searched, 'm', 3, 'down')} out"
-        return f"out to {format_quantity(self.autofocus_radius, 'm', 3, 'down')}"
+            return f"beyond the scene ({format_quantity(self.searched, 'm', 3, 'down')})"
+        return f"up to {format_quantity(self.autofocus_radius, 'm', 3, 'down')} from the centre"
 
 
 def _degeneracy(mission: Mission, ground_point: GroundVector) -> str:

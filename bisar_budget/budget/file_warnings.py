@@ -96,25 +96,25 @@ def _nothing_declared(rows: Sequence[Row]) -> Iterator[_Warned]:
 @phrase
 def another_mission(changes: str) -> str:
     """Said of a mission that options changed."""
-    return f"checked is not the mission of the file: {changes}"
+    return f"the mission checked is not that of the file: {changes}"
 
 
 @phrase
 def id_of_no_row(row_id: str) -> str:
     """Said of a key of `requirement_ids`."""
-    return f"requirement_ids: {row_id} is the id of no row"
+    return f"requirement_ids: no row has the id {row_id}"
 
 
 @phrase
 def no_orbit_to_turn() -> str:
     """Said of figures of the Earth's rotation that nothing uses."""
-    return "earth_orientation: it turns orbits into the axes of the Earth, and no platform has one"
+    return "earth_orientation: not used, since no platform has an orbit"
 
 
 @phrase
 def full_model_gates(model: str) -> str:
     """Said of a mission with a direct path, which asks for another model."""
-    return f"allocation.model {model}: the published model does not know the direct path; the full model gates"
+    return f"allocation.model {model}: the published model ignores the direct path; the full model decides"
 
 
 @phrase
@@ -153,8 +153,8 @@ def fit_changes_allowables(platform: str, acceleration: float, change: float, ro
     by = f"by up to {100 * change:.2g} %" if change < 1 else "by a factor of two and more"
     return (
         f"platforms.{platform}: the noise of the log leaves the acceleration of its path uncertain by {size} (1"
-        f" sigma, along the line of sight), which changes allowables {by} ({row_id}): a longer or a better log makes"
-        " them sure"
+        f" sigma, along the line of sight), which changes allowables {by} ({row_id}): a longer or a more accurate log"
+        " reduces it"
     )
 
 
@@ -194,7 +194,7 @@ def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence
             "latitude)"
         )
     return (
-        f"platforms.{platform}: {speed / 1e3:.3g} km/s is the speed of a satellite, and the path is straight. "
+        f"platforms.{platform}: {speed / 1e3:.3g} km/s is the speed of a satellite, but the path is straight. "
         f"A circular orbit has acceleration: [{components}] {how}"
     )
 
@@ -226,7 +226,7 @@ def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
 def nothing_swings_the_arm(platform: str) -> str:
     """Said of a lever arm without attitude errors."""
     return (
-        f"platforms.{platform}.motion_error.lever_arm.arm: attitude errors swing it, and imu states none: "
+        f"platforms.{platform}.motion_error.lever_arm.arm: attitude errors swing it, but imu states none: "
         "add imu.attitude, gyro_bias or angle_random_walk"
     )
 
@@ -251,8 +251,8 @@ def _of_calm_oscillators(mission: Mission) -> Iterator[_Warned]:
 def nothing_shakes_the_oscillator(platform: str) -> str:
     """Said of a sensitivity to acceleration without vibration."""
     return (
-        f"platforms.{platform}.oscillator.acceleration_sensitivity judges nothing: vibration and turns act on it, "
-        "and the file has none: add oscillator.vibration, or sinusoidal or spectrum to motion_error.vibration"
+        f"platforms.{platform}.oscillator.acceleration_sensitivity has no effect: vibration and turns act on it, "
+        "but the file has none: add oscillator.vibration, or sinusoidal or spectrum to motion_error.vibration"
     )
 
 
@@ -292,7 +292,7 @@ def exchanges_are_rare(aperture_time: float) -> str:
     """Said of clocks that are synchronised less than once in an aperture. [s]"""
     return (
         f"synchronization.interval: pulses are exchanged less than once in an aperture of {aperture_time:g} s; "
-        "straight lines between them may make the phase worse than it is without"
+        "interpolation between them may make the phase worse than without synchronisation"
     )
 
 
@@ -315,8 +315,8 @@ def _of_autofocus(mission: Mission, resolution: Resolution) -> Iterator[_Warned]
 def walks_over_range_cells(n_pull: float, cells: float, cap: str) -> str:
     """Said of a pull-in range that range walk does not leave; `cap` is the `n_pull` of half a cell, rounded down."""
     return (
-        f"autofocus.n_pull: {n_pull:g} counts as {cap}, f0/B, where an error walks half a range cell; one of "
-        f"{n_pull:g}π rad walks {cells:.3g} cells, which correction along one dimension does not take out"
+        f"autofocus.n_pull: {n_pull:g} is limited to {cap}, f0/B, where the range walk is half a cell; an error of "
+        f"{n_pull:g}π rad walks {cells:.3g} cells, which a one-dimensional correction does not remove"
     )
 
 

@@ -42,10 +42,14 @@ if TYPE_CHECKING:
     "--reserve",
     type=click.FloatRange(0, 100, max_open=True),
     metavar="PERCENT",
-    help="Part of every limit that is kept free (default: what allocation.warn_above leaves, 20 %).",
+    help="Fraction of every limit to keep in reserve (default: 100 % less allocation.warn_above, 20 %).",
 )
 @click.option(
-    "--compare", "other", type=FILE, metavar="MISSION", help="Hold the figures of another mission file to it."
+    "--compare",
+    "other",
+    type=FILE,
+    metavar="MISSION",
+    help="Compare the figures of another mission file with the specifications.",
 )
 @MODEL
 @SET
@@ -68,11 +72,11 @@ def allocate(
 ) -> None:
     """Find specifications for the errors of a mission that together meet every requirement.
 
-    The sizes are the largest ones: none can grow unless another shrinks. What is ordered is rounded down to two
-    digits, and the mission is checked with it. All other errors of the file are fixed and count first; so do the
-    file's split, combination, autofocus and model. With -o FILE.yaml the mission is written with the specifications
-    in place. Exit code: 0, 1 if there are none, or the mission does not comply with them, or with the offer of
-    --compare, 2 for wrong usage or an unusable mission file.
+    The sizes are the largest ones: none can grow unless another shrinks. Specifications are rounded down to two
+    digits, and the mission is checked with them. All other errors of the file are fixed and use their part of the
+    limits first; split, combination, autofocus and model are those of the file. With -o FILE.yaml the mission is
+    written with the specifications. Exit code: 0, 1 if there are none, or the mission does not comply with them, or
+    with the offer of --compare, 2 for wrong usage or an unusable mission file.
     """
     if reserve is not None and math.isnan(reserve):
         raise click.UsageError("--reserve: nan is no part of a limit; accepted: 0 to 100, in percent.")
@@ -81,11 +85,11 @@ def allocate(
     if is_mission and len(files) > 1:
         raise click.UsageError("-o FILE.yaml writes one mission.")
     if other is not None and len(files) > 1:
-        raise click.UsageError("--compare holds one offer to one mission.")
+        raise click.UsageError("--compare compares one offer with one mission.")
     spare([*files, *([other] if other else [])], [output])
     loaded = load_all(files, model, changes)
     if (twice := next((key for place, key in enumerate(keys) if key in keys[:place]), None)) is not None:
-        raise click.UsageError(f"--for {twice}: stands twice; each key once.")
+        raise click.UsageError(f"--for {twice}: is given twice; accepted: each key once.")
     from bisar_budget.front import questions
     from bisar_budget.report.formats import specification_sheet
 

@@ -208,7 +208,7 @@ class _Draws(ParamType[int]):
 @click.option(
     "--exit-zero/--no-exit-zero",
     envvar="BISAR_BUDGET_EXIT_ZERO",
-    help="Exit with 0 even if a requirement is broken or not judged; every report says it.",
+    help="Exit with 0 even if a requirement is broken or not judged; every report states it.",
 )
 @model_option("BISAR_BUDGET_MODEL")
 @date_option(" A compliance report shows it only if it is given.")
@@ -220,7 +220,7 @@ class _Draws(ParamType[int]):
     envvar="BISAR_BUDGET_MONTE_CARLO",
     type=_Draws(),
     metavar="N",
-    help="Also draw the declared errors N times from their distributions and say how often each requirement holds.",
+    help="Also draw the declared errors N times from their distributions: how often each requirement holds.",
 )
 @click.option(
     "--seed",
@@ -298,8 +298,8 @@ def check(
     the tool.
 
     Defaults of --format, --report, --strict, --exit-zero, --model, --monte-carlo, --seed and --color:
-    [tool.bisar-budget] in the pyproject.toml nearest to each mission, and over it the variables BISAR_BUDGET_FORMAT
-    and so on. Missions of several projects are judged each by its own settings.
+    [tool.bisar-budget] in the pyproject.toml nearest to each mission, overridden by the variables BISAR_BUDGET_FORMAT
+    and so on. Each mission is judged by the settings of its own project.
     """
     from bisar_budget.report import Style, joined
 
@@ -443,7 +443,7 @@ def _options_in(context: click.Context, judged_on: date | None, today: datetime 
         origin = origin_of(parameter)
         text = None
         if name == "model":
-            text = value or "as each file says"
+            text = value or "as in each file"
         elif name == "today":
             if value is None and judged_on is not None:
                 origin = day_origin(today, COMMAND_LINE)

@@ -24,13 +24,13 @@ from bisar_budget.cli.streams import BROKEN_EXIT_CODE, complain, deliver, write_
     help="One equation of the paper, 1 to 31, in place of a table.",
 )
 @format_option(("text", "latex", "markdown", "mathml"), "How to write it.")
-@click.option("--check", "check_only", is_flag=True, help="Fail if a generated file is not what it gives.")
+@click.option("--check", "check_only", is_flag=True, help="Fail if a generated file differs from the derivation.")
 @click.option("--write", is_flag=True, help="Rewrite the generated files: evaluators and formulas.")
 def derive(table: str, number: int | None, format_name: str, check_only: bool, write: bool) -> None:
     """Derive the paper's tables from the geometry and print them.
 
-    Rigling & Moses, equations (1) to (31) with the slips of the print, Tables I and II, vibration limits; and the
-    full model. Equation and table numbers are the paper's.
+    Rigling & Moses, equations (1) to (31) with their errata, Tables I and II, vibration limits; and
+    the full model. Equation and table numbers are those of the paper.
     """
     if check_only and write:
         raise click.UsageError("--check and --write cannot be combined.")

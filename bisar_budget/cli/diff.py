@@ -55,25 +55,25 @@ class _Part(ParamType[float]):
 @click.command()
 @click.argument("files", type=FILE, nargs=-1, required=True, metavar="OLD NEW | MISSION...")
 @click.option("--base", metavar="REV", help="Compare each MISSION with itself in this git revision.")
-@set_option("Compare each MISSION with itself with a value in place of its own, or beside it")
+@set_option("Compare each MISSION with itself with a value replaced or added")
 @click.option(
     "--fail-on-erosion",
     "tolerated",
     type=_Part(),
     metavar="PERCENT",
-    help="Exit with 1 if the change loosens anything, if a row or a requirement newly fails or is not evaluated any "
-    "more, or if the change uses up more than this part of what was left of a row's limit.",
+    help="Exit with 1 if the change loosens anything, if a row or a requirement newly fails or is no longer "
+    "evaluated, or if the erosion of a row exceeds this value.",
 )
 @click.option(
     "--allow",
     "allowed",
     multiple=True,
     metavar="ID",
-    help="With --fail-on-erosion: let this through. ID is as the comparison names it, or a pattern; FILE:ID is that "
-    "of one mission. Repeatable.",
+    help="With --fail-on-erosion: accept this change. ID is that of the comparison, or a pattern; FILE:ID for one "
+    "mission only. Repeatable.",
 )
 @format_option(("text", "markdown", "json"), "Format of the comparison.")
-@click.option("--all", "all_rows", is_flag=True, help="Also show rows that moved by less than 1 %.")
+@click.option("--all", "all_rows", is_flag=True, help="Also show rows that changed by less than 1 %.")
 @OUTPUT
 @DATE
 def diff(
@@ -89,18 +89,17 @@ def diff(
 ) -> None:
     """Show what a change to a mission does to every margin, and what it loosens.
 
-    Compares two mission files, each with itself in a git revision, or each with itself with other values (--set).
-    What changed in the file and in the geometry stands first, then the rows. With --base the parts, settings, orbits
+    Compares two mission files, or each mission file with its version in a git revision (--base), or with other values
+    (--set). Lists changes of the file and the geometry, then the rows. With --base the parts, settings, orbits
     and logs are those of the revision too, and a pattern names the missions of both.
 
-    Rows are sorted by erosion. Erosion is the part of what was left of a limit that the change uses up:
-    (u2 - u1)/(1 - u1), u1 and u2 being declared over allowable before and after. A row that had nothing left has
-    u2/u1 - 1.
+    Rows are sorted by erosion, the fraction of the remaining margin that the change uses up: (u2 - u1)/(1 - u1),
+    u1 and u2 being declared over allowable before and after; u2/u1 - 1 for a row without margin before.
 
-    Margins do not show what is loosened: a mission file, a requirement, an error, its source or a word of
-    requirements.declare that is gone, a larger requirement, a waiver that is new or lasts longer, a row that is newly
-    waived, more autofocus, and less coverage, reserve, model or combination. Nor do they show an error that does less
-    than before in the same geometry while neither its part nor its source has another name.
+    Also lists what is loosened, which margins do not show: a mission file, a requirement, an error, its source or an
+    entry of requirements.declare that was removed, a larger requirement, a new or longer waiver, a newly waived row,
+    more autofocus, and less coverage, reserve, model or combination; and an error whose effect is smaller
+    than before in the same geometry although its part and its source are the same.
 
     Exit code: 0; 1 with --fail-on-erosion; 2 for wrong usage, an unusable file or an unknown revision.
     """

@@ -61,7 +61,7 @@ def verify(
     scheduler: str | None,
     patience: int,
 ) -> None:
-    """Form images at the limits and measure whether they are true.
+    """Form images at the limits and measure whether the limits hold.
 
     The data come from exact ranges, and the phase is measured in the image. A limit is confirmed if the
     image shows its budget within 5 %, optimistic if it shows more, conservative if less. With autofocus
@@ -89,7 +89,7 @@ def verify(
 @click.command()
 @click.argument("mission", type=FILE)
 @plot_option("Draw Figures 3 to 7 of the paper for this mission: .png, .svg or .pdf.")
-@output_option("Save the images and what explains them for NumPy: .npz. Or write the phase history alone: .cphd.")
+@output_option("Save the images and their data for NumPy: .npz. Or write the phase history alone: .cphd.")
 @click.option(
     "--image-former",
     type=click.Choice(["backprojection", "polar_format", "matched_filter", "far_field"]),
@@ -100,7 +100,7 @@ def verify(
 @click.option(
     "--targets",
     metavar="LIST",
-    help="What stands in the scene, instead of one point at its centre: EAST, NORTH[, LEVEL]; ...; "
+    help="Targets in the scene, instead of one point at its centre: EAST, NORTH[, LEVEL]; ...; "
     "grid:NXxNY:SPACING; FILE.csv; clutter LEVEL.",
 )
 @SET
@@ -114,15 +114,15 @@ def simulate(
 ) -> None:
     """Form the image of a point, or of a scene, with the declared errors.
 
-    All errors of the file together, with its signs, are flown once: they may cancel, and the worst case is that
-    of `check`. The data come from exact ranges; the image is formed where the errors move the point, in the scene's
+    Simulates one flight with all errors of the file, with their signs: they may cancel, and `check` gives the worst
+    case. The data come from exact ranges; the image is formed where the errors move the point, in the scene's
     axes and rotated so that the smear lies in cross range, before and after autofocus, and rotated back.
     With --targets "0, 0; 40 m, -30 m, -6 dB; clutter -25 dB" there are two points in clutter, and one correction for
     both; levels are those of a pixel over a point of 0 dB. grid:5x5:40 is a grid about the scene centre, and a CSV
     file has the columns east [m], north [m], amplitude.
 
     FILE.cphd is the phase history for an image former of your own, as CPHD 1.1.0: the signal has the true ranges, its
-    vectors have the measured places. No image is formed then. It needs the extra `formats`.
+    vectors have the measured positions. No image is formed then. Needs the extra `formats`.
     """
     kind = suffix_of(plot, (".png", ".svg", ".pdf"))[1:]
     is_phase_history = suffix_of(output, (".npz", ".cphd")) == ".cphd"

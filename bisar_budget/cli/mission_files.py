@@ -69,7 +69,7 @@ def import_file(file: str, output: str | None, channel: str | None, force: bool)
 
     FILE is read as far as its header, its XML and the parameters of its pulses; XML alone is read too. The mission
     has the scene point, the band, the aperture by the dwell on that point, both platforms' paths, and the errors that
-    the file declares. What a mission has no key for stands in its comments. Needs the extra `formats`.
+    the file declares. Data without a key in the mission are written as comments. Needs the extra `formats`.
     """
     from bisar_budget.constants import SPEED_OF_LIGHT_MPS
     from bisar_budget.faults import MissionError
@@ -96,14 +96,14 @@ def import_file(file: str, output: str | None, channel: str | None, force: bool)
     away = {name: format_quantity(track.farthest, "m") for name, track in tracks.items()}
     for name, track in tracks.items():
         if track.farthest > track.state.slant_range / 100:
-            fail(f"{file}: a place of the {name} is {away[name]} from its path, more than a hundredth of its range")
+            fail(f"{file}: a {name} position is {away[name]} from its path, more than a hundredth of its range")
     farthest = max(track.farthest for track in tracks.values())
     if (
         collection.unused
         or farthest > SPEED_OF_LIGHT_MPS / collection.center_frequency / _WAVELENGTH_PER_VISIBLE_OFFSET
     ):
         doubts = [collection.unused] if collection.unused else []
-        doubts += [f"places of the {name} are up to {length} from its path" for name, length in away.items()]
+        doubts += [f"positions of the {name} are up to {length} from its path" for name, length in away.items()]
         complain(f"warning: {'; '.join(doubts)}; the comments say more")
     deliver(text, output, "yaml")
     if output not in (None, "-"):

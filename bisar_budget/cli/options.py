@@ -100,18 +100,18 @@ def set_option(effect: str) -> _Option:
         metavar="KEY=VALUE",
         callback=_read_changes,
         help=f"{effect}: KEY is its path in the file, such as platforms.receiver.azimuth or other_errors.0.name, "
-        "VALUE as the file would have it; null takes the key out. Repeatable; every report says it.",
+        "VALUE as in the file; null removes the key. Repeatable; every report states it.",
     )
 
 
-SET = set_option("Put a value in place of the mission's own, or beside it")
+SET = set_option("Replace a value of the mission, or add one")
 
 GATING_MODEL = click.Choice(GATING_MODELS)
 
 
 def model_option(variable: str | None = None) -> _Option:
     """The option `--model`, which a variable of the environment may replace."""
-    words = "Model that decides, instead of the mission file's."
+    words = "Model that decides, instead of that of the mission file."
     return click.option("--model", envvar=variable, type=GATING_MODEL, help=words)
 
 

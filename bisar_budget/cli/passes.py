@@ -54,7 +54,7 @@ _FORMAT_BY_SUFFIX = {".txt": "text", ".json": "json", ".csv": "csv", ".ics": "ic
     "--from",
     "start",
     metavar="DATE",
-    help="Day of UTC to begin with, or an instant such as 2026-07-01T05:30:00Z (default: the day of --date).",
+    help="First day, UTC, or an instant such as 2026-07-01T05:30:00Z (default: the day of --date).",
 )
 @click.option(
     "--days",
@@ -62,7 +62,7 @@ _FORMAT_BY_SUFFIX = {".txt": "text", ".json": "json", ".csv": "csv", ".ics": "ic
     default=3.0,
     show_default=True,
     metavar="N",
-    help=f"How many days to look at, up to {MAX_DAYS:g}.",
+    help=f"Number of days, up to {MAX_DAYS:g}.",
 )
 @click.option(
     "--min-elevation",
@@ -70,7 +70,7 @@ _FORMAT_BY_SUFFIX = {".txt": "text", ".json": "json", ".csv": "csv", ".ics": "ic
     default="20 deg",
     show_default=True,
     metavar="ANGLE",
-    help="Least elevation of the satellite, seen from the scene; of each, where both platforms have orbits.",
+    help="Least elevation of the satellite seen from the scene; of both satellites if both platforms have orbits.",
 )
 @click.option(
     "--squint",
@@ -118,7 +118,7 @@ def passes(
     The mission names an orbit of a platform and the scene's place on the Earth; its collection.center_time is
     that of each pass in turn. A pass that cannot be checked is listed with the reason. Exit code: 0 if the mission
     complies or is waived in some pass, 1 if in none, 2 for wrong usage, an unusable mission file or an orbit that is
-    not known at any time that was asked for.
+    not known at any time of the period.
     """
     if math.isnan(days):
         raise click.UsageError(f"--days: nan is no number of days; accepted: more than 0, up to {MAX_DAYS:g}.")

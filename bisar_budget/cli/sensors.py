@@ -31,14 +31,14 @@ _IN_A_FOLDER = "accepted: a folder with files that end in .yaml or .yml"
 @click.option("--check", "checking", is_flag=True, help="Check files of parts of your own, instead of a list.")
 @TEXT_OR_JSON
 def sensors(patterns: Sequence[str], kind: str | None, checking: bool, format_name: str) -> None:
-    """List parts of the catalogue, their figures and where these stand.
+    """List parts of the catalogue, their figures and the sources.
 
     PATTERN is a name, or a glob of names. A mission takes a part's figures by its name: `motion_error: {sensor:
     stim300}`, `oscillator: {sensor: sit5358}`. Parts of your own are YAML files of the same form: name the file, or
     folders of files in `[tool.bisar-budget] sensors` of pyproject.toml.
 
     With --check, FILE is the YAML file of a part, a folder of them, a glob pattern, or - for standard input. Each is
-    read as a mission reads it, and every fault is said. Exit code: 0 missions can use all of them, 2 one they cannot.
+    read as a mission reads it, and every fault is reported. Exit code: 0 if missions can use all parts, else 2.
     """
     if checking:
         if kind is not None:

@@ -53,15 +53,15 @@ if TYPE_CHECKING:
 @click.option(
     "--between",
     metavar="A..B",
-    help="Range to look at, with units (default: a tenth to ten times the file's value; of azimuths the circle).",
+    help="Range to search, with units (default: a tenth to ten times the stated value; for azimuths the circle).",
 )
-@click.option("--row", metavar="ID", help="The row that has to comply, instead of the whole mission.")
+@click.option("--row", metavar="ID", help="The row that must comply, instead of the whole mission.")
 @click.option(
     "--target",
     type=click.Choice(TARGETS),
     default=TARGETS[0],
     show_default=True,
-    help="What must not happen: fail, or also warn and what check --strict breaks on.",
+    help="Status to avoid: fail, or also warn and whatever fails check --strict.",
 )
 @MODEL
 @SET
@@ -85,11 +85,11 @@ def solve(
 ) -> None:
     """Find the values of a number at which a mission begins or ceases to comply.
 
-    Every such value of the range is found, what binds on both sides of it is named, and both sides are checked as
-    they are written. A pair of values closer than the places looked at is found only if the worst utilization turns
-    there. Of platforms.receiver.motion_error.sensor and the like every part of the catalogue is tried. Exit code: 0,
-    also where nothing complies and something is waived; 1 if no value of the range and no part complies or is waived,
-    or if the image refutes the limit (--verify); 2 for wrong usage or an unusable mission file.
+    Finds every such value of the range, names the binding row on both sides of it, and checks both sides as
+    they are written. Two values closer than the search step are found only if the worst utilization has an extremum
+    between them. For platforms.receiver.motion_error.sensor and the like every part of the catalogue is tried. Exit
+    code: 0, also if nothing complies but some value is waived; 1 if no value of the range and no part complies or is
+    waived, or if the image refutes the limit (--verify); 2 for wrong usage or an unusable mission file.
     """
     from bisar_budget.front import questions
     from bisar_budget.report.formats import answers
@@ -107,7 +107,7 @@ def solve(
 
 @click.command()
 @MISSIONS
-@click.option("--row", metavar="ID", help="A row to follow too; numbers are ordered by what they do to it.")
+@click.option("--row", metavar="ID", help="Also follow this row; numbers are sorted by their effect on it.")
 @MODEL
 @SET
 @DATE
@@ -124,13 +124,13 @@ def sensitivity(
     output: str | None,
     plot: str | None,
 ) -> None:
-    """Rank the numbers of a mission by what they do to its worst utilization.
+    """Rank the numbers of a mission by their effect on its worst utilization.
 
-    Each number that the file states, or takes from a part of the catalogue, is changed by itself and the mission
-    checked anew: by 1 % of it to both sides,
-    directions and levels by a quarter of what is said, a degree or a decibel, places on the Earth by 1 % of the
-    smaller slant range. With balanced shares a second table says what relaxing an error costs the others. Exit code:
-    0, or 2 for wrong usage or an unusable mission file.
+    Each number that the file states, or takes from a part of the catalogue, is changed alone and the mission
+    checked again: by 1 % to both sides, directions by a quarter of a degree and levels by a quarter of a decibel,
+    reported per degree and decibel, positions on the Earth by 1 % of the smaller slant range. With balanced shares a
+    second table shows the cost of relaxing an error for the others. Exit code: 0, or 2 for wrong usage or an unusable
+    mission file.
     """
     from bisar_budget.front import questions
     from bisar_budget.report.formats import answers

@@ -105,10 +105,10 @@ def sweep(
 ) -> None:
     """Check a mission for many values of its keys: a table with one line for each case.
 
-    It has what varied, resolutions, angles, the status, the worst row, its utilization, and the requirement that
-    binds. Cases for which there is no mission, such as a platform below the ground, have the status error and a
-    reason. CSV goes to standard output without -o and --plot. Statuses do not change the exit code, as long as some
-    case is judged: 0; 1 if none is; 2 for wrong usage or an unusable mission file.
+    Its columns are the varied keys, resolutions, angles, the status, the worst row, its utilization, and the binding
+    requirement. Cases without a valid mission, such as a platform below the ground, have the status error and a
+    reason. CSV goes to standard output without -o and --plot. Exit code: 0 if any case is judged, 1 if none is, 2 for
+    wrong usage or an unusable mission file.
     """
     suffix_of(None if output == "-" else output, (".csv", ".parquet", ".nc"))
     if plot == "-":

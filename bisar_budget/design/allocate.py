@@ -118,7 +118,7 @@ def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None,
             limits_in_words.append(f"{error.key} {error.ordered(least.allowable or 0.0)[1]}")
     listed = f": {'; '.join(limits_in_words)}" if limits_in_words else ""
     return (
-        "combine: each holds every error alone to its limit, and the single allowables are the answer"
+        "combine: each judges every error alone, so the allowables of the single errors are the answer"
         f"{listed}. accepted: combine: rss or sum, for specifications that hold together"
     )
 

@@ -526,7 +526,7 @@ def _head(imported: Imported) -> list[str]:
         "",
         "Slow time counts when a pulse is at the scene point, from the middle of the aperture there. A pulse leaves "
         "the transmitter before that by its light time, and reaches the receiver after it by its own: each path has "
-        "the places of its platform at its own time, over that slow time. Velocities differ from those over the "
+        "the positions of its platform at its own time, over that slow time. Velocities differ from those over the "
         "platform's own time by about 1 part in 100 000.",
         "Lengths are in metres of the scene's axes: x east, y north, z up of the scene point.",
     ]
@@ -546,7 +546,7 @@ def _fit(track: Fitted) -> str:
     if not track.samples:
         return "as the file states it, a straight path"
     distance = f"{track.farthest * 1e3:.3g} mm" if track.farthest < 1 else f"{track.farthest:.4g} m"
-    words = f"order {track.order} through {track.samples} places, at most {distance} from them"
+    words = f"order {track.order} through {track.samples} positions, at most {distance} from them"
     is_faster = track.order >= 4 and track.farthest >= 1e-3
     return f"{words}: what is left is faster than a mission states" if is_faster else words
 

@@ -398,7 +398,7 @@ def _product(mission: Mission, targets: Targets, remarks: list[str]) -> _Leaves:
         "mission": os.path.basename(printable(mission.file)),
         "mission SHA-256": hashlib.sha256(mission.data).hexdigest(),
         "signal": "exact ranges of the paths as flown",
-        "vectors": "places as measured: as flown, plus the declared errors",
+        "vectors": "positions as measured: as flown, plus the declared errors",
         "points": "; ".join(
             f"{target.east:.9g}, {target.north:.9g}, {target.level_db:.6g}" for target in targets.points
         ),

@@ -54,7 +54,7 @@ class _Pulses:
         if not self.unused:
             return ""
         count = self.sent.size + self.unused
-        return f"without a pulse, a time or a place, and not used: {self.unused} of {count} vectors"
+        return f"without a pulse, a time or a position, and not used: {self.unused} of {count} vectors"
 
 
 class _Aperture(NamedTuple):
@@ -159,7 +159,7 @@ def _pulses_of_cphd(container: Container, vectors: Records, parameters: Element)
     for positions in (transmitter, receiver, points):
         usable &= (np.abs(positions) < _MAX_RADIUS_M).all(axis=1)
     if not usable[reference]:
-        raise parameters.fault("is a vector without times or places", "RefVectorIndex")
+        raise parameters.fault("is a vector without times or positions", "RefVectorIndex")
     x, y, z = (float(value) for value in points[reference])
     pulses = _Pulses(
         sent[usable],

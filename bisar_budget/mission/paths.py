@@ -223,7 +223,7 @@ def _file_problem(file: str | None, error: PathFileError) -> Problem:
 def _required_axes(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
     """The axes of a scene on the Earth; raises `_UnusablePathError` if the scene has none."""
     if axes is None:
-        raise _UnusablePathError((key,), Problem("needs the scene's place on the Earth", _ACCEPTED_SCENE))
+        raise _UnusablePathError((key,), Problem("needs the scene's position on the Earth", _ACCEPTED_SCENE))
     return axes
 
 
@@ -440,7 +440,7 @@ def _log_path(
             hold_to_motion(times, log.places, fitted.stretch, route.file)
         except PathFileError:  # outside of the needed stretch, an impossible fix does not refuse the log
             fitted = smoothed(times, log.places, aperture_time)
-    words = log.words + {SMOOTHED: ", flown smooth by the processor", RAW: ", flown as it is by the processor"}.get(
+    words = log.words + {SMOOTHED: ", smoothed by the processor", RAW: ", used as it is by the processor"}.get(
         route.processed or "", ""
     )
     if log.start is None:
@@ -448,7 +448,7 @@ def _log_path(
     path = _flown(fitted, words, route.file, digest)
     path = path._replace(stated=tuple(_stated_of_log(log, around_aperture(times, aperture_time), route.file)))
     # A sigma is compared with the root mean square; the largest residual of thousands of fixes is four times that.
-    words = "residual of the smoothed log at places left out, root mean square"
+    words = "residual of the smoothed log at fixes left out, root mean square"
     return path._replace(
         doubt_m=fitted.missed,
         doubt_of=words,
@@ -567,14 +567,14 @@ def _of_position(platform: Platform, axes: earth.SceneAxes, aperture_time_s: flo
     speed, heading, climb = platform.speed or 0.0, platform.heading or 0.0, platform.climb or 0.0
     if not speed and not climb:
         return FlownPath(
-            PlatformState(position=axes.place(earth.earth_fixed(position)), velocity=STRAIGHT), "geodetic place"
+            PlatformState(position=axes.place(earth.earth_fixed(position)), velocity=STRAIGHT), "geodetic position"
         )
 
     def path() -> FlownPath:
         fitted = interpolated(
             lambda times: axes.places(earth.flown(position, heading, speed, climb, times)), aperture_time_s
         )
-        return _flown(fitted, "geodetic place, flight along the geodesic")
+        return _flown(fitted, "geodetic position, flight along the geodesic")
 
     key = (position, heading, speed, climb, axes, aperture_time_s)
     return _kept(_paths, _KEPT_PATH_COUNT, key, path)

@@ -137,7 +137,8 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
         error, position, _ = satellite.sgp4_tsince(elapsed / 60)
         if error or not all(math.isfinite(coordinate) for coordinate in position):
             raise PathFileError(
-                f"{elements.where}: SGP4 has no place of {elements.object} at {instant.as_text()}: {_failure(error)}"
+                f"{elements.where}: SGP4 has no position of {elements.object} at {instant.as_text()}: "
+                f"{_failure(error)}"
             )
         x, y, z = position
         return (1000 * x, 1000 * y, 1000 * z)
@@ -211,7 +212,7 @@ def orbit_of(
         smallest_km, largest_km = (_EPOCH_ERROR_KM + abs(days) * daily_km for daily_km in _DAILY_ERRORS_KM)
         return (
             f"{name}: the elements of {elements.object} are of {elements.epoch.as_text()}, {abs(days):.1f} days"
-            f" {'before' if days > 0 else 'after'} the aperture; SGP4 may place it {smallest_km:.0f} to "
+            f" {'before' if days > 0 else 'after'} the aperture; its position by SGP4 may be {smallest_km:.0f} to "
             f"{largest_km:.0f} km off",
         )
 

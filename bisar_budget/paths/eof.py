@@ -75,8 +75,8 @@ def read_eof(
         )
     if not error_ratio <= MAX_VELOCITY_ERROR_RATIO:
         raise PathFileError(
-            f"{name}:{lines[0]}: velocities are {100 * error_ratio:.2g} % off what the places do; they must be those"
-            " over the ground"
+            f"{name}:{lines[0]}: velocities are {100 * error_ratio:.2g} % off the motion of the positions; they must "
+            "be those over the ground"
         )
     kind, satellite = _text(file, "File_Type") or "EOF", shown(_text(file, "Mission") or "?")
     accuracy_m = _ACCURACIES_M.get(kind, 0.0)

@@ -169,7 +169,7 @@ class _Between:
         time = tai(instant)
         if not self.segment.is_useable(time):
             raise PathFileError(
-                f"{self.segment.where}: has no place at {instant.as_text()}; its useable time is"
+                f"{self.segment.where}: has no position at {instant.as_text()}; its useable time is"
                 f" {self.span[0].as_text()} to {self.span[1].as_text()}"
             )
         position = interpolate(self.segment.samples, time, self.interpolation.nodes, self.interpolation.is_hermite)
@@ -284,7 +284,7 @@ def _segment_at(segments: Sequence[Segment], name: str, center: Instant) -> Segm
         spans = [(utc(segment.first), utc(segment.last)) for segment in segments]
         span_words = ", ".join(f"{first.as_text()} to {last.as_text()}" for first, last in spans)
         raise PathFileError(
-            f"{name}: has no place at {center.as_text()}; its useable time is {cut(span_words)}", spans=spans
+            f"{name}: has no position at {center.as_text()}; its useable time is {cut(span_words)}", spans=spans
         )
     return max(useable, key=lambda segment: min(time.since(segment.first), segment.last.since(time)))
 

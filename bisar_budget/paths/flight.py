@@ -622,7 +622,7 @@ def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s:
     count = int((np.abs(times) <= half * (1 + 1e-9)).sum())
     if count < _SMOOTHING.min_fixes:
         raise PathFileError(
-            f"has {count} places around the aperture of {aperture_time_s:g} s, at least {_SMOOTHING.min_fixes} are "
+            f"has {count} fixes around the aperture of {aperture_time_s:g} s, at least {_SMOOTHING.min_fixes} are "
             "needed; keep more of the log"
         )
     fit, excess = _widened(
@@ -636,8 +636,8 @@ def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s:
     if farthest > _SMOOTHING.stray_ratio * median_distance + _SMOOTHING.min_stray_m:
         stray_time = float(times_used[distances.argmax()])
         doubts = (
-            f"a place of the log, {stray_time:+.4g} s from mid-aperture, is {farthest:.3g} m from the smooth path; "
-            f"half of the places are within {median_distance:.2g} m",
+            f"a fix of the log, {stray_time:+.4g} s from mid-aperture, is {farthest:.3g} m from the smooth path; "
+            f"half of the fixes are within {median_distance:.2g} m",
         )
     first = max(int(np.searchsorted(times_used, -aperture_time_s / 2)) - 1, 0)
     near_aperture = slice(first, int(np.searchsorted(times_used, aperture_time_s / 2, "right")) + 1)

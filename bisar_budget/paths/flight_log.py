@@ -234,7 +234,7 @@ def _hold_to_datum(lines: Sequence[str], name: str) -> None:
         match = _DATUM.match(line.strip())
         if match is not None and not is_wgs84(match[1]):
             raise PathFileError(
-                f"{name}:{number}: has places of the datum {shown(match[1])}",
+                f"{name}:{number}: has positions of the datum {shown(match[1])}",
                 "accepted: WGS-84 or ITRF",
             )
 
@@ -344,7 +344,7 @@ def _positions(table: _Table, header: _Header, records: LogRecords, keys: LogKey
             radius < _DEEPEST_M,
             lambda i: (
                 f"x, y, z are {radius[i] / 1e3:.4g} km from the Earth's centre; Earth-fixed coordinates are wanted, "
-                "places of the scene are named east, north, up"
+                "positions of the scene are named east, north, up"
             ),
         )
     return np.array(coordinates)
@@ -466,8 +466,8 @@ def _accuracy_columns(
         has_covariance |= meaning == CROSS_COVARIANCE
         if meaning == UNCLEAR:
             refuse(
-                f"{shown(column)} looks like an accuracy of the places, and is none that is read: name it as what it "
-                f"is, or leave it out where it is of something else; {ACCEPTED_ACCURACIES}"
+                f"{shown(column)} looks like an accuracy of the positions, but is not a known one: name it as what "
+                f"it is, or leave it out where it is of something else; {ACCEPTED_ACCURACIES}"
             )
         if meaning in (None, CROSS_COVARIANCE):
             continue
@@ -535,11 +535,11 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
         headings[column] = (index, unit)
     kinds = [kind for kind in _POSITION_COLUMNS if any(axis in headings for axis in kind)]
     if not kinds:
-        refuse("names no place; the first line names columns, like 'latitude [deg]', 'x [m]' or 'east [m]'")
+        refuse("names no position; the first line names columns, like 'latitude [deg]', 'x [m]' or 'east [m]'")
     if len(kinds) > 1:
         first_axis, second_axis = (next(axis for axis in kind if axis in headings) for kind in kinds[:2])
         listed = ", or ".join(", ".join(kind) for kind in _POSITION_COLUMNS)
-        refuse(f"mixes {first_axis} with {second_axis}; places are {listed}")
+        refuse(f"mixes {first_axis} with {second_axis}; positions are {listed}")
     kind = kinds[0]
     if kind == _GEODETIC and "altitude" in headings:
         if "height" in headings:
@@ -594,7 +594,7 @@ def _vendor_header(
             columns.setdefault(column.name, column._replace(cell_index=index))
     if "height" not in columns and "altitude" not in columns:
         raise PathFileError(
-            f"{where}: {vendor.words} has no height above the sea or the ellipsoid; one above take-off is no place"
+            f"{where}: {vendor.words} has no height above the sea or the ellipsoid; one above take-off is no position"
         )
     if "height" in columns:
         columns.pop("altitude", None)
@@ -669,7 +669,7 @@ def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
             is_any = True
             _read_rows([chunk[n] for n in kept], np.array(kept) + first + 1, header, name, rows)
     if not is_any:
-        raise PathFileError(f"{name}:{header.line}: has a header and no places")
+        raise PathFileError(f"{name}:{header.line}: has a header and no fixes")
     return rows
 
 

@@ -98,7 +98,7 @@ class LogRecords:
         elif lost > most_left_out(self._total):
             raise PathFileError(f"{name}: {lost} of {self._total} records are damaged, at most 1 % may be")
         if not count:
-            raise PathFileError(f"{name}: has no place")
+            raise PathFileError(f"{name}: has no fix")
 
     @property
     def first(self) -> int:
@@ -444,9 +444,9 @@ def usable_log(
     )
 
 
-def counted(number: int, noun: str = "place") -> str:
+def counted(number: int, noun: str = "fix") -> str:
     """A number with its noun."""
-    return f"{number} {noun}" + "s" * (number != 1)
+    return f"{number} {noun}" + ("" if number == 1 else "es" if noun.endswith("x") else "s")
 
 
 # ---------------------------------------------------------------------- logs that no platform can have flown
@@ -491,10 +491,10 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
     extent = float(np.linalg.norm(flown_positions - flown_positions[0], axis=1).max())
     if extent <= _MAX_STILL_EXTENT_M:
         raise PathFileError(
-            f"{name}: stands still: its {flown_times.size} places around the aperture are the same to "
+            f"{name}: stands still: its {flown_times.size} fixes around the aperture are the same to "
             f"{1e3 * _MAX_STILL_EXTENT_M:g} mm",
             "accepted: the log of a platform that moves",
-            "A fixed platform needs no log: give its place, and speed 0",
+            "A fixed platform needs no log: give its position, and speed 0",
         )
     _hold_to_new_fixes(flown_times, flown_positions, extent, name)
     neighbourhood = slice(max(first - _MEDIAN_MARGIN_SAMPLES, 0), last + _MEDIAN_MARGIN_SAMPLES)
@@ -513,11 +513,11 @@ def _hold_to_new_fixes(times: Floats, positions: Floats, extent: float, name: st
     missed = extent * float(durations[longest] / (times[-1] - times[0]))
     if missed > _MIN_FAULT_M:
         raise PathFileError(
-            f"{name}: repeats places: {int(is_repeated.sum())} of {times.size} around the aperture are the place "
+            f"{name}: repeats fixes: {int(is_repeated.sum())} of {times.size} around the aperture equal the fix "
             f"before; from {times[begins[longest]]:+.4g} s of mid-aperture on for {durations[longest]:.3g} s, in "
             f"which the platform moves {format_quantity(missed, 'm')}",
             f"accepted: repeats in which it moves at most {_MIN_FAULT_M:g} m",
-            "Leave out places that were not measured anew, or write more digits",
+            "Leave out repeated fixes, or write more digits",
         )
 
 
@@ -539,5 +539,5 @@ def _hold_to_small_steps(times: Floats, positions: Floats, half: float, name: st
             f"{name}: jumps by {jump} within {steps[worst]:.3g} s, {times[worst]:+.4g} s from mid-aperture; the "
             f"steps beside it allow {limit}",
             "accepted: the log of a flight without steps",
-            "Take out the places that are wrong, or smooth the log before",
+            "Remove the wrong fixes, or smooth the log before",
         )

@@ -234,7 +234,7 @@ class _Sentences:
                 if not datum.is_wgs84:
                     says = "says" if is_sound else "with a wrong checksum or none says"
                     raise PathFileError(
-                        f"{name}:{line}: DTM {says} that the places are of {datum.words}",
+                        f"{name}:{line}: DTM {says} that the positions are of {datum.words}",
                         "accepted: WGS-84, W84 without offsets",
                         "Let the receiver, or its converter, write WGS-84",
                     )
@@ -276,8 +276,8 @@ class _Sentences:
                 fixes[index] = fixes[index]._replace(quality=quality)
             return
         raise PathFileError(
-            f"{name}:{at_line}: GGA and GNS of the talker {talker} are {says}: places of two solutions",
-            f"accepted: GGA and GNS of the same places, to {format_quantity(_SAME_PLACE_M, 'm')}",
+            f"{name}:{at_line}: GGA and GNS of the talker {talker} are {says}: positions of two solutions",
+            f"accepted: GGA and GNS of the same positions, to {format_quantity(_SAME_PLACE_M, 'm')}",
             f"Leave out the sentences of one solution: {self._words(talker)}",
         )
 

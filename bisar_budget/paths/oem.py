@@ -258,8 +258,8 @@ def _interpolation(
     error_ratio = velocity_error(samples)
     if kind.upper() == "HERMITE" and not error_ratio <= MAX_VELOCITY_ERROR_RATIO:
         raise PathFileError(
-            f"{name}:{kind_line}: INTERPOLATION HERMITE needs the velocities of the places; those of the segment are"
-            f" {100 * error_ratio:.2g} % off what the places do"
+            f"{name}:{kind_line}: INTERPOLATION HERMITE needs the velocities of the positions; those of the segment "
+            f"are {100 * error_ratio:.2g} % off the motion of its positions"
         )
     is_hermite = kind.upper() == "HERMITE" or (not kind and error_ratio <= MAX_VELOCITY_ERROR_RATIO)
     if is_hermite:
@@ -267,7 +267,7 @@ def _interpolation(
     interpolation = Interpolation(is_hermite, degree)
     if len(samples) < interpolation.nodes:
         raise PathFileError(
-            f"{name}:{line}: the segment has {len(samples)} place{'s' * (len(samples) != 1)};"
+            f"{name}:{line}: the segment has {len(samples)} position{'s' * (len(samples) != 1)};"
             f" {'Hermite' if is_hermite else 'Lagrange'} of degree {degree} needs {interpolation.nodes}"
         )
     return interpolation

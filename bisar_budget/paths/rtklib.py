@@ -145,7 +145,7 @@ def _header(text: str, location: str) -> _Columns | None:
         return None
     if match[3].startswith("e-baseline"):
         raise PathFileError(
-            f"{location}: has baselines from a base station, no places",
+            f"{location}: has baselines from a base station, no positions",
             "accepted: latitude, longitude and height, or x, y, z of RTKLIB's options of the output",
         )
     indices: dict[str, int] = {}
@@ -228,7 +228,7 @@ def _hold_to_datum(datum_line: str, name: str) -> None:
     """Refuse fixes of another datum than WGS-84 or a frame of the ITRF, by the line of % that states the datum."""
     match = _DATUM_WORDS.search(datum_line)
     if match is not None and not is_wgs84(match[1]):
-        raise PathFileError(f"{name}: has places of the datum {shown(match[1])}", "accepted: WGS84")
+        raise PathFileError(f"{name}: has positions of the datum {shown(match[1])}", "accepted: WGS84")
 
 
 def _heights(heights: Floats, datum_line: str, keys: LogKeys, name: str) -> Floats:

@@ -228,11 +228,11 @@ def _satellites(
             break
         elif line.strip() and kind not in ("P", "V", "E", "/", "%"):
             header.broken[number] = (
-                f"{name}:{number}: must be an epoch, a place or a velocity (got {shown(line[:20])})"
+                f"{name}:{number}: must be an epoch, a position or a velocity (got {shown(line[:20])})"
             )
     count = max((len(satellite.samples) for satellite in satellites.values()), default=0) + len(header.broken)
     if len(header.broken) > most_left_out(count):
-        raise PathFileError(_first_of(header.broken), "accepted: 1 % of the places, and one of 20 or more")
+        raise PathFileError(_first_of(header.broken), "accepted: 1 % of the positions, and one of 20 or more")
     return satellites
 
 
@@ -247,7 +247,7 @@ def _epoch_after(line: str, last_epoch: Instant | None, system: str, location: s
 def _add_velocity(line: str, satellite: _Satellite, index: int, location: str) -> None:
     """Add the velocity of the next line to a sample."""
     if _satellite_of(line, location) != satellite.id:
-        raise PathFileError(f"{location}: the velocity is not of {satellite.id}, whose place is above it")
+        raise PathFileError(f"{location}: the velocity is not of {satellite.id}, whose position is above it")
     velocity = [speed / 10 for speed in _numbers(line, location, "dm/s")]
     if any(velocity):
         satellite.samples[index] = satellite.samples[index]._replace(velocity=(velocity[0], velocity[1], velocity[2]))
@@ -279,7 +279,7 @@ def _add_position(
         satellite.lines.pop()
         satellite.deviations.pop()
         satellite.breaks.add(len(satellite.samples))
-        raise PathFileError(f"{location}: {satellite_id} has two places at one epoch")
+        raise PathFileError(f"{location}: {satellite_id} has two positions at one epoch")
     satellite.samples.append(Sample(time, (1000 * x, 1000 * y, 1000 * z), (0.0, 0.0, 0.0)))
     satellite.lines.append(number)
     satellite.deviations.append(_deviations(line, header.base))
@@ -342,7 +342,7 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
         for n in range(1, len(samples))
         if n in satellite.breaks or samples[n].time.since(samples[n - 1].time) > _MAX_SAMPLE_GAP_RATIO * usual_step
     ]
-    lines = f"{header.nameless} place{'s' * (header.nameless > 1)}"
+    lines = f"{header.nameless} position{'s' * (header.nameless > 1)}"
     nameless = f", {lines} without a satellite's name left out" if header.nameless else ""
     if header.broken:
         listed = ", ".join(map(str, sorted(header.broken)[:_NAMED_LINES])) + ", …" * (
@@ -370,7 +370,9 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
             + (f", {interpolation.words}" if interpolation else ""),
             interpolation=interpolation,
             accuracy=partial(_stated, satellite, range(first, last)),
-            remarks=(f"{name}: places of {satellite.id} around the aperture are predicted",) if is_predicted else (),
+            remarks=(f"{name}: positions of {satellite.id} around the aperture are predicted",)
+            if is_predicted
+            else (),
         )
 
 

@@ -126,7 +126,7 @@ def read_ulog(data: bytes, name: str, keys: LogKeys) -> Log:
         gps = max((topic for topic in gps_topics if topic.instance == chosen), key=_count)
     if gps is None:
         raise PathFileError(
-            f"{name}: has no place",
+            f"{name}: has no position",
             f"accepted: a ULog with the topic {', '.join(_GPS_TOPICS)} (with a fix) or {_GLOBAL_TOPIC}",
         )
     return _of_gps(gps, keys, name)

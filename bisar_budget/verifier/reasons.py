@@ -47,7 +47,7 @@ def displacement_degenerates(why: str) -> str:
 @phrase
 def errors_move_nothing(rule: str) -> str:
     """Said of the location requirement."""
-    return f"the declared errors move nothing by {rule}"
+    return f"by {rule} the declared errors do not displace the image"
 
 
 @phrase
@@ -71,37 +71,37 @@ def no_quadratic_phase_declared() -> str:
 @phrase
 def root_sum_square_is_of_many_flights() -> str:
     """Said of a root-sum-square."""
-    return "a root-sum-square speaks of many flights, an image shows one"
+    return "a root-sum-square describes many flights, an image shows one"
 
 
 @phrase
 def phase_without_motion() -> str:
     """Said of an error that is stated as a phase."""
-    return "stated as a phase: there is no motion to form an image of"
+    return "stated as a phase: there is no motion to simulate"
 
 
 @phrase
 def stated_by_its_effect() -> str:
     """Said of an error from elsewhere that is stated by what it does."""
-    return "stated by its effect: there is nothing to form an image of"
+    return "stated by its effect: there is no motion to simulate"
 
 
 @phrase
 def images_are_of_the_centre() -> str:
     """Said of the row of the scene's edge."""
-    return "the difference of two places of the scene: images are formed of its centre"
+    return "a difference between two points of the scene: images are formed at its centre"
 
 
 @phrase
 def no_spread_declared() -> str:
     """Said of an ISLR row."""
-    return "nothing that spreads is declared"
+    return "no declared error adds to the ISLR"
 
 
 @phrase
 def no_tone_declared() -> str:
     """Said of the requirement of PSLR."""
-    return "nothing that echoes is declared"
+    return "no declared error makes paired echoes"
 
 
 @phrase
@@ -155,7 +155,7 @@ def rule_misplaces(who: str, rule: str, by_rule: Sequence[float], is_at: Sequenc
     """Said of the errors that a rule places farthest from where they go. [m]"""
     return (
         f"{who}: {_placed(by_rule)} by {rule}, {_placed(is_at)} by exact ranges and image: "
-        f"{rule} does not say where the image goes"
+        f"{rule} does not predict the displacement"
     )
 
 
@@ -221,7 +221,7 @@ def draws_decide(draws: int, low: float, high: float) -> str:
 @phrase
 def draws_do_not_decide(draws: int, low: float, high: float) -> str:
     """Said of noise so near the border of two verdicts that as many draws as are made do not tell them apart. [dB]"""
-    return f"{low:.2f} to {high:.2f} dB at 95 %, by {draws} draws, which is too near the border of two verdicts"
+    return f"{low:.2f} to {high:.2f} dB at 95 %, by {draws} draws: too near the border between two verdicts"
 
 
 # ---------------------------------------------------------------------- autofocus

@@ -664,4 +664,7 @@ def test_a_leg_along_the_ground_has_no_allowable() -> None:
         found = findings(platforms__receiver=receiver, propagation={"zenith_electron_content": "1 TECU"})
         one = row(found, "propagation.receiver.zenith_delay")
         assert (one.status, one.allowable) == ("not_declared", None)
-        assert one.reason == "the leg of the receiver runs along the ground: no delay follows from that of the zenith"
+        assert (
+            one.reason
+            == "the leg of the receiver runs along the ground: the delay at the zenith does not give its delay"
+        )

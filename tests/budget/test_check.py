@@ -632,7 +632,7 @@ def test_a_vertical_velocity_error_is_judged_by_its_worse_sign() -> None:
     assert not full.notes
     published = row(findings(platforms=platforms), "receiver.velocity.z")
     assert published.status == "warn"
-    assert published.reason.startswith("the full model says fail: QPE 0.77")
+    assert published.reason.startswith("fails by the full model: QPE 0.77")
 
 
 class TestTheStricterOfBothModels:
@@ -674,7 +674,7 @@ class TestTheStricterOfBothModels:
         changes["requirements__location_error"] = factor * moved[other]
         found = row(findings(**changes, allocation__model=gating), "mission.location_error")
         assert found.status == status
-        assert (found.reason or "").startswith(f"the {other} model says fail: ") == (status == "warn")
+        assert (found.reason or "").startswith(f"fails by the {other} model: ") == (status == "warn")
 
     @pytest.mark.parametrize(("factor", "status"), [(0.99, "warn"), (1.01, "pass")])
     def test_pull_in_that_only_the_full_model_exceeds_is_a_warning(self, factor: float, status: str) -> None:
@@ -683,14 +683,14 @@ class TestTheStricterOfBothModels:
         changes = {"platforms": self.PLATFORMS, "collection": {"aperture_time": 5}}
         found = row(findings(**changes, autofocus__n_pull=factor * known / math.pi), "mission.autofocus_pull_in")
         assert (found.status, found.declared) == (status, 0)
-        assert (found.reason or "").startswith("the full model says beyond it: QPE ") == (status == "warn")
+        assert (found.reason or "").startswith("beyond it by the full model: QPE ") == (status == "warn")
 
     def test_cubic_phase_that_only_the_full_model_knows_is_a_warning(self) -> None:
         known = row(self.found("full"), "mission.cubic_phase_error").declared
         limit = known / 1.4
         published = row(self.found("published", cubic_phase_error=limit), "mission.cubic_phase_error")
         assert (published.status, published.declared) == ("warn", 0)
-        assert "full model says fail" in published.reason
+        assert "fails by the full model" in published.reason
         assert row(self.found("full", cubic_phase_error=limit), "mission.cubic_phase_error").status == "fail"
         assert row(self.found("full", cubic_phase_error=1.1 * known), "mission.cubic_phase_error").status != "fail"
 

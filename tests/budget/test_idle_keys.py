@@ -14,7 +14,7 @@ SHAKEN = {"vibration": {"sinusoidal": [{"amplitude": "1 um", "frequency": "20 Hz
 HOLDOVER = {"synchronization": {"method": "holdover", "age": "60 s", "averaging": "10 s"}}
 BOTH = {f"platforms__{name}__oscillator": {"power_law": {"h0": 1e-26}} for name in ("transmitter", "receiver")}
 
-SHAKES, TURNS = "vibration and turns act on it", "it turns orbits"
+SHAKES, TURNS = "vibration and turns act on it", "no platform has an orbit"
 
 
 @pytest.mark.parametrize(

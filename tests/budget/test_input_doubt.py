@@ -71,7 +71,7 @@ class TestALog:
             assert one.status == "not_evaluated"
             assert one.reason == (
                 f"the path may be {format_quantity(doubt.doubt, 'm')} off (residual of the smoothed log at "
-                "places left out, root mean square), 86.6 mm is declared: state it in "
+                "fixes left out, root mean square), but 86.6 mm is declared: declare the error in "
                 "platforms.receiver.motion_error.position"
             )
         assert row(found, "receiver.velocity.x").status != "not_evaluated"
@@ -145,7 +145,7 @@ class TestALog:
         found = check_mission(logged(tmp_path, geodetic_csv(flown._replace(height=height)), position="1 mm"), TODAY)
         assert found.status == "not_evaluated"
         (warning,) = [one.message for one in found.warnings if one.is_doubt]
-        assert "a place of the log, -0.2 s from mid-aperture, is" in warning
+        assert "a fix of the log, -0.2 s from mid-aperture, is" in warning
 
     def test_a_row_that_fails_stays_so_and_a_waiver_is_for_one_that_is_named(self, tmp_path: Path) -> None:
         logged(tmp_path, noisy(30.0), position=["1 cm", "5 m", "1 cm"])

@@ -106,7 +106,7 @@ class TestWhatIsSaid:
         published, full = (format_limit(size, "m/s") for size in (one.allowable_published, one.allowable_full))
         assert published != full
         assert found.model_doubt == (
-            f"the published model does not hold here: it allows receiver.velocity.x {published}, "
+            f"the published model does not hold here: for receiver.velocity.x it allows {published}, "
             f"the full model {full}"
         )
         assert found.model_doubt.values == (one.id, one.allowable_published, one.allowable_full, "m/s", 0)
@@ -116,11 +116,11 @@ class TestWhatIsSaid:
         found = findings(platforms__receiver__motion_error__position=["20 m", "1 mm", 0])
         limits = [row(found, f"receiver.position.{axis}").allowable_full for axis in "xy"]
         assert None not in limits
-        assert found.model_doubt.startswith("the published model does not hold here: it allows receiver.position.x")
+        assert found.model_doubt.startswith("the published model does not hold here: for receiver.position.x")
         assert "without limit, the full model" in found.model_doubt
-        assert found.model_doubt.endswith("; 1 other declared error is over 5 % apart too")
+        assert found.model_doubt.endswith("; for 1 other declared error the models differ by more than 5 % too")
         found = findings(platforms__receiver__motion_error__position=["20 m", "1 mm", "1 mm"])
-        assert found.model_doubt.endswith("; 2 other declared errors are over 5 % apart too")
+        assert found.model_doubt.endswith("; for 2 other declared errors the models differ by more than 5 % too")
 
     @pytest.mark.parametrize("family", FAMILIES)
     def test_it_is_an_independent_count(self, family: str) -> None:
@@ -141,7 +141,7 @@ class TestWhatIsSaid:
 
 
 class TestShown:
-    SAID = "the published model does not hold here: it allows receiver.position.x without limit, the full model"
+    SAID = "the published model does not hold here: for receiver.position.x it allows without limit, the full model"
 
     @staticmethod
     def text(found: MissionFindings, name: str) -> str:

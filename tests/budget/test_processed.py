@@ -92,7 +92,7 @@ class TestTheResidual:
         found = check_mission(mission, TODAY)
         assert found.status == "pass"
         assert RESIDUAL not in {one.id for one in found.rows}
-        assert "flown smooth by the processor" in mission.platforms.receiver.path.source
+        assert "smoothed by the processor" in mission.platforms.receiver.path.source
 
     @pytest.mark.parametrize(("islr", "status"), [("-9 dB", "pass"), ("-14 dB", "fail")])
     def test_raw_fixes_spread(self, tmp_path: Path, islr: str, status: str) -> None:

@@ -231,7 +231,8 @@ class TestBandwidth:
         (note,) = (note for note in self.row_of(bandwidth="1 kHz").notes if note.code == "mask-is-cut")
         rms = math.sqrt(self.power(1e3, 1e6))
         assert (
-            note == f"phase noise counts to `bandwidth`, 1 kHz; the mask goes to 1 MHz, with {rms:.3g} rad rms beyond"
+            note
+            == f"phase noise counts up to `bandwidth`, 1 kHz; the mask extends to 1 MHz, with {rms:.3g} rad rms above"
         )
 
     def test_a_band_that_ends_below_the_mask_has_what_continues_it(self) -> None:
@@ -397,7 +398,7 @@ class TestPowers:
         assert one.islr_db == pytest.approx(shown_db(sigma**2), abs=1e-5)
         assert whole.allowable == pytest.approx(-20, abs=1e-12)
         if status == "warn":
-            assert "the full model says fail: -23.5 dB allowed" in one.reason
+            assert "fails by the full model: -23.5 dB allowed" in one.reason
         taylor = with_error(
             walk, allocation={"model": "published"}, requirements=qpe, simulation={"window": "taylor"}
         )

@@ -74,7 +74,7 @@ def test_a_requirement_without_anything_that_bears_on_it_is_not_evaluated(key: s
     }
     found = check(**changes)
     assert requirement(found, key).status == "not_evaluated"
-    assert "nothing declared that" in str(requirement(found, key).reason)
+    assert "no declared error " in str(requirement(found, key).reason)
     assert requirement(found, "quadratic_phase_error").status == "pass"
     assert (found.status, code(found)) == ("not_evaluated", 1)
 
@@ -294,7 +294,7 @@ def test_a_row_that_fails_says_each_effect_that_nothing_judges(combine: str) -> 
     assert ("QPE" in str(noisy.reason)) == (combine == "each")
     cubic, spread = (one.text for one in unjudged_effects(found))
     assert cubic.startswith("cubic phase of ")
-    assert "rad rms of phase that spreads" in spread
+    assert "rad rms that adds to the ISLR" in spread
     assert requirement(found, "quadratic_phase_error").status == "fail"
 
 

@@ -71,7 +71,7 @@ class TestACovarianceOfAnEphemeris:
             assert one.status == "not_evaluated"
             assert one.reason == (
                 "a.oem, covariance of 2026-06-01T05:19:30.000Z: a position error of 10 km (radial, in-track, "
-                "cross-track) is stated, 1 m is declared: state at least that in "
+                "cross-track) is stated, but 1 m is declared: declare at least that in "
                 "platforms.transmitter.motion_error.position"
             )
         assert statuses(found, "receiver") == {"not_declared"}
@@ -87,7 +87,7 @@ class TestACovarianceOfAnEphemeris:
         assert stated["source"] == "a.oem, covariance of 2026-06-01T05:19:30.000Z"
         assert stated["position_m"] == pytest.approx([1, 1, 1])
         assert path["doubt_m"] == pytest.approx(3**0.5)
-        assert any("stands in place of [1 m, 1 m, 1 m] of a.oem" in note for note in found.notes)
+        assert any("replaces [1 m, 1 m, 1 m] of a.oem" in note for note in found.notes)
 
     @pytest.mark.parametrize(
         ("declared", "is_enough"),

@@ -99,9 +99,9 @@ def test_the_reason_says_what_stays_what_it_would_make_and_what_to_add() -> None
     assert reason.values[3] == pytest.approx(level, abs=1e-3)
     assert reason.values[4] == pytest.approx(use, rel=1e-3)
     assert str(reason) == (
-        "without correlation_time the delays of propagation stay over 80 s, and say nothing of air that changes: in "
-        f"10 min it would spread {level:.1f} dB, {100 * use:.3g} % of what is allowed: add "
-        "propagation.correlation_time, 1e9 s for a delay that stays"
+        "without correlation_time the delays of propagation are constant over 80 s; with a correlation time of 10 "
+        f"min they would add an ISLR of {level:.1f} dB, {100 * use:.3g} % of what is allowed: add "
+        "propagation.correlation_time, 1e9 s for a constant delay"
     ).replace("-18.0 dB", "-18 dB")
 
 
@@ -182,7 +182,7 @@ def test_only_legs_that_lack_it_count(air: dict[str, object], is_open: bool) -> 
         reason = str(requirement(found, "islr").reason)
         own = "receiver" in air and "transmitter" in air
         assert ("add propagation.receiver.correlation_time" in reason) == own
-        assert "1e9 s for a delay that stays" in reason
+        assert "1e9 s for a constant delay" in reason
 
 
 def test_of_one_air_amplitudes_add() -> None:
@@ -225,7 +225,7 @@ def test_without_a_requirement_on_islr_there_is_nothing_of_it() -> None:
         assert statuses(found) == dict.fromkeys(needs, "pass")
     reason = row(found, "propagation.zenith_delay").reason
     assert reason.code == "air-stays-untaken"
-    assert "add propagation.correlation_time, 1e9 s for a delay that stays, or `islr: -20 dB` to requ" in str(reason)
+    assert "add propagation.correlation_time, 1e9 s for a constant delay, or `islr: -20 dB` to requ" in str(reason)
     assert findings(of_delay(5e-3, **STAYS), requirements=needs).status == "pass"
 
 
@@ -291,7 +291,7 @@ def test_solve_finds_the_tenth_and_allocate_orders_below_it(run: Callable, tmp_p
 def test_an_explanation_has_the_numbers() -> None:
     found = findings(of_delay(5e-3))
     text = explain(found.mission, found, "mission.islr")
-    assert "as if they changed in 600 s" in text
+    assert "if their correlation time were 600 s" in text
 
 
 @examples(25)

@@ -34,7 +34,7 @@ class TestSheet:
         found = run("allocate", mission)
         assert found.exit_code == 0
         lines = found.stdout.splitlines()
-        assert lines[0] == "7 specifications that meet every requirement together: check says pass"
+        assert lines[0] == "7 specifications that together meet every requirement; result of check: pass"
         assert all(len(line) <= 80 for line in lines)
         assert any(line.startswith("location error") for line in lines)
 
@@ -178,7 +178,7 @@ class TestOffer:
         offer.write_text(offer.read_text().replace("20 mm/s", "900 mm/s"))
         found = run("allocate", mission, "--compare", offer)
         assert found.exit_code == 1
-        assert "the mission as a whole says FAIL" in found.stdout
+        assert "result of check FAIL" in found.stdout
 
     def test_a_figure_that_the_offer_does_not_state_is_outside(self, run, mission, tmp_path) -> None:
         silent = tmp_path / "silent.yaml"
@@ -233,7 +233,7 @@ class TestOffer:
         (["--for", f"{KEY}s"], 2, f"Did you mean '{KEY}'"),
         (["--reserve", "100"], 2, "--reserve"),
         (["--reserve", "nan"], 2, "--reserve: nan is no part of a limit"),
-        (["--set", "allocation.combine=each"], 2, "the single allowables are the answer"),
+        (["--set", "allocation.combine=each"], 2, "the allowables of the single errors are the answer"),
         (["--set", "scene.height_error=500 m"], 1, "other errors leave no room"),
         (["--compare", "nowhere.yaml"], 2, "nowhere.yaml"),
     ],

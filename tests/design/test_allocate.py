@@ -195,7 +195,7 @@ def test_an_effect_that_no_requirement_takes_stays_negligible() -> None:
 def test_each_error_alone_needs_no_sheet() -> None:
     given = mission(allocation__combine="each")
     with pytest.raises(
-        QuestionError, match=r"the single allowables are the answer: .*receiver\.motion_error\.velocity"
+        QuestionError, match=r"the allowables of the single errors are the answer: .*receiver\.motion_error\.velocity"
     ):
         allocate(given, today=DAY)
 

@@ -362,7 +362,7 @@ def test_balanced_shares_say_what_an_error_costs_the_others() -> None:
 def test_the_table_of_shares_is_shown_for_balanced_missions_alone(run: Callable) -> None:
     file = str(MISSIONS / "drones_same_gnss.yaml")
     balanced = run("sensitivity", file, "--set", "allocation.split=balanced")
-    assert "Shares are balanced. What an error that is doubled costs the others:" in balanced.stdout
+    assert "Shares are balanced. Cost of doubling an error for the other errors:" in balanced.stdout
     assert "66.2/33.8" in balanced.stdout
     assert "balanced" not in run("sensitivity", file).stdout
 

@@ -99,7 +99,7 @@ def test_an_aggregate_names_the_spur_that_makes_most_of_it(level: float, is_most
     reason = str(found["receiver.quadratic_phase_error"].reason)
     assert ("mostly its spur at 50.2 Hz, which exchanges fold" in reason) is is_most
     assert ("the mask begins at 1 Hz" in reason) is not is_most
-    assert any("a level does not shift them" in note for note in found["receiver.oscillator"].notes)
+    assert any("`level` does not shift them" in note for note in found["receiver.oscillator"].notes)
 
 
 def test_what_is_folded_on_the_mainlobe_is_no_echo() -> None:
@@ -208,7 +208,7 @@ def test_an_echo_beside_the_mainlobe_says_where_exchanges_fold_it_to() -> None:
     """It named 1.2 cycles of a spur of 50.3 Hz, and not why."""
     quiet = spur(50.3, level=LEVEL - 20), spur(0.3, level=LEVEL - 20).partition("synchronization")[0]
     reason, free = (str(bb.check(bb.loads(text))["receiver.oscillator.spur.0"].reason) for text in quiet)
-    assert reason.startswith("straight lines between exchanges fold it to 0.3 Hz; 1.2 cycles per aperture: below 3 ")
+    assert reason.startswith("interpolation between exchanges folds it to 0.3 Hz; 1.2 cycles per aperture: below 3 ")
     assert free.startswith("1.2 cycles per aperture: below 3 ")
 
 

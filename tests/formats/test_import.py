@@ -189,14 +189,14 @@ def test_another_channel_and_vectors_without_a_pulse(run, tmp_path) -> None:
     for tau in (-0.3, 0.0, 0.3):
         assert math.dist(first.transmitter.state.at(tau)[0], other.transmitter.state.at(tau)[0]) < 30e-6
     # How many are not used was not said.
-    unused = f"ithout a pulse, a time or a place, and not used: {len(pvps[::7])} of {len(pvps)} vectors"
+    unused = f"ithout a pulse, a time or a position, and not used: {len(pvps[::7])} of {len(pvps)} vectors"
     assert "vectors" not in run("import", path).stderr
     said = run("import", path, "--channel", "2")
     assert said.exit_code == 0
     assert f"# W{unused}." in said.stdout
     (line,) = said.stderr.splitlines()
-    assert line.startswith(f"warning: w{unused}; places of the transmitter are up to ")
-    assert "; places of the receiver are up to " in line
+    assert line.startswith(f"warning: w{unused}; positions of the transmitter are up to ")
+    assert "; positions of the receiver are up to " in line
 
 
 def test_a_moving_reference_surface_of_constant_height(tmp_path) -> None:
@@ -474,7 +474,7 @@ def test_crsd(tmp_path) -> None:
         writer.write_pvp("the channel", pvps)
         writer.write_ppp("the sequence", ppps)
     lacking = import_collection(str(path))
-    assert lacking.unused == f"without a pulse, a time or a place, and not used: 3 of {count} vectors"
+    assert lacking.unused == f"without a pulse, a time or a position, and not used: 3 of {count} vectors"
     assert lacking.transmitter.state.position == pytest.approx(found.transmitter.state.position, abs=1e-4)
     assert lacking.reference.receiver_range == pytest.approx(found.reference.receiver_range, abs=1e-4)
     assert found.channel == "the channel"
@@ -618,7 +618,7 @@ def test_a_vector_that_is_elsewhere_is_said_or_refused(run, tmp_path, off, exit_
     assert found.exit_code == exit_code, found.stderr
     assert (tmp_path / "mission.yaml").exists() is (exit_code == 0)
     said = (
-        "warning: places of the transmitter are" if exit_code == 0 else "a place of the transmitter is 49612 km from"
+        "warning: positions of the transmitter are" if exit_code == 0 else "a transmitter position is 49612 km from"
     )
     assert said in found.stderr
 
@@ -631,7 +631,7 @@ def test_a_place_beyond_the_moon_is_none(run, tmp_path, place) -> None:
     pulses["TxPos"][50, 0] = place
     found = run("import", written(tmp_path / "a.cphd", tree, pulses))
     assert found.exit_code == 0
-    assert "without a pulse, a time or a place, and not used: 1 of 201 vectors" in found.stderr
+    assert "without a pulse, a time or a position, and not used: 1 of 201 vectors" in found.stderr
 
 
 @pytest.mark.parametrize("value", ["1e308", "1e200", "-1e308"])

@@ -114,7 +114,7 @@ def test_a_mask_that_does_not_rise_is_said_to_be_sorted(is_sorted: bool) -> None
     mask = ", ".join(points if is_sorted else reversed(points))
     text = receiver(f"oscillator: {{frequency: 10 MHz, phase_noise: {{{mask}}}}}")
     noise = next(one.noise for one in Analysis(parse_mission(text)).random if one.subject.kind == "oscillator")
-    assert ["in another order" in str(note) for note in noise.notes] == [True] * (not is_sorted)
+    assert ["not in rising order" in str(note) for note in noise.notes] == [True] * (not is_sorted)
 
 
 def test_a_mask_that_ends_below_its_bandwidth_says_so() -> None:
@@ -122,7 +122,7 @@ def test_a_mask_that_ends_below_its_bandwidth_says_so() -> None:
     for bandwidth, is_said in (("1 kHz", False), ("1.001 kHz", True)):
         text = receiver(f"oscillator: {{frequency: 10 MHz, {mask}, bandwidth: {bandwidth}}}")
         noise = next(one.noise for one in Analysis(parse_mission(text)).random if one.subject.kind == "oscillator")
-        assert ["nothing is stated" in str(note) for note in noise.notes] == [True] * is_said
+        assert ["none is stated" in str(note) for note in noise.notes] == [True] * is_said
 
 
 @pytest.mark.parametrize(
@@ -265,21 +265,21 @@ class TestCatalogue:
         )
         found = check_mission(parse_mission(text), TODAY)
         at, gnss, imu = "platforms.receiver.motion_error", "Septentrio mosaic-X5, DGNSS", _name("stim300")
-        of_velocity = f"{at}.velocity stands in place of 0.03 m/s of {gnss}"
-        of_gyro = f"{at}.imu.gyro_bias stands in place of 0.5 deg/h of {imu}"
-        noted = {row.id: row.remarks for row in found.rows if any("in place of" in one for one in row.remarks)}
+        of_velocity = f"{at}.velocity replaces 0.03 m/s of {gnss}"
+        of_gyro = f"{at}.imu.gyro_bias replaces 0.5 deg/h of {imu}"
+        noted = {row.id: row.remarks for row in found.rows if any("replaces" in one for one in row.remarks)}
         assert noted.keys() == {*(f"receiver.velocity.{axis}" for axis in "xyz"), "receiver.imu.gyro_bias"}
         assert all((of_velocity in noted[one]) == (one != "receiver.imu.gyro_bias") for one in noted)
         assert of_gyro in noted["receiver.imu.gyro_bias"]
         assert {of_velocity, of_gyro} <= set(found.notes)
         for name in ("html", "markdown", "json"):
             said = html.unescape(render(name, Report("", (found,)), Style())).replace("\\", "").replace("<wbr>", "")
-            assert "in place of 0.03 m/s of" in said, name
-            assert "in place of 0.5 deg/h of" in said, name
+            assert "replaces 0.03 m/s of" in said, name
+            assert "replaces 0.5 deg/h of" in said, name
 
     def test_without_a_key_beside_it_a_part_is_overridden_by_nothing(self) -> None:
         found = check_mission(parse_mission(receiver("motion_error: {sensor: [stim300, mosaic-x5-rtk]}")), TODAY)
-        assert not [note for note in found.notes if "in place of" in note]
+        assert not [note for note in found.notes if "replaces" in note]
 
     def test_a_covariance_says_what_it_replaces_of_a_part_and_leaves_the_rest(self, tmp_path) -> None:
         """It used to drop the position and the velocity of a GNSS receiver without a word."""
@@ -296,8 +296,8 @@ class TestCatalogue:
         found = check_mission(mission, TODAY)
         key = "platforms.receiver.motion_error.covariance"
         said = {
-            "position": f"{key} stands in place of 2 cm of Ours",
-            "velocity": f"{key} stands in place of [1 cm/s, 1 cm/s, 2 cm/s] of Ours",
+            "position": f"{key} replaces 2 cm of Ours",
+            "velocity": f"{key} replaces [1 cm/s, 1 cm/s, 2 cm/s] of Ours",
         }
         for kind, words in said.items():
             assert all(words in row.remarks for row in found.rows if row.id.startswith(f"receiver.{kind}."))
@@ -324,7 +324,7 @@ class TestCatalogue:
         (row,) = (row for row in found.rows if row.subject.kind == "random")
         assert row.id == "receiver.random.noise"
         (said,) = row.remarks
-        assert "motion_error.random stands in place of [name: multipath, sigma: 1 mm" in said
+        assert "motion_error.random replaces [name: multipath, sigma: 1 mm" in said
 
     @pytest.mark.parametrize(
         ("text", "said"),
@@ -352,13 +352,13 @@ class TestCatalogue:
     def test_what_is_replaced_of_an_oscillator_is_said(self) -> None:
         text = "oscillator: {sensor: wenzel-5mhz, frequency: 10 MHz, spurs: {50 Hz: -90 dBc}}"
         found = check_mission(parse_mission(receiver(text)), TODAY)
-        said = f"platforms.receiver.oscillator.frequency stands in place of 5 MHz of {_name('wenzel-5mhz')}"
+        said = f"platforms.receiver.oscillator.frequency replaces 5 MHz of {_name('wenzel-5mhz')}"
         for row_id in ("receiver.oscillator", "receiver.oscillator.spur.0"):
             assert [said in row.remarks for row in found.rows if row.id == row_id] == [True]
         text = "oscillator: {sensor: wenzel-5mhz, allan_deviation: {1 s: 1e-12}}"
         found = check_mission(parse_mission(receiver(text)), TODAY)
-        (noise,) = (note for note in found.notes if "in place of" in note)
-        assert "oscillator.allan_deviation stands in place of power_law h-1: 1.268e-26" in noise
+        (noise,) = (note for note in found.notes if "replaces" in note)
+        assert "oscillator.allan_deviation replaces power_law h-1: 1.268e-26" in noise
 
     @pytest.mark.parametrize(
         ("noise", "said"),
@@ -371,14 +371,14 @@ class TestCatalogue:
     def test_the_frequency_at_which_a_mask_beside_a_part_holds_is_said(self, noise: str, said: bool) -> None:
         """The file's mask was taken at the frequency of the part, and nothing said so."""
         found = check_mission(parse_mission(receiver(f"oscillator: {{sensor: wenzel-5mhz, {noise}}}")), TODAY)
-        warned = f"states no frequency, and is taken at 5 MHz, that of {_name('wenzel-5mhz')}"
+        warned = f"states no frequency, and is assumed at 5 MHz, that of {_name('wenzel-5mhz')}"
         sentences = [*(one.message for one in found.warnings), *(str(one.reason) for one in found.rows)]
         assert any(warned in sentence for sentence in sentences) is said
 
     def test_a_frequency_replaces_nothing_where_noise_is_the_same_at_any(self) -> None:
         text = "oscillator: {sensor: wenzel-5mhz, frequency: 10 MHz}"
         found = check_mission(parse_mission(receiver(text)), TODAY)
-        assert not [note for note in found.notes if "in place of" in note]
+        assert not [note for note in found.notes if "replaces" in note]
 
     def test_own_parts_stand_in_a_folder_of_the_project_or_anywhere(self, tmp_path, monkeypatch) -> None:
         monkeypatch.chdir(tmp_path)

@@ -92,7 +92,7 @@ class TestSolutionsSayTheirErrors:
     def test_what_the_mission_states_is_noted_beside_them(self, tmp_path: Path) -> None:
         (tmp_path / "a.pos").write_bytes(solution(FLOWN))
         found = checked(tmp_path, {"file": "a.pos"})
-        said = "platforms.receiver.motion_error.position stands in place of [8 mm, 10 mm, 20 mm] of solution a.pos"
+        said = "platforms.receiver.motion_error.position replaces [8 mm, 10 mm, 20 mm] of solution a.pos"
         assert said in found.notes
         assert {row.id for row in found.rows if said in row.remarks} == {f"receiver.position.{one}" for one in "xyz"}
 
@@ -182,6 +182,6 @@ def test_a_report_says_format_and_scale(run: Callable[..., Any], tmp_path: Path)
     (tmp_path / "m.yaml").write_text(aircraft(platforms__receiver={"trajectory": {"file": "a.pos"}}))
     report = json.loads(run("check", tmp_path / "m.yaml", "--format", "json").stdout)
     path = report["missions"][0]["geometry"]["receiver"]["path"]
-    assert path["source"] == "RTKLIB solution (fix 490, float 11), 501 places over 10 s, UTC is GPS less 18 s"
+    assert path["source"] == "RTKLIB solution (fix 490, float 11), 501 fixes over 10 s, UTC is GPS less 18 s"
     assert path["stretch_s"] >= 2
     assert path["samples"] == 2 * int(path["stretch_s"] / 2 * 50) + 1  # on both sides of the middle, and it

@@ -158,8 +158,7 @@ class TestEveryKindOfPath:
         assert error.evidence("position") == "accuracy file smrmsg.out"
         found = check_mission(load_mission(str(folder / "m.yaml")), TODAY)
         said = (
-            "platforms.receiver.motion_error.velocity stands in place of [5 mm/s, 4 mm/s, 6 mm/s] of accuracy file "
-            "smrmsg.out"
+            "platforms.receiver.motion_error.velocity replaces [5 mm/s, 4 mm/s, 6 mm/s] of accuracy file smrmsg.out"
         )
         assert said in found.notes
         assert {row.id for row in found.rows if said in row.remarks} == {f"receiver.velocity.{one}" for one in "xyz"}
@@ -173,16 +172,14 @@ class TestEveryKindOfPath:
         error = mission.platforms.receiver.motion_error
         assert error.position == pytest.approx((0.03, 0.02, 0.05))
         assert error.evidence("position") == error.evidence("velocity") == "accuracy file smrmsg.out"
-        said = [note for note in check_mission(mission, TODAY).notes if "in place of" in note]
-        assert [note.partition(" of ")[0] for note in said] == [
-            "platforms.receiver.trajectory.accuracy stands in place"
-        ] * 2
+        said = [note for note in check_mission(mission, TODAY).notes if "replaces" in note]
+        names = [note.partition(" replaces ")[0] for note in said]
+        assert names == ["platforms.receiver.trajectory.accuracy"] * 2
         stated["motion_error"] = {"covariance": {"position": "1 cm", "velocity": "1 cm/s"}}
         (folder / "m.yaml").write_text(aircraft(platforms__receiver=stated))
         said = [note for note in check_mission(load_mission(str(folder / "m.yaml")), TODAY).notes if "smrmsg" in note]
-        assert [note.partition(" of ")[0] for note in said] == [
-            "platforms.receiver.motion_error.covariance stands in place"
-        ] * 2
+        names = [note.partition(" replaces ")[0] for note in said]
+        assert names == ["platforms.receiver.motion_error.covariance"] * 2
 
 
 class TestWhatIsSaid:
@@ -225,7 +222,7 @@ class TestWhatIsSaid:
         (folder / "flight.csv").write_bytes(b"\n".join([header, *rest]))
         found = run("check", "--strict", folder / "m.yaml")
         assert found.exit_code == 1
-        assert "a place of the log, -0.2 s from mid-aperture, is" in " ".join(found.stdout.split())
+        assert "a fix of the log, -0.2 s from mid-aperture, is" in " ".join(found.stdout.split())
 
     def test_chords_of_an_ephemeris_are_a_doubt_wherever_the_middle_is(
         self, run: Callable[..., Any], folder: Path
@@ -238,7 +235,8 @@ class TestWhatIsSaid:
             assert found["status"] == "not_evaluated"
             (reason,) = {one["reason"] for one in found["rows"] if one["id"].startswith("transmitter.position")}
             said = re.fullmatch(
-                r"the path may be (.*) km off \(interpolation of the ephemeris\), no position error is declared: .*",
+                r"the path may be (.*) km off \(interpolation of the ephemeris\), but no position error is declared: "
+                ".*",
                 reason,
             )
             assert float(said[1]) == pytest.approx(3.587, rel=0.02)  # r(ωh)²/8 of a chord of 60 s
@@ -376,7 +374,8 @@ BROKEN: dict[str, tuple[Callable[[], str], dict[str, bytes | str], str]] = {
     "elements ten years old": (
         lambda: satellite(EPOCH.after(3652.2 * 86400)),
         {},
-        "3652.2 days before the aperture; SGP4 may place it 3653 to 10958 km off; a doubt of 7305 km is more",
+        "3652.2 days before the aperture; its position by SGP4 may be 3653 to 10958 km off; a doubt of 7305 km is "
+        "more",
     ),
     "an ephemeris that is missed by 80 km": (
         lambda: ephemeris("2026-06-01T05:20:00Z", oem()),
@@ -386,13 +385,13 @@ BROKEN: dict[str, tuple[Callable[[], str], dict[str, bytes | str], str]] = {
     "a log that stands still": (
         aircraft,
         {"flight.csv": replaced(lambda _, cells: [cells[0], *FIRST[1:]])},
-        "flight.csv: stands still: its 101 places around the aperture are the same to 1 mm; accepted: the log of a "
-        "platform that moves. A fixed platform needs no log: give its place, and speed 0",
+        "flight.csv: stands still: its 101 fixes around the aperture are the same to 1 mm; accepted: the log of a "
+        "platform that moves. A fixed platform needs no log: give its position, and speed 0",
     ),
-    "a log that repeats places": (
+    "a log that repeats fixes": (
         aircraft,
         {"flight.csv": replaced(lambda n, cells: [cells[0], *LATER[5 * (n // 5)]])},
-        "flight.csv: repeats places: 80 of 101 around the aperture are the place before",
+        "flight.csv: repeats fixes: 80 of 101 around the aperture equal the fix before",
     ),
     "a log that jumps": (
         aircraft,
@@ -597,8 +596,8 @@ def test_a_sentinel_by_its_orbit_file(run: Callable[..., Any], tmp_path: Path) -
     found = json.loads(run("check", tmp_path / "m.yaml", "--format", "json").stdout)["missions"][0]
     (reason,) = {one["reason"] for one in found["rows"] if one["id"].startswith("transmitter.position")}
     assert reason == (
-        f"{EOF}, accuracy of AUX_RESORB: a position error of 100 mm is stated, 86.6 mm is declared: state at least "
-        "that in platforms.transmitter.motion_error.position"
+        f"{EOF}, accuracy of AUX_RESORB: a position error of 100 mm is stated, but 86.6 mm is declared: "
+        "declare at least that in platforms.transmitter.motion_error.position"
     )
 
 

@@ -138,7 +138,7 @@ class TestLevelFlight:
         fixed = {key: FLIGHT[key] for key in ("latitude", "longitude", "altitude")}
         found = mission(platforms__receiver={**fixed, "speed": 0})
         assert found.platforms.receiver.state.velocity == (0, 0, 0)
-        assert found.platforms.receiver.path.source == "geodetic place"
+        assert found.platforms.receiver.path.source == "geodetic position"
 
 
 class TestRadialAxes:
@@ -208,7 +208,7 @@ class TestAPathInOneOfItsWays:
         assert words in said(platforms__receiver=platform)
 
     def test_what_a_path_on_the_earth_needs(self) -> None:
-        need = "needs the scene's place on the Earth"
+        need = "needs the scene's position on the Earth"
         assert need in said(scene={}, platforms__receiver=FLIGHT)
         assert need in said(scene={}, platforms__receiver={"orbit": {"tle": "a.tle"}})
         assert "needs an instant" in said(platforms__receiver={"orbit": {"tle": "a.tle"}})

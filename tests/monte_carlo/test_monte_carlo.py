@@ -552,7 +552,7 @@ class TestCommand:
 
     def test_nothing_declared(self, run) -> None:
         text = run("check", "-", "--monte-carlo", 100, input=mission_text()).stdout
-        assert "no declared error has a requirement to hold" in text
+        assert "no requirement limits a declared error" in text
 
     def test_defaults_of_a_project_and_the_environment(self, run, project) -> None:  # noqa: F811
         project(table("monte-carlo = 1000\nseed = 9"))

@@ -206,13 +206,13 @@ OEMS = {
     ),
     "too few for Lagrange": (
         oem(count=7, interpolation=interpolation("LAGRANGE", 7)),
-        "x:4: the segment has 7 places; Lagrange of degree 7 needs 8",
+        "x:4: the segment has 7 positions; Lagrange of degree 7 needs 8",
     ),
     "too few for Hermite": (
         oem(count=3, interpolation=interpolation("HERMITE", 7)),
-        "x:4: the segment has 3 places; Hermite of degree 7 needs 4",
+        "x:4: the segment has 3 positions; Hermite of degree 7 needs 4",
     ),
-    "one place": (oem(count=1), "x:4: the segment has 1 place; Hermite of degree 7 needs 4"),
+    "one place": (oem(count=1), "x:4: the segment has 1 position; Hermite of degree 7 needs 4"),
     "no ephemeris": (OEM.partition("META_STOP")[0] + "META_STOP\n", "x:4: the segment has no ephemeris"),
     "out of order": (
         OEM.replace("T05:03:00.000000000 ", "T05:01:30.000000000 "),
@@ -285,7 +285,7 @@ def test_apertures_of_any_year_are_refused(center: str) -> None:
     at = instant(center)
     with pytest.raises(PathFileError, match=r"more than a century from the aperture$"):
         read_tle(TLE.encode(), "x", None, at).place(at)
-    with pytest.raises(PathFileError, match=r"^x: has no place at "):
+    with pytest.raises(PathFileError, match=r"^x: has no position at "):
         read_oem(OEM.encode(), "x", None, at)
 
 

@@ -193,11 +193,11 @@ def test_old_elements_are_doubted() -> None:
     assert orbit.doubts(EPOCH.after(-6.99 * 86400)) == ()
     assert orbit.doubts(EPOCH.after(12.5 * 86400)) == (
         "s.tle: the elements of SENTINEL-1A (39634) are of 2026-05-31T10:12:13.122Z, 12.5 days before the aperture;"
-        " SGP4 may place it 14 to 38 km off",
+        " its position by SGP4 may be 14 to 38 km off",
     )
     assert orbit.doubts(EPOCH.after(-8 * 86400)) == (
         "s.tle: the elements of SENTINEL-1A (39634) are of 2026-05-31T10:12:13.122Z, 8.0 days after the aperture;"
-        " SGP4 may place it 9 to 25 km off",
+        " its position by SGP4 may be 9 to 25 km off",
     )
 
 
@@ -210,7 +210,7 @@ def test_a_satellite_that_comes_down_has_no_place_afterwards() -> None:
     orbit = read_tle("\n".join(lines).encode(), "down.tle", None, CENTER)
     assert orbit.epoch is not None
     assert math.hypot(*orbit.place(orbit.epoch.after(600))) > 6.4e6
-    with pytest.raises(PathFileError, match=r"^down\.tle:1: SGP4 has no place of 28872 at .*: it has decayed$"):
+    with pytest.raises(PathFileError, match=r"^down\.tle:1: SGP4 has no position of 28872 at .*: it has decayed$"):
         orbit.place(orbit.epoch.after(86400))
     with pytest.raises(PathFileError, match=r"2005-11-29T00:28:58\.939Z, more than a century from"):
         orbit.place(instant("2126-06-01T00:00:00Z"))

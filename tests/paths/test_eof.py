@@ -133,7 +133,7 @@ def test_times_must_rise_and_hold_the_aperture() -> None:
     second = re.findall(r"<UTC>UTC=(.*)</UTC>", TEXT)[1]
     with pytest.raises(PathFileError, match=r"^s.EOF:\d+: is a state vector of the same time as the one before"):
         read_eof(TEXT.replace(f"UTC={second}", f"UTC={FIRST}").encode(), "s.EOF", None, MIDDLE)
-    with pytest.raises(PathFileError, match=r"^s.EOF: has no place at 2023-08-24T.*; its useable time is 2023-08"):
+    with pytest.raises(PathFileError, match=r"^s.EOF: has no position at 2023-08-24T.*; its useable time is 2023-08"):
         read_eof(DATA, "s.EOF", None, Instant(MIDDLE.day + 1, MIDDLE.seconds))
     with pytest.raises(PathFileError, match=r"^s.EOF:1: is not XML, which orbit files of the Sentinels are$"):
         read_eof(b"CCSDS_OEM_VERS = 2.0\n", "s.EOF", None, MIDDLE)

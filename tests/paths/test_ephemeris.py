@@ -114,8 +114,8 @@ def test_without_interpolation_it_is_hermite_where_velocities_are_those_of_the_p
     with pytest.raises(PathFileError) as error:
         read(oem(path=against_stars, interpolation=interpolation("HERMITE", 7)))
     assert str(error.value) == (
-        "c.oem:12: INTERPOLATION HERMITE needs the velocities of the places; those of the segment are 6 % off"
-        " what the places do"
+        "c.oem:12: INTERPOLATION HERMITE needs the velocities of the positions; those of the segment are 6 % off"
+        " the motion of its positions"
     )
     # A step of a twelfth of the orbit is long, and its velocities are still known for what they are.
     assert read(oem(step=490.0)).words.endswith("Hermite degree 7 (the file states no interpolation)")
@@ -253,7 +253,7 @@ def test_useable_time_is_honoured() -> None:
     with pytest.raises(PathFileError) as error:
         read(oem(extra=useable), START.after(100))
     assert str(error.value) == (
-        "c.oem: has no place at 2026-06-01T05:01:40.000Z; its useable time is 2026-06-01T05:05:00.000Z to"
+        "c.oem: has no position at 2026-06-01T05:01:40.000Z; its useable time is 2026-06-01T05:05:00.000Z to"
         " 2026-06-01T05:15:00.000Z"
     )
 

@@ -44,8 +44,8 @@ def test_a_level_flight_is_where_it_was() -> None:
         assert np.abs(log.places - flown.places).max() < 5e-9
     assert by_degrees.start == parse_instant(stamp(0))
     assert by_metres.start is None
-    assert by_degrees.words == "CSV of latitude, longitude, height, 501 places over 10 s"
-    assert by_metres.words == "CSV of x, y, z, 501 places over 10 s"
+    assert by_degrees.words == "CSV of latitude, longitude, height, 501 fixes over 10 s"
+    assert by_metres.words == "CSV of x, y, z, 501 fixes over 10 s"
 
 
 def test_places_of_the_scene() -> None:
@@ -127,7 +127,7 @@ def test_chunks_of_lines_are_one_log(monkeypatch: pytest.MonkeyPatch) -> None:
 
 STAMPED = "utc,x [m],y [m],z [m]\n2026-06-01T05:20:31Z,7e6,0,0\n"
 LATE = "time 1 s is not after 2 s of line 3; times must rise"
-PLACES = "places are latitude, longitude, height, or x, y, z, or east, north, up"
+PLACES = "positions are latitude, longitude, height, or x, y, z, or east, north, up"
 
 
 @pytest.mark.parametrize(
@@ -135,11 +135,11 @@ PLACES = "places are latitude, longitude, height, or x, y, z, or east, north, up
     [
         ("", "1: is empty; its first line names columns, like 'time [s], x [m], y [m], z [m]'"),
         ("\n# a comment\n", "1: is empty; its first line names columns, like 'time [s], x [m], y [m], z [m]'"),
-        (HEADER, "1: has a header and no places"),
-        ("#\n" + HEADER + "\n# none\n", "2: has a header and no places"),
+        (HEADER, "1: has a header and no fixes"),
+        ("#\n" + HEADER + "\n# none\n", "2: has a header and no fixes"),
         (
             "0,48,11,3000\n1,48,11,3000",
-            "1: names no place; the first line names columns, like 'latitude [deg]', 'x [m]' or 'east [m]'",
+            "1: names no position; the first line names columns, like 'latitude [deg]', 'x [m]' or 'east [m]'",
         ),
         (GOOD.replace("height", "x"), f"1: mixes latitude with x; {PLACES}"),
         (GOOD.replace("height [m]", "height [m],up [m]"), f"1: mixes latitude with up; {PLACES}"),
@@ -212,7 +212,7 @@ PLACES = "places are latitude, longitude, height, or x, y, z, or east, north, up
         (
             "time [s],x [m],y [m],z [m]\n0,100,200,300\n",
             "2: x, y, z are 0.3742 km from the Earth's centre; Earth-fixed coordinates are wanted, "
-            "places of the scene are named east, north, up",
+            "positions of the scene are named east, north, up",
         ),
         (
             STAMPED + "2026-06-01T05:20:32.5,7e6,0,0\n",
@@ -417,7 +417,7 @@ class TestAccuracyColumns:
             ("sde(m),sdn(m)", "has sigma_east and no sigma_up; write all of sigma_east, sigma_north, sigma_up"),
             ("sde(m),sigma_east [m]", "has two columns of sigma_east"),
             ("std_lat [deg],std_lon [deg],std_alt [m]", "std_lat "),
-            ("CEP [m]", "CEP looks like an accuracy of the places, and is none that is read: name it as what it is"),
+            ("CEP [m]", "CEP looks like an accuracy of the positions, but is not a known one: name it as what it is"),
             ("EPE [m]", "EPE looks like"),
             ("r95 [m]", "r95 looks like"),
             ("position error [m]", "position error looks like"),

@@ -47,7 +47,7 @@ def test_the_flight_is_where_it_was(data: bytes, keys: dict[str, object], words:
     assert begins is not None
     assert log.start is not None
     assert log.start.since(begins) == pytest.approx(0, abs=1e-9)
-    assert log.words == f"{words}, 501 places over 10 s"
+    assert log.words == f"{words}, 501 fixes over 10 s"
 
 
 def test_a_file_of_another_writer_is_the_same() -> None:
@@ -123,7 +123,7 @@ class TestSeveralTracks:
     def test_the_one_that_covers_the_aperture_is_taken(self) -> None:
         log = track_around(read(self.FILE), self.MIDDLE, None, 0.05, "a.gpx")
         assert np.abs(log.places - SHORT.places).max() < DIGITS
-        assert log.words == "GPX track 1 of 2 (Morning), 6 places over 0.1 s"
+        assert log.words == "GPX track 1 of 2 (Morning), 6 fixes over 0.1 s"
         later = parse_instant("2026-06-01T06:20:01.300Z")
         assert track_around(read(self.FILE), later, None, 0.05, "a.gpx").words.startswith("GPX track 2 of 2 (a), 6")
 
@@ -202,7 +202,7 @@ class TestFix:
     @pytest.mark.parametrize("fix", ["none", "2d"])
     def test_a_point_without_a_height_is_left_out(self, fix: str) -> None:
         log = self.of(fix, 100)
-        assert log.words == "GPX track, 100 points without a fix in three dimensions left out, 401 places over 8 s"
+        assert log.words == "GPX track, 100 points without a fix in three dimensions left out, 401 fixes over 8 s"
         with pytest.raises(PathFileError, match="has no point with a fix in three dimensions"):
             self.of(fix, 501)
 

@@ -66,8 +66,8 @@ def test_a_drone_that_hovers_is_no_fault() -> None:
 
 def test_a_log_that_stands_still_is_refused() -> None:
     error = said(np.full((TIMES.size, 3), 1234.5))
-    assert str(error) == "a.csv: stands still: its 201 places around the aperture are the same to 1 mm"
-    assert error.hint == "A fixed platform needs no log: give its place, and speed 0"
+    assert str(error) == "a.csv: stands still: its 201 fixes around the aperture are the same to 1 mm"
+    assert error.hint == "A fixed platform needs no log: give its position, and speed 0"
     # It may move before and after: what the aperture needs is frozen.
     frozen = flown(noise=0.0)
     frozen[np.abs(TIMES) <= 2] = frozen[200]
@@ -89,10 +89,10 @@ def test_a_log_that_holds_its_places_is_refused() -> None:
     held = np.repeat(flown()[::5], 5, axis=0)[: TIMES.size]
     error = said(held)
     assert str(error) == (
-        "a.csv: repeats places: 160 of 201 around the aperture are the place before; from -2 s of mid-aperture on "
+        "a.csv: repeats fixes: 160 of 201 around the aperture equal the fix before; from -2 s of mid-aperture on "
         "for 0.08 s, in which the platform moves 4.8 m"
     )
-    assert error.hint == "Leave out places that were not measured anew, or write more digits"
+    assert error.hint == "Leave out repeated fixes, or write more digits"
 
 
 def test_a_receiver_that_freezes_within_the_aperture_is_refused() -> None:
@@ -111,7 +111,7 @@ def test_one_repeated_place_counts_by_what_is_missed(speed: float, is_refused: b
     places = np.stack([speed * TIMES, 0 * TIMES, 0 * TIMES], axis=1)
     places[200] = places[199]
     if is_refused:
-        assert "repeats places: 1 of 201" in str(said(places))
+        assert "repeats fixes: 1 of 201" in str(said(places))
     else:
         hold_to_motion(TIMES, places, APERTURE, "a.csv")
 

@@ -30,13 +30,13 @@ def read(data: bytes | str, **keys: object) -> Log:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (nmea(FLOWN), "NMEA 0183 GGA, 501 places over 10 s"),
-        (nmea(FLOWN, date=zda), "NMEA 0183 GGA, 501 places over 10 s"),
-        (nmea(FLOWN, gns), "NMEA 0183 GNS, 501 places over 10 s"),
-        (nmea(FLOWN).replace(b"\r\n", b"\n"), "NMEA 0183 GGA, 501 places over 10 s"),
+        (nmea(FLOWN), "NMEA 0183 GGA, 501 fixes over 10 s"),
+        (nmea(FLOWN, date=zda), "NMEA 0183 GGA, 501 fixes over 10 s"),
+        (nmea(FLOWN, gns), "NMEA 0183 GNS, 501 fixes over 10 s"),
+        (nmea(FLOWN).replace(b"\r\n", b"\n"), "NMEA 0183 GGA, 501 fixes over 10 s"),
         (
             b"\xb5\x62\x01\x07\n" + nmea(FLOWN).replace(b"$GNGGA", b"12.5 $GNGGA"),
-            "NMEA 0183 GGA, 501 places over 10 s",
+            "NMEA 0183 GGA, 501 fixes over 10 s",
         ),
     ],
 )
@@ -123,7 +123,7 @@ class TestTwoReceivers:
     def test_a_key_chooses(self) -> None:
         log = read(self.MIXED, talker="GN")
         assert np.abs(log.places - FLOWN.places[1::2]).max() < DIGITS
-        assert log.words == "NMEA 0183 GGA of the talker GN, 250 places over 9.96 s"
+        assert log.words == "NMEA 0183 GGA of the talker GN, 250 fixes over 9.96 s"
         assert log.typical_sigmas == pytest.approx(np.full(250, 0.01))
         assert len(read(self.MIXED, talker="GP").times) == 501
         with pytest.raises(
@@ -142,7 +142,7 @@ class TestTwoReceivers:
         others = [rmc(0, talker="GP"), sentence("GPGSV,1,1,00"), sentence("GLGSA,A,3,,,,,,,,,,,,,1,1,1")]
         empty = sentence("GPGGA,,,,,,0,,,,,,,,")
         log = read("\n".join([*others, empty, *(gga(*fix) for fix in _places())]))
-        assert log.words == "NMEA 0183 GGA, 501 places over 10 s"
+        assert log.words == "NMEA 0183 GGA, 501 fixes over 10 s"
 
 
 class TestTwoSolutionsOfOneTalker:
@@ -159,7 +159,7 @@ class TestTwoSolutionsOfOneTalker:
     @pytest.mark.parametrize("north_m", [0.0, 0.3])
     def test_the_same_places_are_read(self, north_m: float) -> None:
         log = self.both(north_m)
-        assert log.words == "NMEA 0183 GGA, 501 places over 10 s"
+        assert log.words == "NMEA 0183 GGA, 501 fixes over 10 s"
         assert log.typical_sigmas == pytest.approx(np.full(501, 0.01))
 
     @pytest.mark.parametrize(
@@ -197,7 +197,7 @@ def test_wrong_checksums_are_left_out_and_counted() -> None:
     lines[306] = lines[306][:30]
     log = read("\n".join(lines))
     assert len(log.times) == 498
-    assert log.words == "NMEA 0183 GGA, 3 sentences with a wrong checksum left out, 498 places over 10 s"
+    assert log.words == "NMEA 0183 GGA, 3 sentences with a wrong checksum left out, 498 fixes over 10 s"
 
 
 @pytest.mark.parametrize("quality", [0, 7, 8])
@@ -299,7 +299,7 @@ class TestWithoutADate:
         log = dated(undated, center)
         assert log.start is not None
         assert log.start.as_text() == "2026-06-01T00:00:00.000Z"
-        assert log.words == "NMEA 0183 GGA, 501 places over 10 s, date by collection.center_time: 2026-06-01"
+        assert log.words == "NMEA 0183 GGA, 501 fixes over 10 s, date by collection.center_time: 2026-06-01"
         begins = parse_instant(stamp(0))
         assert slow_times(log, begins, None, 0.01, "a.nmea") == pytest.approx(FLOWN.times, abs=1e-6)
         assert np.abs(log.places - FLOWN.places).max() < DIGITS
@@ -328,7 +328,7 @@ class TestWithoutADate:
         log = read("\n".join([*map(sentence, none), nmea(FLOWN).decode()]))
         assert log.start is not None
         assert log.start.as_text() == "2026-06-01T05:20:01.250Z"
-        assert log.words == "NMEA 0183 GGA, 3 sentences without a date that there is left out, 501 places over 10 s"
+        assert log.words == "NMEA 0183 GGA, 3 sentences without a date that there is left out, 501 fixes over 10 s"
 
 
 @pytest.mark.parametrize(("clock", "seconds"), [("051960.00", 1200), ("235960", 0), ("051959.996", 1199.996)])
@@ -372,7 +372,7 @@ class TestADatum:
     def test_another_one_is_refused_by_its_name(self, datum: str, words: str) -> None:
         with pytest.raises(PathFileError) as error:
             read(nmea(SHORT).decode() + sentence(f"GPDTM,{datum}"))
-        assert str(error.value) == f"a.nmea:19: DTM says that the places are of {words}"
+        assert str(error.value) == f"a.nmea:19: DTM says that the positions are of {words}"
 
     @pytest.mark.parametrize("ending", ["*00", "", "*"])
     def test_its_checksum_excuses_no_other_datum(self, ending: str) -> None:

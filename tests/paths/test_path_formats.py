@@ -71,7 +71,7 @@ def test_what_is_no_log_is_none(data: bytes) -> None:
         (smrmsg(SHORT.times), "b.out", "b.out: is the accuracy file of an SBET (smrmsg), records of ten doubles, 80"),
         (b"ULog", "a.ulg", "a.ulg: is no ULog"),
         (b"<tcx/>", "a.gpx", "a.gpx:1: is no GPX, its root is tcx"),
-        (b"hello\n", "a.csv", "a.csv:1: names no place"),
+        (b"hello\n", "a.csv", "a.csv:1: names no position"),
         (b"hello\n", "a.txt", "a.txt: is no log that is known by its content"),
     ],
 )

@@ -59,9 +59,9 @@ def test_the_flight_is_where_it_was(data: bytes, digits: float) -> None:
 
 def test_words_say_scale_and_qualities() -> None:
     assert read(solution(FLOWN)).words == (
-        "RTKLIB solution (fix 490, float 11), 501 places over 10 s, UTC is GPS less 18 s"
+        "RTKLIB solution (fix 490, float 11), 501 fixes over 10 s, UTC is GPS less 18 s"
     )
-    assert read(solution(FLOWN, system="JST")).words == "RTKLIB solution (fix 490, float 11), 501 places over 10 s"
+    assert read(solution(FLOWN, system="JST")).words == "RTKLIB solution (fix 490, float 11), 501 fixes over 10 s"
 
 
 @pytest.mark.parametrize("latitude", [-0.25, -33.6])
@@ -135,7 +135,7 @@ HEAD, *ROWS = TEXT.splitlines(keepends=True)[2:]
         (HEAD, "a.pos: has no solution"),
         (ROWS[0], "a.pos:1: no line that begins with '%  GPST', UTC or JST names the columns before it"),
         (HEAD + ROWS[0], "a.pos: has no line of % that says whether heights are above the ellipsoid or the geoid"),
-        (TEXT.replace("WGS84/", "Tokyo/"), "a.pos: has places of the datum Tokyo"),
+        (TEXT.replace("WGS84/", "Tokyo/"), "a.pos: has positions of the datum Tokyo"),
         (TEXT.replace(" 3000.0000", ""), "a.pos:4: has 14 cells, the columns need 15"),
         (TEXT.replace("height(m)", "heigth(m)"), "a.pos:3: names no column height(m)"),
         (TEXT.replace("3000.0000", "3000.0O00", 1), "a.pos:4: must have numbers behind the time (got '3000.0O00')"),
@@ -158,7 +158,7 @@ HEAD, *ROWS = TEXT.splitlines(keepends=True)[2:]
         (TEXT + HEAD.replace("GPST", "UTC "), "a.pos:10: names other columns than the lines before"),
         (
             "%  UTC   e-baseline(m)  n-baseline(m)  u-baseline(m)   Q  ns\n",
-            "a.pos:1: has baselines from a base station, no places",
+            "a.pos:1: has baselines from a base station, no positions",
         ),
         (TEXT.replace("d", "\x00", 1).replace("3000", "\xff"), "a.pos:4: must have numbers behind the time (got "),
     ],

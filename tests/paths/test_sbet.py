@@ -39,7 +39,7 @@ def test_a_level_flight_is_where_it_was(wander: float) -> None:
     assert np.abs(log.places - FLOWN.places).max() < 5e-9
     assert log.times == pytest.approx(FLOWN.times, abs=2e-11)  # rounding of 1e5 s
     assert log.start == instant(START.strftime("%Y-%m-%dT%H:%M:%S.%fZ"))
-    assert log.words == "SBET, 501 places over 10 s, UTC is GPS less 18 s"
+    assert log.words == "SBET, 501 fixes over 10 s, UTC is GPS less 18 s"
     by_csv = read_csv(geodetic_csv(FLOWN), "b.csv")
     assert by_csv.start == log.start
     assert np.abs(log.places - by_csv.places).max() < 5e-9
@@ -49,7 +49,7 @@ def test_without_a_week_times_are_seconds_of_it() -> None:
     log = read_sbet(sbet(FLOWN), "a.out", NO_KEYS)
     assert log.start is None
     assert log.times == pytest.approx(SECOND + FLOWN.times, abs=1e-10)
-    assert log.words == "SBET, 501 places over 10 s"
+    assert log.words == "SBET, 501 fixes over 10 s"
 
 
 REAL = """

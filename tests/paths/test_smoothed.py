@@ -218,7 +218,7 @@ def test_too_few_samples(count: int) -> None:
     times = np.linspace(-1, 1, count)
     with pytest.raises(PathFileError) as error:
         smoothed(times, np.zeros((count, 3)), 2.0)
-    said = f"has {count} places around the aperture of 2 s, at least 5 are needed; keep more of the log"
+    said = f"has {count} fixes around the aperture of 2 s, at least 5 are needed; keep more of the log"
     assert str(error.value) == said
 
 

@@ -166,13 +166,15 @@ def test_no_polynomial_goes_over_a_place_that_is_missing_or_a_manoeuvre() -> Non
     blocks = epochs(TEXT)
     line = next(line for line in blocks[48].splitlines() if line.startswith("PG05"))
     absent = TEXT.replace(line, "PG05      0.000000      0.000000      0.000000 999999.999999")
-    with pytest.raises(PathFileError, match=r"^g.sp3: has no place at 2010-07-01T11:59:45.000Z; its useable time is"):
+    with pytest.raises(
+        PathFileError, match=r"^g.sp3: has no position at 2010-07-01T11:59:45.000Z; its useable time is"
+    ):
         read(absent)
     moved = TEXT.replace(line, f"{line:<78}M")
     assert read(moved, "G05", NOON.after(60)).span[0] == NOON  # type: ignore[index]
     assert read(moved, "G16", NOON.after(60)).span[0] == epoch_of(blocks[0])  # type: ignore[index]
     gone = TEXT.replace(line + "\n", "")
-    with pytest.raises(PathFileError, match=r"^g.sp3: has no place at"):
+    with pytest.raises(PathFileError, match=r"^g.sp3: has no position at"):
         read(gone)
 
 
@@ -180,7 +182,7 @@ def test_a_predicted_place_is_said() -> None:
     blocks = epochs(TEXT)
     line = next(line for line in blocks[40].splitlines() if line.startswith("PG05"))
     text = TEXT.replace(line, f"{line:<79}P")
-    assert read(text).doubts(NOON) == ("g.sp3: places of G05 around the aperture are predicted",)
+    assert read(text).doubts(NOON) == ("g.sp3: positions of G05 around the aperture are predicted",)
     early = epoch_of(blocks[20])
     assert read(text, "G05", early).doubts(early) == ()
 
@@ -238,8 +240,8 @@ GARBLED = {
     "epoch-not-after": ("*  2010  7  1  0 15", "*  2010  7  1  0  0", 3, "the epoch is not after the one before it"),
     "epoch": ("*  2010  7  1  0 15", "*  2010  7 41  0 15", 3, "must be an epoch such as *  2026  5 31"),
     "place": ("PG05 -25251.856884", "PG05 -2525x.856884", 1, "must be a number of km in columns 5 to 18"),
-    "name-of-another": ("PG16", "PG05", 2, "G05 has two places at one epoch"),
-    "no-record": ("PG16", "XG16", 2, "must be an epoch, a place or a velocity (got XG16"),
+    "name-of-another": ("PG16", "PG05", 2, "G05 has two positions at one epoch"),
+    "no-record": ("PG16", "XG16", 2, "must be an epoch, a position or a velocity (got XG16"),
 }
 
 

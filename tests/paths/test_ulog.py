@@ -82,7 +82,7 @@ def test_the_gps_topic_is_where_the_flight_was(name: str, fields: tuple, digits:
     assert np.abs(log.places - FLOWN.places).max() < digits
     assert log.times == pytest.approx(FLOWN.times, abs=1e-9)  # microseconds
     assert since_start(log) == pytest.approx(0, abs=1e-9)
-    assert log.words == f"ULog {name}, 501 places over 10 s"
+    assert log.words == f"ULog {name}, 501 fixes over 10 s"
 
 
 def test_the_global_position_has_the_utc_of_the_gps_topic() -> None:
@@ -93,7 +93,7 @@ def test_the_global_position_has_the_utc_of_the_gps_topic() -> None:
     assert np.abs(log.places - FLOWN.places).max() < FLOATS
     assert since_start(log) == pytest.approx(-0.1, abs=1e-6)
     assert log.times == pytest.approx(FLOWN.times, abs=1e-9)
-    assert log.words == "ULog vehicle_global_position, UTC of vehicle_gps_position to 0 s, 501 places over 10 s"
+    assert log.words == "ULog vehicle_global_position, UTC of vehicle_gps_position to 0 s, 501 fixes over 10 s"
     by_seconds = read(ulog(own))
     assert by_seconds.start is None
     assert by_seconds.times == pytest.approx(20 + FLOWN.times, abs=1e-9)
@@ -129,7 +129,7 @@ def test_one_of_several_receivers_is_chosen() -> None:
     logs = [read(both, instance=instance) for instance in (0, 1)]
     assert np.abs(logs[0].places - FLOWN.places).max() < NOW
     assert np.linalg.norm(logs[1].places - FLOWN.places, axis=1) == pytest.approx(np.full(501, 6.37e3), rel=0.01)
-    assert logs[1].words == "ULog sensor_gps, instance 1, 501 places over 10 s"
+    assert logs[1].words == "ULog sensor_gps, instance 1, 501 fixes over 10 s"
     with pytest.raises(PathFileError, match=r"has no fix of the instance 2") as error:
         read(both, instance=2)
     assert error.value.key == "instance"
@@ -182,9 +182,9 @@ def renamed(*changes: tuple[str, str]) -> bytes:
     ("data", "says"),
     [
         (b"", "a.ulg: is no ULog: it does not begin with 'ULog'"),
-        (b"ULog\x01\x12\x35", "a.ulg: has no place"),
-        (ulog(), "a.ulg: has no place"),
-        (ulog(topic("sensor_gps", GPS_OF_NOW, 3, gps_records(SHORT, fix=0))), "a.ulg: has no place"),
+        (b"ULog\x01\x12\x35", "a.ulg: has no position"),
+        (ulog(), "a.ulg: has no position"),
+        (ulog(topic("sensor_gps", GPS_OF_NOW, 3, gps_records(SHORT, fix=0))), "a.ulg: has no position"),
         (
             GOOD.replace(b"time_utc_usec;", b"time_utc_used;"),
             f"a.ulg: byte {NAMED}: sensor_gps has no field time_utc_usec",

@@ -53,26 +53,26 @@ def since_start(log: Log) -> float:
 @pytest.mark.parametrize(
     ("data", "keys", "digits", "words"),
     [
-        (px4_csv(FLOWN, GPS_OF_OLD, gps_records(FLOWN)), {}, BY_PX4, "CSV of PX4's GPS topic, 501 places over 10 s"),
-        (px4_csv(FLOWN, GPS_OF_NOW, gps_records(FLOWN)), {}, 1e-8, "CSV of PX4's GPS topic, 501 places over 10 s"),
+        (px4_csv(FLOWN, GPS_OF_OLD, gps_records(FLOWN)), {}, BY_PX4, "CSV of PX4's GPS topic, 501 fixes over 10 s"),
+        (px4_csv(FLOWN, GPS_OF_NOW, gps_records(FLOWN)), {}, 1e-8, "CSV of PX4's GPS topic, 501 fixes over 10 s"),
         (
             px4_csv(FLOWN, tuple(one for one in GPS_OF_OLD if one[1] != "alt_ellipsoid"), gps_records(FLOWN)),
             OF_SEA,
             BY_PX4 + 1e-4,
-            "CSV of PX4's GPS topic, 501 places over 10 s",
+            "CSV of PX4's GPS topic, 501 fixes over 10 s",
         ),
         (
             dataflash(FLOWN),
             OF_SEA | {"instance": 0},
             BY_ARDUPILOT,
-            "GPS rows of ArduPilot, instance 0, 501 places over 10 s, UTC is GPS less 18 s, "
+            "GPS rows of ArduPilot, instance 0, 501 fixes over 10 s, UTC is GPS less 18 s, "
             "1 row without a fix left out",
         ),
         (
             mavlogdump(FLOWN),
             OF_SEA,
             BY_ARDUPILOT,
-            "GPS rows of ArduPilot, 501 places over 10 s, UTC is GPS less 18 s",
+            "GPS rows of ArduPilot, 501 fixes over 10 s, UTC is GPS less 18 s",
         ),
     ],
 )
@@ -106,7 +106,7 @@ def test_airdata_counts_fractions_on_a_clock_of_its_own(unit: str) -> None:
     assert log.times == pytest.approx(DRONE.times, abs=1e-9)
     assert abs(since_start(log)) <= 0.05 + 1e-9
     assert log.words == (
-        "CSV of Airdata, 101 places over 10 s, UTC to 0.05 s by whole seconds, 1 row without a fix left out"
+        "CSV of Airdata, 101 fixes over 10 s, UTC to 0.05 s by whole seconds, 1 row without a fix left out"
     )
     with pytest.raises(PathFileError, match=r"has heights above mean sea level, and no geoid separation"):
         read(airdata(DRONE, unit))
@@ -164,7 +164,7 @@ def test_a_week_that_ends_goes_on_in_the_next() -> None:
         ),
         (
             airdata(SHORT).decode().replace("altitude_above_seaLevel(meters)", "ascent(meters)"),
-            "a.csv:1: CSV of Airdata has no height above the sea or the ellipsoid; one above take-off is no place",
+            "a.csv:1: CSV of Airdata has no height above the sea or the ellipsoid; one above take-off is no position",
         ),
         (
             airdata(SHORT).decode().replace("2026-06-01 05", "2026-06-01 25", 1),
@@ -207,7 +207,7 @@ def test_a_scale_is_said_by_the_header_or_the_mission(data: bytes, scale: str | 
     log = read(data, time_scale=scale)
     assert since_start(log) == pytest.approx(0, abs=1e-9)
     assert log.times == pytest.approx(FLOWN.times, abs=1e-9)
-    assert log.words == f"CSV of latitude, longitude, height, 501 places over 10 s{words}"
+    assert log.words == f"CSV of latitude, longitude, height, 501 fixes over 10 s{words}"
 
 
 def test_gps_time_has_no_leap_second() -> None:
@@ -314,5 +314,5 @@ def test_an_accuracy_that_is_added_to_an_exporters_columns_counts() -> None:
     header, *rows = (text if isinstance(text, str) else text.decode()).splitlines()
     added = [f"{header},position accuracy [m]", *(f"{line},3" for line in rows)]
     assert read("\n".join(added)).sigmas == pytest.approx(np.full((6, 3), 3.0))
-    with pytest.raises(PathFileError, match="CEP looks like an accuracy of the places"):
+    with pytest.raises(PathFileError, match="CEP looks like an accuracy of the positions"):
         read("\n".join([f"{header},CEP [m]", *added[1:]]))

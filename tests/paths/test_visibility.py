@@ -236,13 +236,13 @@ class TestSeveral:
             assert (one.start, one.stop) == pytest.approx((other.start, other.stop), abs=0.01)
 
     def test_a_satellite_that_decays_is_followed_until_then(self) -> None:
-        """With so much drag SGP4 has no place from some day on."""
+        """With so much drag SGP4 has no position from some day on."""
         line = checked("1 39634U 14016A   26151.42515188  .00000355  00000+0  20000-2 0  9990")
         text = f"{line}\n{LOW.splitlines()[1]}\n"
         seen = Watched.over(of_elements(text), axes_at(BESANCON), CENTER, 10 * DAY)
         (piece,), (gap,) = seen.pieces, seen.gaps
         assert 0 < piece.stop == gap.start < gap.stop == 10 * DAY
-        assert "SGP4 has no place" in gap.reason
+        assert "SGP4 has no position" in gap.reason
 
     def test_without_any_orbit_there_is_a_reason(self) -> None:
         def none(_: Instant) -> Orbit:

@@ -181,8 +181,8 @@ class TestNotJudged:
     @pytest.mark.parametrize(
         ("row_id", "title"),
         [
-            ("receiver.oscillator", "Cubic phase: no requirement takes it, the root-sum-square"),
-            ("receiver.random.GNSS", "Rms phase that spreads: no requirement takes it, the root-sum-square"),
+            ("receiver.oscillator", "Cubic phase: no requirement judges it, the root-sum-square"),
+            ("receiver.random.GNSS", "Rms phase that spreads: no requirement judges it, the root-sum-square"),
         ],
     )
     def test_an_effect_that_no_requirement_takes_has_its_numbers(self, row_id: str, title: str) -> None:
@@ -201,12 +201,12 @@ class TestNotJudged:
 
     def test_a_tone_that_no_requirement_takes(self) -> None:
         text = explained(sensors("quadratic_phase_error: 9 deg", LOUD), "receiver.oscillator.spur.0")
-        assert "Peak phase of the tones: no requirement takes it" in text
+        assert "Peak phase of the tones: no requirement judges it" in text
         assert values(text)["negligible"] == pytest.approx(math.radians(0.9), rel=1e-5)
 
     def test_a_judged_row_has_no_such_steps(self) -> None:
         text = explained(sensors("islr: -20 dB, pslr: -30 dB"), "receiver.oscillator")
-        assert "no requirement takes it" not in text
+        assert "no requirement judges it" not in text
         assert "negligible" not in text
 
     def test_the_use_stands_under_its_sum(self) -> None:
@@ -226,7 +226,7 @@ class TestNotJudged:
 
     def test_a_location_beside_free_oscillators_names_them_with_their_phases(self) -> None:
         text = explained(sensors("location_error: 3 m"), "mission.location_error")
-        assert "the image moves by what free oscillators drift" in " ".join(text.split())
+        assert "free-running oscillators displace the image" in " ".join(text.split())
         ((qpe, _),) = re.findall(r"receiver\.oscillator: QPE (\S+) rad, cubic (\S+) rad", text)
         same = values(explained(sensors("location_error: 3 m"), "receiver.oscillator"))
         assert float(qpe) == pytest.approx(same["QPE_full"], rel=1e-5)

@@ -241,7 +241,7 @@ class TestView:
         transmitter, receiver, clock = lines(document, "Owner", "Share")
         assert (transmitter["Before autofocus"], transmitter["With autofocus"]) == ("22.5 deg", "360 deg")
         assert receiver["Owner"] == (Swatch("receiver", 0.5), "receiver")
-        assert clock["Share"] == "held to the receiver’s"
+        assert clock["Share"] == "limited by the receiver’s"
         before, after = [block for block in blocks_of(document) if isinstance(block, Stack)]
         for ended, started in zip(after.shares, before.shares, strict=True):
             assert ended[1] / started[1] == pytest.approx(16)
@@ -315,9 +315,9 @@ class TestBothLanguages:
         page = page_of(language, illustrated())
         heads = [squeezed(head.text).lower() for head in page.all("h2", "h3")]
         for section in (
-            "verdict", "compliance matrix", "where phase and displacement come from", "geometry", "allocation",
+            "verdict", "compliance matrix", "contributions to phase and displacement", "geometry", "allocation",
             "assumptions and validity", "how this report was made", "approval", "annex", "image evidence",
-            "rows in full", "sources", "formulas, with the numbers put in",
+            "all rows", "sources", "formulas with their numbers",
         ):  # fmt: skip
             assert section in heads
 
@@ -488,9 +488,9 @@ class TestSummary:
         page = self.page(language)
         heads = [squeezed(head.text).lower() for head in page.all("h2", "h3")]
         assert heads[-2:] == ["how this report was made", "approval"]
-        assert not {"annex", "formulas, with the numbers put in", "sources"} & set(heads)
+        assert not {"annex", "formulas with their numbers", "sources"} & set(heads)
         text = squeezed(page.text)
-        assert "Not shown: 2 rows that pass or limit nothing, 23 not declared (--detail full has them)." in text
+        assert "Not shown: 2 rows that pass or have no effect, 23 not declared (--detail full has them)." in text
         assert "receiver.velocity.x" not in text
 
     def test_images_and_draws_that_somebody_asked_for_are_an_annex(self, language: str) -> None:
@@ -545,7 +545,7 @@ class TestSummary:
         narrow = findings(platforms__receiver__velocity=[-40, -40, 0], platforms__transmitter__velocity=[-150, 5, 0])
         text = squeezed(self.page(language, narrow).text)
         assert "range and Doppler gradients 12.1° apart" in text
-        assert "displacements are 4.8 times those at right angles" in text.partition("Where phase and")[0]
+        assert "displacements are 4.8 times those at right angles" in text.partition("Contributions to phase and")[0]
 
     def test_the_requirement_is_the_one_that_binds(self, language: str) -> None:
         found = findings(timing_error__quadratic=1e-14, requirements={"location_error": 5, "cubic_phase_error": 0.2})

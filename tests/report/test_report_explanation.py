@@ -95,7 +95,7 @@ def test_what_is_left_at_the_nodes_is_where_v_is_least(row_id: str) -> None:
 
 def test_the_published_model_keeps_the_full_one_as_a_comparison() -> None:
     text = explained("receiver.velocity.y")
-    assert "for comparison: weights of the fit times the range error left" in " ".join(text.split())
+    assert "for comparison: weights of the fit times residual" in " ".join(text.split())
 
 
 def test_vibration_and_autofocus_are_what_the_derivation_prints() -> None:

@@ -52,7 +52,7 @@ def test_a_requirement_without_a_row_that_fails_is_named_with_its_status(format_
     text = said(format_name, found).replace("\\", "")
     assert "ISLR" in text or "islr" in text
     if islr.status == "not_evaluated":
-        assert "nothing declared that spreads" in " ".join(text.split())
+        assert "no declared error adds to the ISLR" in " ".join(text.split())
         assert re.search("not.evaluated|NOT EVAL", text)
     else:
         assert "waived" in text
@@ -89,7 +89,7 @@ class TestMachines:
         (command,) = said("github", found).splitlines()
         assert command.startswith("::error file=mission.yaml,line=")
         assert f"line={found.requirements[-1].line}," in command
-        assert "title=NOT EVAL requirement.islr::ISLR of -20 dB: not evaluated; nothing declared that" in command
+        assert "title=NOT EVAL requirement.islr::ISLR of -20 dB: not evaluated; no declared error " in command
 
     def test_what_a_row_shows_is_no_second_finding(self) -> None:
         """A requirement that a failing row breaks is one annotation, of ten that a step shows."""
@@ -219,9 +219,9 @@ def test_the_first_table_of_a_page_is_that_of_requirements(format_name: str) -> 
         assert cells[0] == ["Requirement", "Allowed", "Reached", "Use", "Status", "Decided by"]
         assert cells[-1][0] == "ISLR"
         assert cells[-1][4] == "not evaluated"
-        assert "nothing declared that spreads" in cells[-1][5]
+        assert "no declared error adds to the ISLR" in cells[-1][5]
     else:
-        assert "| ISLR | -20 dB | – | – | not evaluated | nothing declared that spreads" in text
+        assert "| ISLR | -20 dB | – | – | not evaluated | no declared error adds to the ISLR" in text
     assert re.search("1 of 17 kinds of error", text)
 
 

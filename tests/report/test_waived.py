@@ -259,7 +259,7 @@ def test_a_solution_is_where_it_complies_without_the_waiver(run: Run, waived: Pa
     )
     assert re.search(rf"no value of the range complies, \d+ waived \({WAIVER}\)", said)
     usage = " ".join(run("solve", "--help").stdout.split())
-    assert "Exit code: 0, also where nothing complies and something is waived; 1 if" in usage
+    assert "Exit code: 0, also if nothing complies but some value is waived; 1 if" in usage
 
 
 def test_a_solution_in_python_counts_it_apart(waived: Path) -> None:

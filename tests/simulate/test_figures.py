@@ -176,7 +176,7 @@ class TestPictures:
         turned = [math.cos(look) * at[0] + math.sin(look) * at[1], math.cos(look) * at[1] - math.sin(look) * at[0]]
         assert drawn.rotated.image_points[0] == pytest.approx(turned)
         key = next(panel for panel in point_plot.figure(drawn, "").axes if panel.get_legend())
-        assert key.get_legend().get_texts()[-1].get_text() == "where the image peaks"
+        assert key.get_legend().get_texts()[-1].get_text() == "peak of the image"
 
     def test_a_displaced_response_stands_where_25_puts_it(self, moved) -> None:
         """Two metres north of its place; it was drawn at 0, 0."""

@@ -106,7 +106,7 @@ def test_what_is_stated_as_an_effect_has_no_image() -> None:
     assert [one.id for one in found.rows] == [f"other.a.{key}" for key in others[0] if key != "name"]
     for one in found.rows:
         assert one.verdict == "not_evaluated"
-        assert one.reason == "stated by its effect: there is nothing to form an image of"
+        assert one.reason == "stated by its effect: there is no motion to simulate"
 
 
 # ---------------------------------------------------------------------- what is flown

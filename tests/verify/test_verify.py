@@ -272,14 +272,14 @@ class TestTogether:
         row = self.location("published", [1, 1, 1])
         assert math.hypot(*row.measured_displacement_m) < 1.5
         assert row.verdict == "optimistic"
-        assert "(25) does not say where the image goes" in row.reason
+        assert "(25) does not predict the displacement" in row.reason
 
     def test_location_that_only_is_shorter_is_conservative_and_says_that_the_number_is_wrong(self) -> None:
         row = self.location("published", [0, 0, 1])
         assert math.hypot(*row.displacement_published_m) == pytest.approx(2)
         assert math.hypot(*row.measured_displacement_m) < 1
         assert row.verdict == "conservative"
-        assert "(25) does not say where the image goes" in row.reason
+        assert "(25) does not predict the displacement" in row.reason
 
     def test_location_of_errors_that_hide_each_other_is_not_confirmed(self) -> None:
         """Together 0.3 m by (25) and 25 cm off, less than half a pixel; each alone three metres, and metres off."""

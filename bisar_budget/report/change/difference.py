@@ -163,9 +163,9 @@ def _statuses(change: Change) -> str:
 def _summary(mission: MissionChange, gate: Gate | None, all_rows: bool) -> str:
     newly = sum(change.is_newly_failing for change in mission.changes)
     hidden = len(mission.changes) - len(_shown(mission, gate, all_rows))
-    small = f" ({hidden} by less than 1 %, not shown without --all)" if hidden else ""
+    small = f" ({hidden} by less than 1 %, shown with --all)" if hidden else ""
     rows = counted(len(mission.changes), "row")
-    text = f"{rows} changed{small}, {mission.unchanged} not, {newly} newly failing"
+    text = f"{rows} changed{small}, {mission.unchanged} unchanged, {newly} newly failing"
     if unmet := sum(requirement.is_newly_failing for requirement in mission.requirements):
         text += f"; {counted(unmet, 'requirement')} newly failing"
     if mission.loosened:

@@ -64,9 +64,9 @@ def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
     if findings.monte_carlo is not None:
         sections.append(doc.Chapter("Monte Carlo", list(_draws(page, findings.monte_carlo)), f"{page.anchor}-draws"))
     if page.is_full:
-        title = "Formulas, with the numbers put in"
+        title = "Formulas with their numbers"
         sections += [
-            doc.Chapter("Rows in full", list(_rows(page)), f"{page.anchor}-rows"),
+            doc.Chapter("All rows", list(_rows(page)), f"{page.anchor}-rows"),
             doc.Chapter("Sources", list(_sources(page)), f"{page.anchor}-sources"),
             doc.Chapter(title, list(_formulas(page)), f"{page.anchor}-formulas", short="Formulas"),
         ]
@@ -82,13 +82,11 @@ def _specified(page: Page, sheet: SpecificationSheet) -> Iterator[doc.Block]:
     silent = sum(spec.declared is None and spec.ordered is not None for spec in sheet.specifications)
     clauses = list[str]()
     if not sheet.broken:
-        clauses.append(
-            f"of what the file declares {counted(outside, 'figure')} {'is' if outside == 1 else 'are'} larger"
-        )
+        clauses.append(f"declared sizes above their specification: {outside}")
         clauses += [f"not declared: {silent}"] if silent else []
     suffix = "; ".join(["", *clauses])
-    subject = "Sizes that together meet every requirement, of the errors that "
-    yield doc.Paragraph((subject, doc.Code("allocation.specify"), f" names{suffix}."))
+    subject = "Sizes that together meet every requirement, for the errors in "
+    yield doc.Paragraph((subject, doc.Code("allocation.specify"), f"{suffix}."))
     yield from specified(sheet, f"{page.anchor}-specified")
     yield doc.Paragraph(doc.Code(f"bisar-budget allocate {quote(page.file)}"), "command")
 
@@ -102,14 +100,14 @@ def _studied(page: Page, study: TradeStudy) -> doc.Chapter:
     if len(trade.axes) == 1:
         listed_lines = list(_stretches(trade))
         heads = doc.heads("Values", "Status", doc.Head("Worst row", "id"), *doc.numbers("Utilization"))
-        caption = "Where it complies, and what binds there: the row that uses most of its limit"
+        caption = "Values that comply, and the binding row: the one that uses most of its limit"
     else:
         listed_lines = list(_binding_lines(trade, by_word[1] if by_word else {}))
         name: doc.Text = doc.Name(by_word[0].key) if by_word else "Worst row"
         waived_heads = ["Waived"] if study.waived else []
         heads = doc.heads(doc.Head(name, "id"), *doc.numbers("Cases", "Comply", *waived_heads, "Utilization"))
-        caption = "What binds in how many cases, and how many of them comply"
-        caption = "How many cases comply with each" if by_word else caption
+        caption = "Binding rows, with the number of their cases and of those that comply"
+        caption = "Number of cases that comply, by value" if by_word else caption
     ellipsis = " ..." if len(listed_lines) > _MAX_LISTED_LINES else "."
     list_words = "; ".join(words for _, words in listed_lines[:_MAX_LISTED_LINES]) + ellipsis
     title = f"Trade study: {' and '.join(axis.key for axis in trade.axes)}"
@@ -124,7 +122,7 @@ def _studied(page: Page, study: TradeStudy) -> doc.Chapter:
         illustration.append(doc.TextTable(f"Cases of {page.name}", caption, heads, lines))
     blocks: list[doc.Block] = [
         doc.Paragraph(question),
-        doc.Paragraph(f"{counts} Each was checked as the mission itself. This writes them as a table:"),
+        doc.Paragraph(f"{counts} Each was checked like the mission itself. This command writes them as a table:"),
         doc.Paragraph(doc.Code(_command(findings, study, page.file)), "command"),
         doc.Group("beside", illustration),
     ]
@@ -164,7 +162,7 @@ def _counts(study: TradeStudy) -> str:
     if failing:
         clauses.append(f"{failing} break a requirement")
     if study.missing:
-        clauses.append(f"{study.missing} {'are' if study.missing > 1 else 'is'} no mission")
+        clauses.append(f"{study.missing} without a mission")
     return f"{clauses[0]}: {', '.join(clauses[1:])}."
 
 
@@ -237,8 +235,8 @@ def _evidence(page: Page) -> Iterator[doc.Block]:
     )
     yield doc.TextTable(
         f"Image evidence of {page.name}",
-        "At the limit: what the budget promises, what Table II, the full model and exact ranges predict, what the "
-        "image shows. Phases in rad.",
+        "At the limit: budget, predictions by Table II, the full model and exact ranges, and the measurement in the "
+        "image. Phases in rad.",
         _heads("Limit", "Budget", "Table II", "Full model", "Exact ranges", "Image"),
         [
             (
@@ -283,9 +281,9 @@ def _images(page: Page, evidence: ImageEvidence, number: int) -> doc.Group:
     subject = f"{row_id} at the limit with autofocus"
     point_images = [("limit", f"{row_id} at the limit", "At the limit", evidence.at_limit)]
     if evidence.before_autofocus and evidence.after_autofocus:
-        before, after = "At the limit with autofocus, before it", "The same, after it"
-        point_images.append(("before", f"{subject}, before it", before, evidence.before_autofocus))
-        point_images.append(("after", f"{subject}, after it", after, evidence.after_autofocus))
+        before, after = "At the limit with autofocus, before autofocus", "After autofocus"
+        point_images.append(("before", f"{subject}, before autofocus", before, evidence.before_autofocus))
+        point_images.append(("after", f"{subject}, after autofocus", after, evidence.after_autofocus))
     chips = [
         doc.ShownImage(
             f"{page.number}-chip-{number}-{name}.png", title, f"{caption}: {chip_caption(image)}", chip_png(image),
@@ -329,16 +327,16 @@ def _draws(page: Page, drawn: MonteCarlo) -> Iterator[doc.Block]:
     if lines:
         yield doc.TextTable(
             f"Monte Carlo of {page.name}",
-            f"How often each requirement holds: {drawn.draws:,} draws, seed {drawn.seed}, {drawn.model} model; "
-            f"intervals of {100 * drawn.confidence:.0f} %. Beside it what needs no draws: worst-case sum, "
-            "root-sum-square, standard deviation.",
+            f"Probability that each requirement holds: {drawn.draws:,} draws, seed {drawn.seed}, {drawn.model} "
+            f"model; intervals of {100 * drawn.confidence:.0f} %. For comparison: worst-case sum, root-sum-square, "
+            "standard deviation.",
             doc.heads(doc.Head("Requirement", "id"), *doc.numbers("Limit", "Sum", "Rss", "Sigma"), "Over the draws"),
             lines,
         )
     remarks = [f"{requirement.id}: {text}" for requirement in drawn.requirements for text in requirement.warnings]
     remarks += drawn.notes
     if drawn.probability is None:
-        remarks.append("no declared error has a requirement to hold")
+        remarks.append("no requirement limits a declared error")
     if remarks:
         yield doc.Items([[f"{sentence(text)}."] for text in remarks])
 
@@ -379,7 +377,7 @@ def _sources(page: Page) -> Iterator[doc.Block]:
             names += [", " if names else "", doc.Styled("id", doc.Name(row_id))]
         yield doc.Paragraph(("The file names no source for ", *names, "."))
     elif not by_source:
-        yield doc.Paragraph("No error is declared that would need one.")
+        yield doc.Paragraph("No declared error needs a source.")
 
 
 def _formulas(page: Page) -> Iterator[doc.Block]:
@@ -402,4 +400,4 @@ def _formulas(page: Page) -> Iterator[doc.Block]:
         for number, title, left, right in EQUATIONS
         if number not in ("(11)", "(31)") and (page.mission.has_direct_path or not title.startswith("Direct path"))
     ]
-    yield doc.Chapter("In general", [doc.Steps(f"General formulas, {page.name}", general)], level=4)
+    yield doc.Chapter("General formulas", [doc.Steps(f"General formulas, {page.name}", general)], level=4)

@@ -137,7 +137,7 @@ def undeclared_table(page: Page) -> doc.TextTable:
     """Table of the errors that the file does not declare, with their allowables."""
     return doc.TextTable(
         f"Errors that {page.name} does not declare",
-        "Not declared, so not judged, and what each may be",
+        "Not declared and not judged, with allowables",
         doc.heads(doc.Head("Id", "id"), *doc.numbers("Allowable"), "From"),
         [(doc.Name(row.id), dashed(allowable_words(row, page.findings)), row.equation) for row in page.undeclared],
     )
@@ -214,7 +214,7 @@ def source_of_limit(page: Page, row: Row) -> str:
     if row.metric == DECLARE:
         return f"declared: {', '.join(requirements.declare)}"
     if row.subject.kind == "autofocus_pull_in":
-        return "all QPE together within what autofocus corrects, π·N_pull"
+        return "total QPE within the pull-in range of autofocus, π·N_pull"
     if row.subject.kind == "spatial_variance":  # one correction serves the whole scene, so that autofocus has no gain
         return f"QPE differs over the scene by ≤ {phase_limit(allocation.qpe_total, findings)}"
     if row.subject.kind == "dispersion":
@@ -327,7 +327,7 @@ def largest_contributions(page: Page) -> Iterator[doc.Block]:
 
 def _largest(page: Page, contributions: Sequence[Contribution], name: str, head: str, caption: str) -> doc.TextTable:
     """Table of the largest contributions to the phase or to the displacement."""
-    sum_heads = doc.numbers("Of the sum") if any(error.model_cells for error in contributions) else []
+    sum_heads = doc.numbers("Share of the sum") if any(error.model_cells for error in contributions) else []
     size = doc.Head(head, "number")
     columns = doc.heads("Owner", "Kind", "Axis or term", size, "Relative to the largest", *sum_heads)
     lines: list[doc.Line] = [
@@ -348,12 +348,12 @@ def _largest(page: Page, contributions: Sequence[Contribution], name: str, head:
 
 def all_contributions(page: Page) -> Iterator[doc.Block]:
     """Tables of all errors that have a phase, and of all that displace the image."""
-    models = ("Gating model", "Of the sum", "Published", "Full")
+    models = ("Deciding model", "Share of the sum", "Published", "Full")
     for contributions, title, heads, caption in (
         (
             phase_contributions(page), "contributions to the phase", models,
-            "Quadratic phase error of every declared error by the model that gates, the published and the full one, "
-            "before autofocus; what has none is left out",
+            "Quadratic phase error of every declared error that has one, before autofocus: by the deciding model, "
+            "the published and the full model",
         ),
         (
             displacement_contributions(page), "displacements", ("Displacement",),

@@ -72,23 +72,22 @@ _DISTRIBUTION_WORDS = {
 _VALIDITY = {
     "published": (
         "Rigling & Moses, Tables I and II. It is of first order in the errors and holds the slant ranges constant "
-        "over the aperture. It is accurate near broadside. At a squint, a look off broadside, limits of velocity "
-        "errors can be a third too generous or several times too strict. A row that fails by the full model is a "
-        "warning."
+        "over the aperture. It is accurate near broadside. At a squint, limits of velocity errors can be a third too "
+        "large or several times too small. A row that fails by the full model is a warning."
     ),
     "full": (
         "Exact ranges, for errors of any size. Lines of sight turn over the aperture, and the displaced response has "
-        "a phase of its own. A row that the published model fails is a warning."
+        "a phase of its own. A row that fails by the published model is a warning."
     ),
     "strictest": (
         "Two complete checks, by the published model (Rigling & Moses, Tables I and II) and by the full model "
-        "(exact ranges). Each row is that of the stricter verdict."
+        "(exact ranges). Each row has the stricter verdict."
     ),
 }
 _COMBINATION_SENTENCES = {
-    "each": "each error alone is held to its share of the budget",
-    "sum": "the worst-case sum of a platform's errors is held to its share",
-    "rss": "the errors of a platform are taken as independent; their root-sum-square is held to its share",
+    "each": "each error alone is limited by its share of the budget",
+    "sum": "the worst-case sum of a platform's errors is limited by its share",
+    "rss": "the errors of a platform are independent; their root-sum-square is limited by its share",
 }
 
 
@@ -206,8 +205,8 @@ def _index_line(page: Page) -> doc.Line:
 def _provenance(report: Report) -> doc.Chapter:
     files = "s above, each" if len(report.missions) > 1 else " above,"
     text = (
-        f"By bisar-budget {report.version} from the mission file{files} known by the SHA-256 of its bytes. The same "
-        "input gives the same bytes. Options that bear on the result:"
+        f"By bisar-budget {report.version} from the mission file{files} identified by its SHA-256. The same input "
+        "gives the same bytes. Options that affect the result:"
     )
     options: list[doc.Line] = [
         (doc.Styled("id", option.name), option.value, option.origin) for option in report.options
@@ -264,7 +263,7 @@ def _summary(page: Page) -> list[doc.Block]:
         doc.Chapter("Verdict", list(_verdict(page)), f"{page.anchor}-verdict"),
         doc.Chapter("Compliance matrix", list(_matrix(page)), f"{page.anchor}-matrix"),
         doc.Chapter(
-            "Where phase and displacement come from",
+            "Contributions to phase and displacement",
             list(largest_contributions(page)),
             f"{page.anchor}-contributions",
             short="Contributions",
@@ -304,8 +303,8 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
     if narrow := narrow_gradients(findings.geometry):
         yield doc.Paragraph(narrow)
     if drivers := list(_drivers(page)):
-        subject = "rows that drive" if len(drivers) > 1 else "row that drives"
-        yield doc.Paragraph(f"The {subject} it (QPE is the quadratic phase error at the aperture edge):")
+        subject = "Rows that decide" if len(drivers) > 1 else "Row that decides"
+        yield doc.Paragraph(f"{subject} the verdict (QPE: quadratic phase error at the aperture edge):")
         yield doc.Items([_driver(row, findings) for row in drivers], "drivers", is_numbered=True)
 
 
@@ -326,7 +325,7 @@ def _requirements(page: Page) -> doc.TextTable:
             )
         )
     columns = doc.heads("Requirement", *doc.numbers("Allowed", "Reached", "Use"), "Status", "Decided by")
-    caption = "Requirements, and whether each was judged and is met"
+    caption = "Requirements and their verdicts"
     return doc.TextTable(f"Requirements of {page.name}", caption, columns, lines, "requirements")
 
 
@@ -350,15 +349,15 @@ def _matrix(page: Page) -> Iterator[doc.Block]:
         yield undeclared_table(page)
         return
     caption = (
-        "What is declared or limits something, the worst first. Utilization is declared over allowable, in dB of "
-        "amplitudes; the mark on its bar is the allowable. A margin of × 12 is an allowable of twelve times what is "
-        "declared. The requirement is the one that sets the allowable."
+        "Declared errors and rows with a limit, worst first. Utilization is declared over allowable, for levels in "
+        "dB the ratio of amplitudes; the mark on its bar is the allowable. A margin of × 12: the allowable is twelve "
+        "times the declared value. The requirement is the one that sets the allowable."
     )
-    caption += " The annex has the formulas of each id." if page.is_full else ""
+    caption += " The annex has the formulas of each row." if page.is_full else ""
     shown = [row for row in page.matrix if row.id in page.in_summary]
     yield matrix_table(page, shown, f"Compliance matrix of {page.name}", caption)
     hidden = len(page.hidden)
-    counts = [f"{hidden} rows that pass or limit nothing" if hidden > 1 else "1 row that passes or limits nothing"]
+    counts = [f"{hidden} rows that pass or have no effect" if hidden > 1 else "1 row that passes or has no effect"]
     counts = (counts if hidden else []) + ([f"{len(page.undeclared)} not declared"] if page.undeclared else [])
     if counts:
         annex_words: doc.Text = " (in the annex)" if page.is_full else (" (", doc.Code("--detail full"), " has them)")
@@ -388,7 +387,7 @@ def _allocation(page: Page) -> Iterator[doc.Block]:
     findings, allocation = page.findings, page.findings.allocation
     total, gain = allocation.qpe_total, allocation.autofocus_gain
     yield doc.Paragraph(
-        f"The quadratic phase error at the aperture edge may be {phase_limit(total, findings)} in all; "
+        f"Total quadratic phase error allowed at the aperture edge: {phase_limit(total, findings)}; "
         f"{_gain(allocation)}."
     )
     shares = [
@@ -407,7 +406,7 @@ def _allocation(page: Page) -> Iterator[doc.Block]:
         if share or owner == "clock":
             limit = share * total if share else allocation.qpe_limit(owner)
             name: doc.Text = (doc.Swatch(owner, share), owner) if share else owner
-            share_words = f"{share:.3g}" if share else "held to the receiver’s"
+            share_words = f"{share:.3g}" if share else "limited by the receiver’s"
             lines.append((name, share_words, phase_limit(limit, findings), phase_limit(limit * gain, findings)))
     columns = doc.heads("Owner", *doc.numbers("Share", "Before autofocus", "With autofocus"))
     yield doc.TextTable(f"Allocation of {page.name}", "Shares of the quadratic phase error", columns, lines)
@@ -478,14 +477,14 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
     """Names and texts of the assumptions of the verdict, and of its range of validity."""
     mission, findings = page.mission, page.findings
     if findings.changes:
-        yield "Mission", f"not that of the file, but that of the file with {changes_words(findings.changes)}"
+        yield "Mission", f"the mission of the file, changed by {changes_words(findings.changes)}"
     yield "Model", _VALIDITY[findings.model]
     if mission.has_direct_path:
         yield (
             "Direct path",
-            "the receiver hears the transmitter and takes it as its clock: ranges are less the distance of the "
-            "platforms, and timing errors have no effect. The published model does not know that: its values are "
-            "those without, and a row that it fails is no warning",
+            "the receiver uses the direct signal of the transmitter as its clock: ranges are less the distance "
+            "between the platforms, and timing errors have no effect. The published model ignores the direct path, "
+            "so a row that fails only by it is no warning",
         )
     for name, path in findings.paths:
         yield f"Path of the {name}", path_words(path)
@@ -529,29 +528,31 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
     if any(platform.motion_error.imu or platform.motion_error.random for platform in mission.platforms):
         yield (
             "Sensors",
-            "one sigma, axes independent. Inertial sensors act from mid-aperture on: position and velocity there are "
-            "those declared. Attitude and gyros turn the specific force, scale factors add a part of it",
+            "one sigma, axes independent. Errors of inertial sensors grow from mid-aperture, where position and "
+            "velocity errors are as declared. Attitude errors and gyros turn the specific force, scale factor errors "
+            "add a fraction of it",
         )
     if any(platform.motion_error.lever_arm for platform in mission.platforms):
         yield (
             "Lever arms",
-            "along, cross and up of the velocity, turning with it; of a platform that stands still along the axes of "
-            "the scene. Attitude swings an arm and turns the specific force: the row of the inertial sensor has both",
+            "components along, cross and up of the velocity, turning with it; for a fixed platform along the axes of "
+            "the scene. Attitude errors swing the arm and turn the specific force: the row of the inertial sensor "
+            "includes both",
         )
     if any(row.subject.kind == "time_tag" for row in findings.rows):
-        yield "Time tags", "a path is measured where its platform is later by so much"
+        yield "Time tags", "measured positions belong to times later by the error"
     if any(platform.oscillator for platform in mission.platforms) or mission.synchronization:
         yield (
             "Clocks",
-            "spectra of phase are one-sided, and count to the mask’s end or the oscillator’s bandwidth, 1 kHz where "
-            "neither is stated. The level of an oscillator is that of its noise against the noise declared, 0 dB",
+            "phase spectra are one-sided and count up to the end of the mask or the bandwidth of the oscillator, "
+            "1 kHz if neither is stated. The level of an oscillator is its noise relative to the declared noise",
         )
     if mission.propagation is not None:
         yield (
             "Delays in the air",
-            f"one sigma of what correction leaves above the scene, {_air_of(mission.propagation)}. Below 80 km a leg "
-            "is as long as over a flat Earth and crosses no free electrons; above, it crosses spherical shells at "
-            "7 km and 350 km",
+            "one sigma of the residual after correction, at the zenith of the scene, "
+            f"{_air_of(mission.propagation)}. Below a platform height of 80 km the Earth is flat for the leg and "
+            "there are no free electrons; above, the leg crosses spherical shells at 7 km and 350 km",
         )
     for row in findings.rows:
         if row.subject.kind == "oscillator" and row.remarks:
@@ -564,7 +565,7 @@ def _air_of(propagation: Propagation) -> str:
     legs = {name: propagation.leg(name) for name in Platforms._fields}
     times = {name: leg.correlation_time for name, leg in legs.items() if leg is not None}
     change_words = {
-        name: "as it is within the aperture"
+        name: "constant within the aperture"
         if time is None
         else f"with a correlation time of {format_quantity(time, 's')}"
         for name, time in times.items()
@@ -610,6 +611,6 @@ def _inputs(page: Page) -> Iterator[tuple[str, str, str]]:
     yield value_from("combination", allocation.combine, ("allocation", "combine"))
     yield value_from("model", allocation.model, ("allocation", "model"))
     if mission.has_direct_path:
-        yield value_from("clock", "the direct path; the full model gates", ("synchronization", "method"))
+        yield value_from("clock", "the direct path; the full model decides", ("synchronization", "method"))
     yield value_from("coverage factor", f"{allocation.coverage_factor:g}", ("allocation", "coverage_factor"))
     yield value_from("warning above", f"{100 * allocation.warn_above:g} % of a limit", ("allocation", "warn_above"))

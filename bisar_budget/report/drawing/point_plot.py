@@ -245,12 +245,12 @@ def figure(drawn: Sheet, title: str) -> "Figure":
     bar = page.colorbar(artist, ax=key, orientation="horizontal", location="bottom", fraction=0.5, pad=0.02)
     bar.set_label("dB to the error-free peak")
     styles = [
-        (_target_mark(_TARGET_COLOR), "where the target stands"),
-        (_prediction_mark(_PREDICTION_COLOR), "where (25) puts it"),
+        (_target_mark(_TARGET_COLOR), "position of the target"),
+        (_prediction_mark(_PREDICTION_COLOR), "position by (25)"),
         ({"ls": "none", "marker": "o", "color": _MARK_COLOR, "ms": 5}, "points of (29)"),
     ]
     if drawn.in_scene.image_points.size:
-        styles.append((_peak_mark(_PEAK_COLOR), "where the image peaks"))
+        styles.append((_peak_mark(_PEAK_COLOR), "peak of the image"))
     marks = [key.plot([], [], label=label, **style)[0] for style, label in styles]
     key.legend(handles=marks, loc="lower center", facecolor=_NOT_FORMED_COLOR, labelcolor="white", fontsize=10)
     page.suptitle(printable(title), parse_math=False)  # a $ in a name begins no formula
@@ -304,20 +304,20 @@ def _flown(mission: Mission) -> str:
     factor = mission.allocation.coverage_factor
     times = f", {factor:g} times the file's values" if factor != 1 else ""
     errors = (getattr(mission.platforms, name).motion_error for name in PLATFORMS)
-    covariance_words = "; of a covariance its most probable one" if any(error.covariance for error in errors) else ""
-    seed = (mission.simulation or Simulation()).seed
-    realisation_words = (
-        f"; of sensors and clocks one time series each, seed {seed}" if has_instruments(mission) else ""
+    covariance_words = (
+        "; the most probable error of a covariance" if any(error.covariance for error in errors) else ""
     )
+    seed = (mission.simulation or Simulation()).seed
+    realisation_words = f"; one time series of each sensor and clock, seed {seed}" if has_instruments(mission) else ""
     if mission.propagation is not None:
-        realisation_words += f"; of delays in the air one draw each, seed {seed}, of those that change a time series"
+        realisation_words += f"; one draw of each delay in the air, seed {seed}, a time series of those that change"
     if any(platform.oscillator and platform.oscillator.spurs for platform in mission.platforms):
-        realisation_words += "; spurs are left out, but for what exchanges fold below one cycle per aperture"
+        realisation_words += "; without spurs, except those that exchanges fold below one cycle per aperture"
     if has_instruments(mission) and has_unset_clocks(mission):
-        realisation_words += "; of oscillators without mean and slope, since the file does not say how they are set"
+        realisation_words += "; oscillators without mean and slope, since the file does not state how they were set"
     return (
-        f"the declared ones together, with the signs of the file{times}{covariance_words}{realisation_words}. "
-        "Some may cancel: the worst case is that of check"
+        f"all declared errors, with the signs of the file{times}{covariance_words}{realisation_words}. "
+        "They may cancel: check gives the worst case"
     )
 
 
@@ -345,8 +345,8 @@ def summary(images: PointImages, mission: Mission) -> str:
     if abs(error_db) > _MAX_READING_ERROR_DB:
         text = (
             f"peaks, widths and sidelobes are in doubt: the error-free response is read {abs(error_db):.1g} dB too "
-            f"{'high' if error_db > 0 else 'low'}, since lines of equal range and of equal Doppler run together "
-            "beside it"
+            f"{'high' if error_db > 0 else 'low'}, since lines of equal range and of equal Doppler are nearly "
+            "parallel there"
         )
         lines += ["", *wrapped(text, "")]
     restored_db = 20 * np.log10(images.focused_response.peak / clean.peak)

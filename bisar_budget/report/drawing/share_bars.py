@@ -35,7 +35,7 @@ def share_bars(sheet: SpecificationSheet) -> str:
     keys = [spec.key for spec in sheet.specifications]
     rule = "squares add up" if sheet.combine == "rss" else "sizes add up"
     top = svg.head(
-        canvas, [svg.short(printable(sheet.name), _SHARES_WIDTH_PX), f"what each error takes of a limit; {rule}"]
+        canvas, [svg.short(printable(sheet.name), _SHARES_WIDTH_PX), f"share of each error in a limit; {rule}"]
     )
     rows = limiting(sheet)
     frame = svg.Box(_NAMES_PX, top, _SHARES_WIDTH_PX - _SHARES_EDGE_PX, top + _SHARES_ROW_PX * max(len(rows), 1))
@@ -58,8 +58,8 @@ def share_bars(sheet: SpecificationSheet) -> str:
             start = end
         canvas.text((frame.left - 8, middle + 4), [svg.short(_name(row), _NAMES_PX - 16)], "axis", "end")
     if not rows:
-        canvas.text((frame.middle[0], top + _SHARES_ROW_PX / 2 + 4), ["no row limits anything"], "", "middle")
-    bottom = svg.x_axis(canvas, frame, along, "part of what the row may use [%]")
+        canvas.text((frame.middle[0], top + _SHARES_ROW_PX / 2 + 4), ["no limiting row"], "", "middle")
+    bottom = svg.x_axis(canvas, frame, along, "share of the usable part of the limit [%]")
     for number, spec in enumerate(sheet.specifications, 1):
         if any(spec.key in row.shares for row in rows):
             bottom += svg.LINE_PX

@@ -98,8 +98,8 @@ def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterat
     platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     gates_by_full = model == "full"
     if gates_by_full and source.is_motion and (source.owner != "mission" or source.is_time_tag):
-        unaware = ", which does not know the direct path" if analysis.mission.has_direct_path else ""
-        yield step(f"The published model, for comparison{unaware}; what gates, the full model, comes after it")
+        unaware = ", which ignores the direct path" if analysis.mission.has_direct_path else ""
+        yield step(f"The published model, for comparison{unaware}; the full model, which decides, follows")
     if not source.is_motion:
         yield step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
     elif source.is_time_tag:
@@ -464,18 +464,18 @@ class Residual:
             ]
             formula += " + 4*ρ_3^2/175 + ρ_rest^2"
             values |= {"ρ_3": self.orders[_CUBIC_ORDER], "ρ_rest": self.rms(self.beyond)}
-            turn_words = "; a line of sight turns by more than a radian, so that cubic and rest are in it too"
+            turn_words = "; a line of sight turns by more than a radian, so that it includes cubic and rest"
         yield step(
-            "Rms of what is left, ρ_1 its slope at the aperture edge (P₁): what the band and the turn leave of them",
+            "Residual range error: its rms ρ_rms and its slope ρ_1 at the aperture edge (P₁), for the hidden phase",
             *orders,
         )
         symbol = f"hidden_{mark}"
         hidden = WorkedEquation(symbol, f"2*π/λ*sqrt(45/4*({formula}))", values, self.hidden, "rad")
-        yield step(f"Hidden phase: a quadratic one that costs the peak as much{turn_words}", hidden)
+        yield step(f"Hidden phase: a quadratic phase with the same peak loss{turn_words}", hidden)
         values = {f"QPE_{mark}": self.phase(_QUADRATIC_ORDER), symbol: self.hidden}
         equal_loss = math.hypot(self.phase(_QUADRATIC_ORDER), self.hidden)
         yield step(
-            "Quadratic phase of equal loss" + ("" if self.gain > 1 else ", which is judged"),
+            "Quadratic phase of equal peak loss" + ("" if self.gain > 1 else ", which is judged"),
             WorkedEquation(f"equal_{mark}", f"sqrt(QPE_{mark}^2 + {symbol}^2)", values, equal_loss, "rad"),
         )
         if self.gain > 1:
@@ -486,7 +486,7 @@ class Residual:
                 self.judged,
                 "rad",
             )
-            yield step("Judged, against a limit that holds the gain: autofocus corrects no hidden phase", worked)
+            yield step("Judged against a limit that includes the gain: autofocus corrects no hidden phase", worked)
 
     def listed(self, values: Sequence[float]) -> list[str]:
         """Lines of values at the nodes, with their times."""
@@ -499,7 +499,7 @@ class Residual:
         terms = self._products(self.beyond)
         wavelength = number(self.radar.wavelength)
         worked = Sum(f"rest_full = 2*π/{wavelength}*sqrt({terms}) = {with_unit(self.beyond_phase, 'rad')}")
-        yield step("Rms phase of it, which spreads", worked)
+        yield step("Its rms phase, which adds to the ISLR", worked)
 
     def _terms(self, order: int) -> str:
         pairs = zip(self.exact.fit[order].tolist(), self.ranges, strict=True)
@@ -552,13 +552,13 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
         return
     residual = worse_sign(analysis, source, size)
     if not residual.ranges:
-        yield step(f"Full model{each}: no ground point has the range history that this error leaves")
+        yield step(f"Full model{each}: no ground point has the range history of this error")
         return
     yield from _orbit_motion(analysis, source, residual.size)
-    sign = "" if residual.is_small or residual.size == size else ", with the other sign, which leaves more"
+    sign = "" if residual.is_small or residual.size == size else ", with the other sign, whose residual is larger"
     yield step(
-        f"Full model{each}{sign}: the ground point at which V = Var(ρ) + b²·⟨ρ²⟩ is least, ρ the range error that is "
-        "left, ⟨ ⟩ its mean over the aperture, b² the variance of the frequency over the band in units of f_0²",
+        f"Full model{each}{sign}: ground point with the smallest V = Var(ρ) + b²·⟨ρ²⟩; ρ: residual range error, ⟨ ⟩: "
+        "mean over the aperture, b²: variance of the frequency over the band in units of f_0²",
         *_image_point_lines(residual),
     )
     yield step(
@@ -566,7 +566,7 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
         *residual.listed(residual.ranges),
     )
     yield step(
-        "Quadratic phase at the aperture edge, 3/2 of P₂: weights of the fit times what is left",
+        "Quadratic phase at the aperture edge, 3/2 of P₂: weights of the fit times residual",
         residual.sum("QPE_full", _QUADRATIC_ORDER),
     )
     yield from residual.steps()
@@ -616,7 +616,7 @@ def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: s
         yield step(f"Full model{each}, for comparison: no ground point has the range history")
         return
     yield step(
-        f"Full model{each}, for comparison: weights of the fit times the range error left (--model full lists it)",
+        f"Full model{each}, for comparison: weights of the fit times residual (--model full lists it)",
         residual.sum("QPE_full", _QUADRATIC_ORDER),
     )
 
@@ -649,9 +649,9 @@ def _displacement_of(residual: Residual) -> float:
 def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
     """Step that explains the end of the image."""
     yield step(
-        "End of the image: no ground point has the range history of a larger error, of one sign or the other",
+        "End of the image: no ground point has the range history of a larger error of either sign",
         "The point is followed as the error grows, to where range and Doppler gradients become parallel there",
-        f"by_image = {with_unit(size, unit)}, a limit whatever phase or displacement is allowed",
+        f"by_image = {with_unit(size, unit)}, a limit for any allowed phase or displacement",
     )
 
 
@@ -674,7 +674,7 @@ def smallest_size(row: Row, sizes: Mapping[str, float]) -> Iterator[Step]:
     factor = min(allowed_sizes)
     yield step(f"{title}: a factor of the noise's amplitude", Sum(f"factor = {text} = {with_unit(factor, '')}"))
     worked = WorkedEquation("allowable", "20*log(factor)/log(10)", {"factor": factor}, row.allowable, "dB")
-    yield step("As a level, against the noise that is declared: it may rise by that much", worked)
+    yield step("As a level relative to the declared noise", worked)
     yield step("Utilization", WorkedEquation("utilization", "1/factor", {"factor": factor}, 1 / factor, ""))
 
 

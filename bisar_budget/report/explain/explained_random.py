@@ -87,7 +87,7 @@ _SYMBOLS = {
 _PHASE_SYMBOLS = ("QPE", "cubic", "left")
 _PER_SENSITIVITY = "rad per s²/m"
 _MOMENT_FRACTIONS = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of half an aperture
-_PHASE_WORDS = ("quadratic phase at the aperture edge", "cubic phase there", "what is left after the cubic, rms")
+_PHASE_WORDS = ("quadratic phase at the aperture edge", "cubic phase there", "residual after the cubic, rms")
 
 
 def explained_random(analysis: Analysis, allocation: Allocation, error: RandomError, row: Row) -> Iterator[Step]:
@@ -160,11 +160,11 @@ def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
         east, north, up = (with_unit(force + 0.0, "m/s^2") for force in specific_force(mission, state))
         yield step("Specific force f = a − g, which accelerometers measure", f"f = [{east}, {north}, {up}]")
         name = (
-            "what a tilt turns of it into the line of sight, f_u = |u × f|"
+            "specific force that a tilt turns into the line of sight, f_u = |u × f|"
             if component == "f_u"
-            else "what scale factors have of it along the line of sight, f_s"
+            else "error of the specific force by scale factors along the line of sight, f_s"
         )
-    yield step(f"Through {name}, at mid-aperture; of three values the root-sum-square of what each has")
+    yield step(f"Through {name}, at mid-aperture; for three values the root-sum-square of their components")
     for index, formula in enumerate(formulas):
         if formula:
             k = mission.allocation.coverage_factor if index == 2 else 1.0  # a mean power has no coverage factor
@@ -224,7 +224,8 @@ def _arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     total = math.sqrt(math.fsum(component * component for component in seen))
     worked = WorkedEquation("l_u", "sqrt(l_1^2 + l_2^2 + l_3^2)", values, total, "m per rad")
     yield step(
-        "Along the line of sight, u·(ψ × l) about each axis, and of all at their sizes over the largest", worked
+        "Along the line of sight, u·(ψ × l) about each axis; root-sum-square with sizes relative to the largest",
+        worked,
     )
 
 
@@ -245,7 +246,7 @@ def _lever_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
         total = math.sqrt(math.fsum(component * component for component in seen))
         worked = WorkedEquation("u_l", "sqrt(u_along^2 + u_cross^2 + u_up^2)", values, total, "")
         title = (
-            "R(τ)·δl along the line of sight at mid-aperture: of each axis of the body, at its size over the largest"
+            "R(τ)·δl along the line of sight at mid-aperture, for each axis of the body, relative to the largest size"
         )
         yield step(title, worked)
     yield step(
@@ -288,7 +289,7 @@ def _displacement(error: RandomError, model: str) -> Iterator[Step]:
     source = "(25)" if model == "published" else "exact ranges"
     title = f"Orders 0 and 1 displace the image, by {source}; rms length"
     yield step(
-        title if error.is_covered else "In whatever direction: half of its square east, half of it north",
+        title if error.is_covered else "In any direction: half of its square east, half of it north",
         *(f"{symbol} = {with_unit(value, unit)}" for symbol, value in values.items()),
         WorkedEquation("moved/unit", "sqrt((east/unit)^2 + (north/unit)^2)", values, effect.displacement, unit),
     )
@@ -312,7 +313,7 @@ def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
         error,
         process_of(mission, error).correlation_time,
         "u",
-        "Along the line of sight at mid-aperture, u; of three values the root-sum-square of each",
+        "Along the line of sight at mid-aperture, u; root-sum-square of three values",
     )
 
 
@@ -325,7 +326,7 @@ def _changing_delay(analysis: Analysis, error: RandomError) -> Iterator[Step]:
             error,
             correlation_time,
             "m",
-            "Along the way through the air at mid-aperture, m per unit of the zenith, of one air that of both legs",
+            "Along the path through the air at mid-aperture, m per zenith unit; for one air summed over both legs",
         )
 
 
@@ -342,7 +343,7 @@ def _gauss_markov(
         WorkedEquation("a", "T/(2*τ_c)", {"T": T, "τ_c": correlation_time}, T / (2 * correlation_time), ""),
     )
     mean_squares = gauss_markov(T, correlation_time)
-    words = ("quadratic", "cubic", "left after the cubic", "constant", "linear")
+    words = ("quadratic", "cubic", "residual after the cubic", "constant", "linear")
     yield step(
         "Mean squares of a process of variance 1 with the spectrum 4·τ_c/(1 + (2πf·τ_c)²)",
         *(f"{word} = {number(value)}" for word, value in zip(words, mean_squares, strict=False)),
@@ -374,7 +375,7 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
         yield from _setting(pieces, mission, sync)
     k = mission.allocation.coverage_factor
     if k != 1:
-        yield step(f"Phases times the coverage factor {number(k)}; what is left is a mean power and has none")
+        yield step(f"Phases times the coverage factor {number(k)}; the residual is a mean power and has none")
 
 
 def _slow(
@@ -473,10 +474,10 @@ def _integrals(
 def _link(mission: Mission, error: RandomError) -> Iterator[Step]:
     sync = mission.synchronization
     if sync is None or sync.interval is None:
-        yield step("Another error for each pulse: all of it spreads, none of it is a quadratic phase")
+        yield step("Independent from pulse to pulse: all of it adds to the ISLR, no quadratic phase")
         return
     yield step(
-        "Errors of each exchange, joined by straight lines: S = 2·σ²·T_s·sinc(f·T_s)⁴, two thirds of σ² in all",
+        "Errors of the exchanges, interpolated linearly: S = 2·σ²·T_s·sinc(f·T_s)⁴, in total two thirds of σ²",
         f"T_s = {with_unit(sync.interval, 's')}",
     )
     effect = error.published
@@ -489,7 +490,7 @@ def _spectrum_steps(vibration: Vibration | FeltVibration, spectrum: Spectrum) ->
     quantity, unit = ("acceleration", "g²/Hz") if spectrum.is_accelerated else ("displacement", "m²/Hz")
     scale = STANDARD_GRAVITY_MPS2**2 if spectrum.is_accelerated else 1.0
     points = [f"{f:.6g} Hz: {density / scale:.6g} {unit}" for f, density in spectrum.points]
-    yield step(f"One-sided spectrum of {quantity}, straight over logarithms, nothing beside its points", *points)
+    yield step(f"One-sided spectrum of {quantity}, straight over logarithms, zero outside its points", *points)
     if vibration.spectrum_level:
         power = float(power_of(vibration))
         worked = WorkedEquation("p", "10^(L/10)", {"L": vibration.spectrum_level}, power, "")
@@ -517,7 +518,7 @@ def _spectrum(mission: Mission, error: RandomError) -> Iterator[Step]:
     )
     along = float(counted(mission, name, 1.0, "islr"))
     if along != 1:
-        yield step(f"Of it {number(along)} lies in the range less the direct path")
+        yield step(f"Fraction in the range less the direct path: {number(along)}")
     pieces = pieces_of_vibration(mission, name)
     yield step(
         "One-sided spectrum of phase along the line of sight, one way, S = S_x·(2π/λ)² [rad²/Hz]",
@@ -640,7 +641,7 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
             result = effect.displacement * error.declared
             lines.append(WorkedEquation(f"moved{mark}", "moved/unit*declared", values, result, "m"))
         if lines:
-            yield step(f"Of what is declared, by {model_words}", *lines)
+            yield step(f"For the declared size, by {model_words}", *lines)
 
 
 def _covered(mission: Mission, error: RandomError) -> float:
@@ -672,7 +673,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         worked = WorkedEquation(
             part, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, limited.quadratic, f"rad per {_unit(error)}"
         )
-        yield step("With what band and turn hide, of which autofocus corrects nothing", worked)
+        yield step("With the hidden phase, which autofocus does not correct", worked)
     if limited.quadratic:
         yield by("by_QPE", part, limit, limited.quadratic, "Allowable by the quadratic phase")
     if effect.cubic and required.cubic_phase_error is not None:
@@ -688,7 +689,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         rule, values = allowed_variance(model, power, energy)
         rms = spread_phase(power, model, energy) * math.sqrt(share)
         worked = WorkedEquation("rms", f"sqrt({rule})*sqrt(s)", {**values, "s": share}, rms, "rad")
-        yield step(f"Phase that may be left, requirements.islr {required.islr:g} dB, share s of its power", worked)
+        yield step(f"Residual phase allowed, requirements.islr {required.islr:g} dB, share s of its power", worked)
         sizes["by_ISLR"] = rms / limited.spread
         k = _covered(mission, error)
         values = {"rms": rms, spread: limited.spread * k, "k": k}

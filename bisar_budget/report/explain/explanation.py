@@ -106,7 +106,7 @@ def _lines(steps: Iterable[Step]) -> list[str]:
 
 def _text(mission: Mission, title: str, body: Iterable[str]) -> str:
     lines = [f"{title} of {printable(mission.name)}"]
-    lines += [f"Not as the file says: {changes_words(mission.changes)}"] if mission.changes else []
+    lines += [f"Changed from the file: {changes_words(mission.changes)}"] if mission.changes else []
     lines += ["", *body]
     return "\n".join(fitted for line in lines for fitted in _fitted(line)) + "\n"
 
@@ -475,11 +475,11 @@ def _phase_aggregate(together: Together, findings: MissionFindings, row: Row) ->
         yield from combined("QPE of the declared errors", "sum", sizes_by_name, row.declared)
         values = {"N_pull": allocation.n_pull or 0.0}
         worked = WorkedEquation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
-        yield step("What autofocus corrects, Section VI", worked)
+        yield step("Pull-in range of autofocus, Section VI", worked)
         return
     rule, gain = findings.combine, allocation.autofocus_gain
     title = (
-        "Quadratic phase of equal loss of the declared errors"
+        "Quadratic phase of equal peak loss of the declared errors"
         if row.model == "full"
         else "QPE of the declared errors"
     )
@@ -492,7 +492,7 @@ def _phase_aggregate(together: Together, findings: MissionFindings, row: Row) ->
         title, rule, together.phase_parts(together.judged_parts(members, gain=1.0), rule), row.declared
     )
     judged, limit = float(together.judged(members)[0]), allocation.qpe_allowed(owner)
-    title = "Judged, hidden phases times the gain: autofocus corrects none of them"
+    title = "Judged, with hidden phases times the gain: autofocus corrects none of them"
     yield from combined(
         title, rule, together.phase_parts(together.judged_parts(members), rule), judged, symbol="judged"
     )
@@ -500,7 +500,7 @@ def _phase_aggregate(together: Together, findings: MissionFindings, row: Row) ->
     if row.declared and row.allowable is not None:
         values = {"limit": limit, "combined": row.declared, "judged": judged}
         worked = WorkedEquation("allowable", "limit*combined/judged", values, row.allowable, "rad")
-        yield step("Of the phase of equal loss so much is allowed as reaches the limit", worked)
+        yield step("Allowable, as a phase of equal peak loss", worked)
 
 
 def _cubic_aggregate(together: Together, findings: MissionFindings, row: Row) -> Iterator[Step]:
@@ -646,9 +646,9 @@ def _air_that_changes(reason: Note) -> Step:
     values: Sequence[SectionValue] = reason.values
     _, correlation_time, key, size, use, _ = values
     unit = {"islr": "dB", LOCATION: "m"}.get(key, "rad")
-    title = f"The declared delays of the air, as if they changed in {with_unit(correlation_time, 's')}"
+    title = f"The declared delays of the air, if their correlation time were {with_unit(correlation_time, 's')}"
     return step(
-        title, f"{key} = {with_unit(size, unit)}", f"use = {number(use)}, {NEGLIGIBLE_FRACTION:g} may go unsaid"
+        title, f"{key} = {with_unit(size, unit)}", f"use = {number(use)}, negligible up to {NEGLIGIBLE_FRACTION:g}"
     )
 
 
@@ -675,7 +675,7 @@ def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[S
         )
     total, rule, sizes_by_name = max(totals, key=lambda candidate: candidate[0])
     yield from combined(
-        f"{_EFFECT_TITLES[kind]}: no requirement takes it", rule, sizes_by_name, total, symbol="total"
+        f"{_EFFECT_TITLES[kind]}: no requirement judges it", rule, sizes_by_name, total, symbol="total"
     )
     required = analysis.mission.requirements.quadratic_phase_error
     values = {"required": required}
@@ -692,9 +692,7 @@ def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[S
     worked = WorkedEquation(
         "least", f"min({MAKER_FRACTION:g}*largest, negligible/{count})", values, float(untaken.least[0]), "rad"
     )
-    title = (
-        "Parts of at least a tenth of the largest make it up, and smaller ones that together would not be negligible"
-    )
+    title = "It consists of parts of at least a tenth of the largest, and of smaller ones if together not negligible"
     yield step(f"{title}; this row’s is {with_unit(row_size_rad, 'rad')}", worked)
 
 
@@ -717,20 +715,20 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
         )
         declared = declared_position_error(error)
         if declared is None:
-            yield step("It declares no position error")
+            yield step("No position error is declared")
             continue
         sizes = [*(error.stated("position") or ()), *(sigma for process in error.random for sigma in process.sigma)]
         terms = " + ".join(f"{number(size)}^2" for size in sizes)
         line = Sum(f"stated = sqrt({terms}) = {with_unit(declared, 'm')}")
-        yield step("Position errors that it declares, without coverage factor: less than the doubt", line)
+        yield step("Declared position errors, without coverage factor: less than the doubt", line)
 
 
 def _of_log(doubt: InputDoubt) -> Step:
     """Step with the residual of a log or the resolution of its fixes, and the largest negligible value."""
     if doubt.kind == RESIDUAL:
-        title = f"Phase that the smooth path leaves of the {doubt.owner}’s log along the line of sight, rms"
+        title = f"Residual of the {doubt.owner}’s smoothed log along the line of sight, rms phase"
         return step(title, f"left = {with_unit(doubt.doubt, 'rad')}", f"most = {with_unit(doubt.declared, 'rad')}")
-    title = f"The step to which the {doubt.owner}’s log writes its fixes, beside the declared position error"
+    title = f"Quantisation step of the {doubt.owner}’s log, compared with the declared position error"
     largest = MOST_GRID_SHARE * doubt.declared
     return step(title, f"step = {with_unit(doubt.doubt, 'm')}", f"most = a tenth of it = {with_unit(largest, 'm')}")
 
@@ -752,4 +750,4 @@ def _displacing(analysis: Analysis, row: Row) -> Iterator[Step]:
                 with_unit(float(phase[0]), "rad") for phase in (contribution.qpe_rad, contribution.cubic_rad)
             )
             lines.append(f"{printable(contribution.row_id)}: QPE {qpe}, cubic {cubic}")
-    yield step("Not in the displacement, by an amount that is not computed", *lines)
+    yield step("Not included in the displacement, which is not computed for them", *lines)

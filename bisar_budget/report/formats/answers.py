@@ -182,11 +182,13 @@ def _lines_of_parts(comparison: Comparison, style: Style) -> Iterator[str]:
     yield from table(rows)
     yield ""
     if any(state.is_given for state in comparison.parts):
-        stays = "; of several each stays while parts of the other kind change" if comparison.kept else ""
+        stays = "; the part of the other kind is kept" if comparison.kept else ""
         yield from wrapped(f"*  named by the file{stays}", "   ")
     if any(state.silent_on for state in comparison.parts):
-        yield from wrapped("-  says nothing of figures that others have: these errors are not declared", "   ")
-    yield from wrapped("What complies has the smallest margin first, what does not the nearest miss.", "  ")
+        yield from wrapped("-  lacks figures that other parts have: these errors are not declared", "   ")
+    yield from wrapped(
+        "Parts that comply come first, smallest margin first; then those that do not, nearest miss first.", "  "
+    )
     if comparison.overridden:
         yield from wrapped(f"Stated by the file itself, with every part: {', '.join(comparison.overridden)}.", "  ")
     if comparison.imaged is not None:
@@ -244,16 +246,16 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
     elif len(solution.crossings) == 2:
         yield "Bounded", "from below and from above"
     if solution.skipped:
-        yield "No mission", f"at {solution.skipped} of the places looked at; they do not comply"
+        yield "No mission", f"at {solution.skipped} of the values tried; they do not comply"
     if solution.waived:
         waivers = waiver_names(solution.waived_by)
-        yield "Waived", f"at {solution.waived} of the places looked at, where it does not comply ({waivers})"
+        yield "Waived", f"at {solution.waived} of the values tried, where it does not comply ({waivers})"
     for crossing in solution.crossings:
         inside, outside = crossing.inside, crossing.outside
         yield "Inside", f"{_value_text(solution, inside.value)}: {_state_words(inside)}{_resolution(crossing)}"
         yield "Outside", f"{_value_text(solution, outside.value)}: {_state_words(outside)}"
         if crossing.is_verified:
-            yield "Checked", "both, as they are written here"
+            yield "Checked", "both values as written here"
         else:
             yield "Not checked", "compliance changes again within the digits written here"
     if solution.imaged is not None:
@@ -261,7 +263,7 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
     if solution.is_constant and not solution.crossings:
         yield (
             "No effect",
-            f"{printable(solution.key)} changes nothing that decides: the use is the same at every value",
+            f"{printable(solution.key)} does not change the deciding row: the use is the same at every value",
         )
     if not solution.crossings:
         is_miss = not solution.nearest.complies
@@ -273,7 +275,7 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
             )
             return
         yield (
-            "Nearest" if is_miss else "Least left",
+            "Nearest" if is_miss else "Least margin",
             f"{_value_text(solution, nearest.value)}: {_state_words(nearest)}",
         )
 
@@ -392,7 +394,7 @@ def _lines_of_numbers(sensitivity: Sensitivity, style: Style) -> Iterator[str]:
 def _table(sensitivity: Sensitivity) -> Iterator[str]:
     shown = sensitivity.shown
     if not shown:
-        yield "No number of the file changes it."
+        yield "No number of the file changes the utilization."
         return
     row_head = [] if sensitivity.row is None else ["of the row"]
     rows = [["key", "value", "to limit", "per", "worst", *row_head, ""]]
@@ -414,9 +416,9 @@ def _table(sensitivity: Sensitivity) -> Iterator[str]:
     yield from table(rows)
     yield ""
     yield from wrapped(
-        "to limit: what a number has to change by, alone, until the utilization is 100 %, if that goes on as it goes "
-        "here; the least stands first. worst: change of the utilization in percentage points, if a number grows by "
-        "what stands under per; a negative number grows away from 0.",
+        "to limit: change of this number alone that brings the utilization to 100 %, extrapolated from its slope "
+        "here; smallest first. worst: change of the utilization in percentage points when the number grows by the "
+        "step under per; a negative value becomes more negative.",
         "  ",
     )
 
@@ -440,11 +442,11 @@ def _notes(sensitivity: Sensitivity) -> Iterator[str]:
     shown = sensitivity.shown
     if any(slope.is_mixed for slope in shown):
         yield from wrapped(
-            "In parentheses: the row that is the worst beside the value. The change is made of the slopes of both.",
+            "In parentheses: the worst row on the other side of the value. The change combines the slopes of both.",
             "  ",
         )
     if negligible := len(sensitivity.slopes) - len(shown):
-        yield f"Less than a ten-thousandth of it: {counted(negligible, 'number')} (JSON lists them)."
+        yield f"Effect below a ten-thousandth of it: {counted(negligible, 'number')} (JSON lists them)."
     if sensitivity.unchanging:
         yield f"Without effect: {counted(len(sensitivity.unchanging), 'number')} (JSON lists them)."
     if sensitivity.skipped:
@@ -457,9 +459,9 @@ def _notes(sensitivity: Sensitivity) -> Iterator[str]:
 def _balance(sensitivity: Sensitivity) -> Iterator[str]:
     moving_errors = [error for error in sensitivity.relaxed if error.moves_shares]
     if not moving_errors:
-        yield "Shares are balanced; no error that is doubled would move them."
+        yield "Shares are balanced; doubling an error does not change them."
         return
-    yield from wrapped("Shares are balanced. What an error that is doubled costs the others:", "  ")
+    yield from wrapped("Shares are balanced. Cost of doubling an error for the other errors:", "  ")
     yield ""
     rows = [["doubled", "shares t/r", "transmitter", "receiver", ""]]
     for error in moving_errors:
@@ -479,10 +481,10 @@ def _balance(sensitivity: Sensitivity) -> Iterator[str]:
     yield from table(rows)
     yield ""
     yield from wrapped(
-        "Of each platform the worst utilization of what is not doubled, before and after; shares in percent.", "  "
+        "For each platform the worst utilization of its other errors, before and after; shares in percent.", "  "
     )
     if unmoved := len(sensitivity.relaxed) - len(moving_errors):
-        yield f"Doubling moves no share of {counted(unmoved, 'other')}."
+        yield f"Doubling does not change the shares for {counted(unmoved, 'other error')}."
 
 
 def _change_words(change: tuple[str, float, float] | None) -> str:

@@ -256,18 +256,18 @@ def _notes(passes: Passes) -> Iterator[str]:
         yield f"{sentence(text)}: {numbers}."
     for text, numbers in _grouped(passes.found, lambda overpass: overpass.reason and _figureless(overpass)):
         first = next(overpass for overpass in passes.found if overpass.reason and _figureless(overpass) == text)
-        of_first = f" (numbers of {first.number})" if first.reason != text and not numbers.isdecimal() else ""
+        of_first = f" (values of pass {first.number})" if first.reason != text and not numbers.isdecimal() else ""
         yield f"{STATUS[first.status].text} {numbers}: {printable(first.reason)}{of_first}."
     if any(overpass.center is None for overpass in passes.found):
-        yield "* of the culmination: there is no mid-time."
+        yield "* time of the culmination: no mid-time is known."
     for numbers, event in (
         (
             _numbers(overpass.number for overpass in passes.found if not overpass.rises),
-            "Began before what was looked at",
+            "Began before the period",
         ),
         (
             _numbers(overpass.number for overpass in passes.found if not overpass.sets),
-            "Goes on after what was looked at",
+            "Continues after the period",
         ),
     ):
         if numbers:
@@ -279,10 +279,10 @@ def _notes(passes: Passes) -> Iterator[str]:
         )
     if passes.found:
         yield (
-            "above: minutes above the least elevation; elev: elevation at the mid-time, and at most; from: bearing "
-            "from north, clockwise; bist, grad: bistatic angle, angle between range and Doppler gradients; "
-            "resolution: range x cross range, peak to null, on the ground; doubt: how far the satellite may be off; "
-            "use: of what the requirement that decides allows."
+            "above: minutes above the least elevation; elev: elevation at mid-time and maximum; from: bearing from "
+            "north, clockwise; bist, grad: bistatic angle, angle between range and Doppler gradients; resolution: "
+            "range x cross range, peak to null, on the ground; doubt: position uncertainty of the satellite; use: "
+            "share of the limit of the deciding requirement."
         )
 
 

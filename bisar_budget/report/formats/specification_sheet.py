@@ -126,12 +126,12 @@ def _lines(answer: Answer, style: Style) -> Iterator[str]:
             yield ""
             yield from wrapped(_offered(offer), "  ")
         return
-    yield from table([["specification", "ordered", "today", "largest share"], *map(_line, sheet.specifications)])
+    yield from table([["specification", "ordered", "declared", "largest share"], *map(_line, sheet.specifications)])
     yield ""
     if sheet.findings is not None:
         yield from requirement_table(sheet.findings, style)
         yield ""
-    keeping = [f"Parts that keep to {spec.key}: {_parts_words(spec)}." for spec in sheet.specifications if spec.parts]
+    keeping = [f"Parts that meet {spec.key}: {_parts_words(spec)}." for spec in sheet.specifications if spec.parts]
     for text in [*_remarks(sheet), *keeping]:
         yield from wrapped(text, "  ")
     if offer is not None:
@@ -151,28 +151,29 @@ def _verdict(sheet: SpecificationSheet) -> str:
     count = counted(number, "specification")
     status_text = STATUS[sheet.status].text
     if not number:
-        return f"no requirement limits any of these errors: check says {status_text}"
+        return f"no requirement limits any of these errors; result of check: {status_text}"
     if not sheet.complies:
         return f"{count}, but the mission does not comply with them: {status_text}"
-    return f"{count} that meet{'s' if number == 1 else ''} every requirement together: check says {status_text}"
+    verb = "meets" if number == 1 else "together meet"
+    return f"{count} that {verb} every requirement; result of check: {status_text}"
 
 
 def _terms(sheet: SpecificationSheet) -> str:
-    combination = "root-sum-square" if sheet.combine == "rss" else "sum of all at their worst"
+    combination = "root-sum-square" if sheet.combine == "rss" else "worst-case sum"
     return f"{sheet.model} model, {combination}, {percent(sheet.reserve)} of each limit in reserve"
 
 
 def _line(spec: Specification) -> list[str]:
     most = max(spec.shares, key=lambda key: spec.shares[key], default="")
-    share = f"{share_percent(spec.shares[most])} of {REQUIREMENT_NAMES[most]}" if most else "limited by nothing"
+    share = f"{share_percent(spec.shares[most])} of {REQUIREMENT_NAMES[most]}" if most else "no limit"
     return [spec.key, spec.text or "free", spec.declared_text or "-", share]
 
 
 def _offered(offer: Offer) -> str:
     outside = sum(figure.is_inside is False for figure in offer.figures)
-    count_words = f"of {counted(len(offer.figures), 'figure')} {outside} {'is' if outside == 1 else 'are'} outside"
+    count_words = f"{outside} of {counted(len(offer.figures), 'figure')} outside"
     difference = f"; it differs in {', '.join(offer.notes)} too" if offer.notes else ""
-    subject = f"Offer {printable(offer.file)}: the mission as a whole says {STATUS[offer.status].text}"
+    subject = f"Offer {printable(offer.file)}: result of check {STATUS[offer.status].text}"
     return f"{subject}; {count_words}{difference}."
 
 
@@ -199,8 +200,8 @@ def _way_out(sheet: SpecificationSheet) -> str:
     room_fraction = 1 - max(used) / (1 - MIN_ROOM_FRACTION)
     permille = math.ceil(1e3 * room_fraction) - 1 if room_fraction > 0 else -1  # strictly less than the room
     if permille >= 0:
-        return f"The other errors use that much by themselves. --reserve {permille / 10:g}% or less leaves room."
-    return "The other errors, which are fixed, use that much by themselves: make them smaller, or specify them too."
+        return f"The other errors alone use this much. --reserve {permille / 10:g}% or less leaves room."
+    return "The other errors, which are fixed, alone use this much: make them smaller, or specify them too."
 
 
 def _remarks(sheet: SpecificationSheet) -> Iterator[str]:
@@ -208,9 +209,9 @@ def _remarks(sheet: SpecificationSheet) -> Iterator[str]:
     for row in limiting(sheet):
         if row.requirement is None and row.id.startswith("negligible"):
             effect = row.id.partition(".")[2]
-            yield f"{effect.capitalize()} phase is kept negligible, since no requirement takes it: that limits sizes."
+            yield f"{effect.capitalize()} phase is kept negligible, as no requirement judges it: this limits sizes."
         elif row.requirement is None:
-            cause = "where the image ends" if row.id.startswith("end") else "what a mission file may state"
+            cause = "the end of the image" if row.id.startswith("end") else "the largest value that a file may state"
             yield f"{row.id.partition('.')[2]} is limited by {cause}."
     for spec in sheet.specifications:
         if spec.remark:
@@ -279,7 +280,7 @@ def _required(sheet: SpecificationSheet) -> Iterator[doc.Block]:
             [line.name, line.allowed, line.reached, line.use, doc.Badge(line.status), _decided_by(line)]
             for line in requirement_lines(sheet.findings)
         ]
-        yield doc.TextTable("Requirements", "Requirements, with what is ordered in place", heads, rows)
+        yield doc.TextTable("Requirements", "Requirements with the ordered sizes", heads, rows)
 
 
 def _decided_by(line: RequirementLine) -> doc.Text:
@@ -299,14 +300,14 @@ def specified(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:
         return
     yield from _table(sheet)
     if limiting(sheet):
-        yield doc.Figure(f"{anchor}-shares.svg", anchor, "What uses up each limit", "Shares", share_bars(sheet))
+        yield doc.Figure(f"{anchor}-shares.svg", anchor, "Use of each limit", "Shares", share_bars(sheet))
     if texts := list(_remarks(sheet)):
         yield doc.Items([[text] for text in texts])
 
 
 def _table(sheet: SpecificationSheet) -> Iterator[doc.Block]:
     keys = [key for key in REQUIREMENT_NAMES if any(key in spec.shares for spec in sheet.specifications)]
-    size_heads = doc.numbers("Ordered", "Found", "Today", *(f"Of {REQUIREMENT_NAMES[key]}" for key in keys))
+    size_heads = doc.numbers("Ordered", "Found", "Declared", *(f"Share of {REQUIREMENT_NAMES[key]}" for key in keys))
     heads = doc.heads(*doc.numbers("No."), "Specification", *size_heads, "Parts")
     rows: list[doc.Line] = []
     for number, spec in enumerate(sheet.specifications, 1):
@@ -316,7 +317,7 @@ def _table(sheet: SpecificationSheet) -> Iterator[doc.Block]:
         ]
         sizes = (spec.text or "free", spec.found_text or "–", spec.declared_text or "–")
         rows.append([str(number), doc.Name(spec.key), *sizes, *shares, _parts_words(spec) or "–"])
-    caption = "Specifications, rounded down to two digits; shares are those of what a limit may use."
+    caption = "Specifications, rounded down to two digits; shares refer to the usable part of each limit."
     yield doc.TextTable("Specifications", caption, heads, rows)
 
 
@@ -405,7 +406,7 @@ def _rationale(sheet: SpecificationSheet, spec: Specification) -> str:
     ]
     takes = f"It takes {' and '.join(share_words)} that may be used. " if share_words else ""
     reserve = f"{percent(sheet.reserve)} of each limit is in reserve."
-    return f"{takes}With all specifications of the sheet together the check says {sheet.status}; {reserve}"
+    return f"{takes}With all specifications of the sheet the result of the check is {sheet.status}; {reserve}"
 
 
 def _parents(sheet: SpecificationSheet, spec: Specification) -> list[str]:

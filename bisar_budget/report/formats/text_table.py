@@ -220,12 +220,12 @@ def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
     """Explanation of the columns, and the numbers of hidden rows."""
     key = "use: declared / allowable"
     if any(row.binding_requirement not in (None, "quadratic_phase_error") for row in rows):
-        key += "; by: what sets the allowable; a table, an equation or a model stands for QPE"
+        key += "; by: requirement that sets the allowable, or for QPE its table, equation or model"
     judged = [row for row in hidden if row.status != "not_declared"]
     counts = [
         (len(hidden) - len(judged), "not declared", "not declared"),
-        (sum(not matters(row) for row in judged), "that limits nothing", "that limit nothing"),
-        (sum(matters(row) for row in judged), "that uses less", "that use less"),
+        (sum(not matters(row) for row in judged), "without effect", "without effect"),
+        (sum(matters(row) for row in judged), "with less use", "with less use"),
     ]
     hidden_words = ", ".join(
         f"{count} {singular if count == 1 else plural}" for count, singular, plural in counts if count

@@ -100,7 +100,7 @@ def geometry_remarks(rows: Sequence[Verdict]) -> Iterator[str]:
     if hidden:
         least = min(hidden, key=lambda row: (row.measured_qpe_rad or 0.0) / (row.measured_equal_loss_qpe_rad or 1.0))
         yield (
-            "exact, image: the quadratic phase of equal loss, which the budget holds; least quadratic part "
+            "exact, image: quadratic phase of equal peak loss, which the budget limits; smallest quadratic part "
             f"{_phase(least.measured_qpe_rad)} of {_phase(least.measured_equal_loss_qpe_rad)} rad, {least.id}"
         )
     published_rows = [row for row in rows if row.model == "published"]

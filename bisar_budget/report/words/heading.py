@@ -153,7 +153,7 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
     gain = ""
     if allocation.n_pull is not None:
         gain = (
-            f"; autofocus pulls in (corrects) up to {multiple_of_pi(allocation.n_pull)} rad: limits times "
+            f"; autofocus corrects up to {multiple_of_pi(allocation.n_pull)} rad: limits × "
             f"{allocation.autofocus_gain:.3g}"
         )
     yield "Budget", f"quadratic phase error (QPE) {phase_limit(allocation.qpe_total, mission)}: {shares}{gain}"
@@ -162,7 +162,7 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
         radius = format_quantity(mission.scene.radius, "m")
         yield (
             "Scene",
-            f"radius {radius}; one autofocus correction of the declared errors serves {mission.scene.served}",
+            f"radius {radius}; autofocus correction valid {mission.scene.served}",
         )
     if mission.coverage_factor != 1:
         yield "Coverage", f"navigation and clock: declared is {mission.coverage_factor:g} times the file's value"
@@ -185,12 +185,12 @@ def path_words(path: FlownPath) -> str:
     if path.order is None or path.farthest is None or path.rms is None:
         return text
     is_one = path.pieces is None or path.pieces == 1
-    text += f"; flown as {'a polynomial' if is_one else f'{path.pieces} polynomials'} of order {path.order}"
+    text += f"; {'polynomial' if is_one else f'{path.pieces} polynomials'} of order {path.order}"
     if path.samples:
         rms, farthest = (format_quantity(size, "m") for size in (path.rms, path.farthest))
-        within = "" if path.stretch is None else f" in {format_quantity(path.stretch, 's')}"
-        return f"{text} through {path.samples} places{within}, {rms} rms and at most {farthest} from them"
-    return f"{text}, at most {format_quantity(path.farthest, 'm')} from it"
+        over = "" if path.stretch is None else f" over {format_quantity(path.stretch, 's')}"
+        return f"{text} fitted to {path.samples} fixes{over}, residual {rms} rms and at most {farthest}"
+    return f"{text}, at most {format_quantity(path.farthest, 'm')} from the orbit"
 
 
 def multiple_of_pi(factor: float) -> str:

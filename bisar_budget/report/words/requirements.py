@@ -81,7 +81,7 @@ def use_remarks(requirement: JudgedRequirement) -> Iterator[str]:
 
 _SHARE_SUFFIX = "'s share"
 # Shares without a platform or a clock as owner.
-_SHARE_NAMES = {"autofocus": "pull-in of autofocus", "scene": "at the scene's edge", "band": "over the band"}
+_SHARE_NAMES = {"autofocus": "autofocus pull-in", "scene": "at the scene's edge", "band": "over the band"}
 
 
 def share_words(requirement: JudgedRequirement, share: DecidingShare) -> str:
@@ -274,7 +274,7 @@ def probabilities(drawn: MonteCarlo) -> list[str]:
         "",
     ]
     if drawn.probability is None or drawn.probability_low is None or drawn.probability_high is None:
-        return [*lines, "  no declared error has a requirement to hold"]
+        return [*lines, "  no requirement limits a declared error"]
     lines.append(_cells("requirement", "limit", "sum", "rss", "sigma"))
     for requirement in drawn.requirements:
         lines += _requirement(requirement)

@@ -9,7 +9,7 @@ from bisar_budget.faults import KeyPath, Place, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row
-from bisar_budget.units import format_in, given_unit
+from bisar_budget.units import format_in, format_quantity, given_unit
 
 # Words for requirements that can set an allowable. The terminal writes only the first word.
 BINDING_WORDS = {
@@ -80,7 +80,13 @@ def measure(row: Row, mission: MissionFindings) -> str:
     """Declared value, allowable and use of a row, in words."""
     if row.metric == DECLARE:
         return "everything asked for is declared" if row.status == "pass" else "not everything asked for is declared"
-    declared = "not declared" if row.declared is None else f"declared {row_size(row.declared, row, mission)}"
+    if row.declared is None:
+        declared = "not declared"
+    elif is_noise_level(row):
+        declared = row_size(row.declared, row, mission)
+        declared = f"noise {declared}" if declared == AS_DECLARED else f"noise {declared} on the declared one"
+    else:
+        declared = f"declared {row_size(row.declared, row, mission)}"
     if row.allowable is None:
         return declared
     text = f"{declared}, allowable {row_limit(row, mission)}"
@@ -140,18 +146,30 @@ def dashed(text: str) -> str:
 
 
 _PHASE_UNIT = "deg"  # unit of a phase requirement that the file does not state
+AS_DECLARED = "as declared"  # a level of 0 dB relative to the declared noise
 _LEVEL_REQUIREMENTS = ("pslr", "islr")  # requirements in dB of the image, and the kinds of rows with their sums
 # Kinds of rows with sums of phases.
 _PHASE_KINDS = ("quadratic_phase_error", "cubic_phase_error", "spatial_variance", "dispersion")
+
+
+def is_noise_level(row: Row) -> bool:
+    """Whether the numbers of a row are levels of a spectrum relative to the declared spectrum. [dB]"""
+    kind, axis = row.subject.kind, row.subject.axis
+    return row.unit == "dB" and ((kind == "oscillator" and not axis) or (kind == "vibration" and axis == "spectrum"))
 
 
 def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: str = "nearest") -> str:
     """Write a number of a row, in the unit of its value in the file; a dash for None.
 
     A sum of phases has the unit of its requirement. Without a unit in the file the number has a readable prefix.
+    Levels of noise relative to the declared noise have a sign; 0 dB is `as declared`.
     """
     if value is None:
         return "-"
+    if is_noise_level(row):
+        level = _level(value, row.unit)
+        sign = "+" if level > 0 else ""
+        return f"{sign}{format_quantity(level, 'dB', 3, rounding)}" if level else AS_DECLARED
     unit = _file_unit(row.line, row.unit)
     if not unit and row.unit == "rad" and row.subject.kind in _PHASE_KINDS:
         unit = phase_unit(mission)
