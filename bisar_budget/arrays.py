@@ -12,3 +12,8 @@ PerCase = float | Floats
 """A number of one case, or an array with one number per case, (cases,)."""
 PerCaseFlag = bool | Booleans
 """A condition of one case, or an array with one condition per case, (cases,)."""
+
+
+def absolute(value: PerCase) -> PerCase:
+    """Absolute value of a number, or of each number; `abs` alone loses the type of a number or an array."""
+    return abs(value)

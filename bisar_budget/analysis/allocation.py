@@ -8,10 +8,10 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.analysis.together import Together
+from bisar_budget.arrays import Floats
 from bisar_budget.effects.effect import plain
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import format_quantity
 
 BALANCED_RANGE = (0.05, 0.95)  # each platform keeps a budget
@@ -164,7 +164,7 @@ def caps(mission: Mission) -> Caps:
     walk = range_walk_cap(mission)
     if mission.scene.radius is None:
         return Caps(walk)
-    cell = mission.geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time)
+    cell = float(mission.geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time))
     return Caps(walk, 2 * mission.scene.radius / (4 * cell * ROOM[mission.autofocus.algorithm]))
 
 

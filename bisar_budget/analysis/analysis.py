@@ -16,6 +16,7 @@ from bisar_budget.analysis.peak_loss import peak_loss_db
 from bisar_budget.analysis.spread import Tone, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.tone_displacement import ToneDisplacement, tone_displacements
+from bisar_budget.arrays import Floats
 from bisar_budget.effects.combined import Correlated, correlated_errors
 from bisar_budget.effects.declared import Declared, DeclaredErrors, Model
 from bisar_budget.effects.effect import ErrorSource, Subject, plain
@@ -29,7 +30,7 @@ from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission, has_random_errors
 from bisar_budget.mission.stacked import picked
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.ranges.resolution import Resolution, resolution
 
 __all__ = ["Analysis", "Case", "Model", "by_nodes"]

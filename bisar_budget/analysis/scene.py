@@ -23,6 +23,7 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.scene_random import RandomPhases
+from bisar_budget.arrays import Booleans, Floats, Indices
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.combined import combined, combined_phase, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
@@ -31,7 +32,7 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.image_plane import MIN_SINE, degeneracy
 from bisar_budget.mission.model import Mission, Shares
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Indices, Lanes, SmallErrors, Truths
+from bisar_budget.ranges.exact_ranges import ExactRanges, Lanes, SmallErrors
 from bisar_budget.ranges.point_paths import ROWS, PointPaths
 from bisar_budget.units import format_quantity
 
@@ -72,7 +73,7 @@ class ScenePlaces:
     clearance: Floats
 
     @property
-    def has_image(self) -> Truths:
+    def has_image(self) -> Booleans:
         """Whether an image can be formed there."""
         return np.asarray(self.clearance > 1)
 
@@ -119,7 +120,7 @@ class Heights(NamedTuple):
         """Some of them."""
         return Heights(self.height[some], self.azimuth[some])
 
-    def where(self, is_own: Truths, others: "Heights") -> "Heights":
+    def where(self, is_own: Booleans, others: "Heights") -> "Heights":
         """These in some places, in the rest others."""
         return Heights(*(np.where(is_own, *both) for both in zip(self, others, strict=True)))
 
@@ -149,7 +150,8 @@ class ScenePhases:
         self.is_large = np.zeros(self.centre.shape, dtype=bool)
         for index, error in enumerate(self.members):
             self.is_large[index] = errors.is_large(error)
-        self.nearest = errors.array(np.minimum(*(path.slant_range for path in errors.geometries.both)))
+        transmitter, receiver = errors.geometries.both
+        self.nearest = errors.array(np.minimum(transmitter.slant_range, receiver.slant_range))
 
     def ranges_at(self, radius: Floats, azimuth: Floats, of: Indices) -> ExactRanges:
         """Exact ranges of places."""
@@ -192,7 +194,7 @@ class ScenePhases:
         """Phase of each error there less that at the centre; by the worse sign of the large ones. [rad]"""
         return self.around(radius, azimuth, of, self.is_large.take(of, axis=1))[1]
 
-    def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Truths) -> tuple[Floats, Floats, Floats]:
+    def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Booleans) -> tuple[Floats, Floats, Floats]:
         """The same were all errors small; with some taken exactly, (errors, places); and how gradients turn.
 
         That is the least of what range and Doppler gradients span where each of these leads, over what they span
@@ -381,7 +383,7 @@ class _Climb:
         differences = self.phases.differences(self.radius, azimuth, self.of)
         return Heights(self.phases.together(differences, self.of), azimuth)
 
-    def _bent(self) -> Truths:
+    def _bent(self) -> Booleans:
         """Which of the large errors differ otherwise than small ones do: seen at three places, two harmonics show."""
         thirds = self.rims.azimuth + 2 * math.pi * np.arange(PROBES)[:, None] / PROBES
         radius, of, large = np.tile(self.radius, PROBES), np.tile(self.of, PROBES), np.tile(self.large, PROBES)
@@ -462,7 +464,7 @@ class SceneEdges:
         return self.largest.height
 
     @property
-    def has_doubt(self) -> Truths:
+    def has_doubt(self) -> Booleans:
         """Whether an error is over its limit at the edge alone."""
         return np.asarray((self.over > 0).any(axis=0))
 

@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bisar_budget.arrays import Floats, Indices
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.air_delays import (
     group_at_nodes,
@@ -37,9 +38,9 @@ from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS, Subject
 from bisar_budget.effects.random_effect import FEWEST_NODES, MOST_NODES, Moves, RandomError, SensorCases, factor
 from bisar_budget.effects.vibration import slow_moves
-from bisar_budget.geometry import Vectors
+from bisar_budget.geometry import VectorArrays
 from bisar_budget.image_plane import nodes
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Indices
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 _CLOCKS = ("oscillator", "synchronization")  # kinds of errors that move nothing
 
@@ -142,7 +143,7 @@ class _Delay(NamedTuple):
 
     places: tuple[int, ...]
     delay: str
-    middles: Sequence[Vectors]
+    middles: Sequence[VectorArrays]
     metres: Floats
     courses: Floats
     groups: int = 1

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.analysis.tone_displacement import ToneDisplacement
+from bisar_budget.arrays import Floats
 from bisar_budget.effects.combined import (
     Correlated,
     Moves,
@@ -22,7 +23,6 @@ from bisar_budget.effects.random_effect import RandomError, factor
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Shares
-from bisar_budget.ranges.exact_ranges import Floats
 
 
 class Together:

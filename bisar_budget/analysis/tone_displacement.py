@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bisar_budget.arrays import Floats
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.declared import published_planes
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
@@ -27,7 +28,7 @@ from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES, counted
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
 from bisar_budget.mission.platforms import MotionError
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 
 class TonePart(NamedTuple):

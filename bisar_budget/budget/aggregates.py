@@ -13,6 +13,7 @@ from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.scene import Corrections, SceneEdge, SceneEdges
 from bisar_budget.analysis.spread import noise, rests
 from bisar_budget.analysis.together import Together, cubics, quadratics
+from bisar_budget.arrays import Booleans, Floats
 from bisar_budget.budget.continued_masks import continuation_note, part_of, rests_on_masks
 from bisar_budget.budget.doubted_noise import doubted_noise_note, rests_on_doubted_noise
 from bisar_budget.budget.judged_requirements import (
@@ -33,7 +34,6 @@ from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Shares
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 PULL_IN = "autofocus_pull_in"
 
@@ -145,7 +145,7 @@ class Aggregates:
         """Errors of sensors, clocks and the air that count against the share of an owner."""
         return [error for error in self.together("full").random if split.includes(error.owner, owner)]
 
-    def _is_declared(self, members: Iterable[DeclaredPhase]) -> Truths:
+    def _is_declared(self, members: Iterable[DeclaredPhase]) -> Booleans:
         """Cases in which any of the phases is declared."""
         is_declared = np.zeros(self.judging.cases, dtype=bool)
         for member in members:
@@ -355,7 +355,7 @@ def _exchanged(phases_by_kind: Mapping[str, Phases], errors: Sequence[RandomErro
 
 
 # ---------------------------------------------------------------------- displacements that no row holds
-def unplaced(together: Together) -> dict[str, Truths]:
+def unplaced(together: Together) -> dict[str, Booleans]:
     """Find the clocks that displace the image by an amount that the file does not state, with the cases."""
     return {error.subject.id: together.errors.array(error.displaces_unknown) > 0 for error in together.random}
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
+from bisar_budget.arrays import Booleans, Floats
 from bisar_budget.constants import ONE_PEAK_DB
 from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, Subject
 from bisar_budget.effects.navigation_errors import residual_subject
@@ -28,7 +29,6 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath, LogNoise, MotionError, Platform
 from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 LEAST_M = 1e-3  # smallest doubt of a path that counts against a declared error, zero included
 NEGLIGIBLE_USE_FRACTION = 0.1  # of a requirement, by the doubt of a path or by a velocity that its source states
@@ -87,7 +87,7 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
     return doubts
 
 
-def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Truths]:
+def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Booleans]:
     """Cases in which a platform's path is in doubt by more than the file declares, by platform and kind of error."""
     doubted = {}
     for name in PLATFORMS:
@@ -408,7 +408,7 @@ def collection_notes(case: Case) -> Iterator[Note]:
     for name, state in zip(PLATFORMS, case.geometry.both, strict=True):
         if not state.is_straight:
             yield phrases.path_curves(name)
-        turn = norm(state.look_rate) * mission.collection.aperture_time / 2
+        turn = float(norm(state.look_rate)) * mission.collection.aperture_time / 2
         if turn > _TURNING_RAD:
             yield phrases.sight_turns(name, turn)
     if case.peak_loss_db is not None and case.peak_loss_db > ONE_PEAK_DB:

@@ -9,6 +9,7 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, Model
+from bisar_budget.arrays import Floats
 from bisar_budget.budget.judged_rows import (
     CODE,
     EFFECTS,
@@ -26,7 +27,6 @@ from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.changes import name_of_error, parts_of
 from bisar_budget.mission.quantities import Number, largest_at
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats
 
 _BINDING = np.array([REQUIREMENTS.index(name) for name in (*HELD, END_OF_IMAGE)] + [-1], dtype=np.int8)
 

@@ -25,6 +25,7 @@ from bisar_budget.analysis.spread import (
     spread_limit,
     stated_powers,
 )
+from bisar_budget.arrays import Booleans, Floats
 from bisar_budget.budget.continued_masks import (
     MIN_USE_FRACTION,
     continuation_note,
@@ -52,7 +53,6 @@ from bisar_budget.mission.platforms import FlownPath, MotionError
 from bisar_budget.mission.readers import SortedPoints
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 ISLR = "islr"
 HELD = (QUADRATIC, CUBIC, ISLR, LOCATION)  # requirements, in the order of the effects of an error
@@ -201,7 +201,7 @@ class RandomRows:
             row = judged.at(error_index, error.subject)
             yield RandomRow(row.in_decibel() if error.unit == "dB" else row, error_index, *columns_of_error)
 
-    def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Truths:
+    def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Booleans:
         """Whether an error's use of a requirement depends on noise below the first point of its mask."""
         rests_on_mask = np.zeros(sizes.shape[1:], dtype=bool)
         for row, error in enumerate(self.errors):
@@ -313,7 +313,7 @@ class RandomRow(FamilyRow):
     """
 
     place: int
-    is_over_other: Truths
+    is_over_other: Booleans
     bound_by_other: NDArray[np.intp]
     without_autofocus: Floats
 
@@ -524,7 +524,7 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
     elif sync.age is not None and sync.averaging is not None:
         yield phrases.left_since_setting(sync.age, sync.averaging)
     else:
-        yield phrases.heard_twice(mission.geometry.echo_delay)
+        yield phrases.heard_twice(float(mission.geometry.echo_delay))
 
 
 def _air_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:

@@ -11,6 +11,7 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import Tone, islr_of
 from bisar_budget.analysis.vibration_limits import Echo, VibrationLimits, highest_echo, tone_limits
+from bisar_budget.arrays import Booleans
 from bisar_budget.budget.continued_masks import MIN_USE_FRACTION
 from bisar_budget.budget.doubted_noise import doubted_noise_note, has_doubted_frequency
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, FamilyRow, Judging, worded
@@ -29,7 +30,6 @@ from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission, has_instruments
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Truths
 
 SENSITIVITY = "acceleration_sensitivity"
 
@@ -110,7 +110,7 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
         yield SpurRow(judged, spur_index, is_over_other, is_there=is_there)
 
 
-def _is_used(size: Any, limit: Any) -> Truths:
+def _is_used(size: Any, limit: Any) -> Booleans:
     """Whether a size uses enough of its limit for a doubt about the size to count, and does not break the limit."""
     return np.asarray((size > MIN_USE_FRACTION * limit) & ~(size > limit * LIMIT_RATIO))
 
@@ -306,5 +306,5 @@ def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
     if mission.synchronization is not None and mission.synchronization.interval is not None:
         notes.append(phrases.left_by_exchanges(mission.synchronization.interval))
     if mission.has_direct_path:
-        notes.append(phrases.heard_twice(mission.geometry.echo_delay))
+        notes.append(phrases.heard_twice(float(mission.geometry.echo_delay)))
     return (*notes, *override_notes(name, oscillator.overridden, SENSITIVITY))

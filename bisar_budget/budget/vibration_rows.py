@@ -19,6 +19,7 @@ from bisar_budget.analysis.vibration_limits import (
     tone_limits,
     vibration_limits,
 )
+from bisar_budget.arrays import Booleans, Floats
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, REQUIREMENTS, FamilyRow, Judged, Judging, worded
 from bisar_budget.budget.near_phases import NearPhases, phase_over, phase_requirement
 from bisar_budget.effects.declared import CUBIC, OTHER_MODEL, QUADRATIC
@@ -37,7 +38,6 @@ from bisar_budget.effects.vibration import (
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.units import format_quantity
 
 _ROUNDING_DB = 1e-6  # by which a level may exceed the required level
@@ -104,7 +104,7 @@ class Vibrations:
         metric: str,
         declared: Floats | None,
         limits: VibrationLimits | None,
-        is_there: Truths,
+        is_there: Booleans,
         *,
         doubt: Any = False,
         phases: NearPhases | None = None,
@@ -140,7 +140,7 @@ class Vibrations:
         published, full = map(self.array, limits)
         return judged._replace(allowable_published=published, allowable_full=full)
 
-    def _line(self, model: str, name: str, index: int, is_there: Truths) -> "VibrationRow":
+    def _line(self, model: str, name: str, index: int, is_there: Booleans) -> "VibrationRow":
         """The row of a vibration of one or more cycles per aperture: its echoes, or their power if ISLR limits them.
 
         Below three cycles its quadratic and cubic phase are limited as well.
@@ -173,7 +173,7 @@ class Vibrations:
             is_over_both=is_over_both,
         )
 
-    def _slow(self, name: str, index: int, is_there: Truths) -> "VibrationRow":
+    def _slow(self, name: str, index: int, is_there: Booleans) -> "VibrationRow":
         """The row of a vibration below one cycle per aperture, judged by its quadratic and cubic phase.
 
         A vibration along three axes is declared as the amplitude along the line of sight with the same utilization.
@@ -222,7 +222,7 @@ class Vibrations:
             yield self._row(model, row_subject, "pslr", amplitude, self.tones.get(name), is_there, members=members)
 
     @cached_property
-    def _near(self) -> dict[str, list[tuple[Truths, Floats]]]:
+    def _near(self) -> dict[str, list[tuple[Booleans, Floats]]]:
         """Lines near each other on each platform, and the amplitude of one line with an equally high echo. [m]"""
         return {name: list(_together(self.amplitudes[name], self.cycles[name])) for name in PLATFORMS}
 
@@ -244,7 +244,7 @@ class Vibrations:
         return {PLATFORMS[0]: phases[:ours], PLATFORMS[1]: phases[ours:]}
 
 
-def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Truths, Floats]]:
+def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Booleans, Floats]]:
     """Lines near each other, and the amplitude of one line with an equally high echo, or 0 without lines. [m]"""
     groups = near_groups(cycles)
     for index in range(groups.max(initial=-1) + 1):
@@ -268,7 +268,7 @@ class VibrationRow(FamilyRow):
 
     limits: VibrationLimits | None = None
     is_slow: bool = False
-    members: Truths | None = None
+    members: Booleans | None = None
     cycles: Any = math.nan
     qpe: Any = math.nan
     cubic: Any = math.nan

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.ranges.exact_ranges import Floats, Truths
+from bisar_budget.arrays import Booleans, Floats
 
 _GAP = 1e-8  # of Σ w·x, that the maximum may be above what is found
 _STEP = 30.0  # by which the barrier gives way each time
@@ -33,7 +33,7 @@ class Rows(NamedTuple):
         """The rows, followed by other rows."""
         return Rows(*(np.concatenate(both) for both in zip(self, further, strict=True)))
 
-    def of_sizes(self, chosen: Truths) -> "Rows":
+    def of_sizes(self, chosen: Booleans) -> "Rows":
         """The rows for some of the sizes."""
         return self._replace(share=self.share[:, chosen])
 

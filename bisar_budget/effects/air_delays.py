@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from bisar_budget.arrays import Floats
 from bisar_budget.constants import EARTH_RADIUS
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.effect import PLATFORMS, subject
@@ -35,7 +36,6 @@ from bisar_budget.mission.propagation import (
     elevation_deg,
     height_of,
 )
-from bisar_budget.ranges.exact_ranges import Floats
 
 ELECTRON_DELAY_M3_PER_S2 = 40.308  # m³/s²: e²/(8π²ε₀mₑ); the group delay of 1/m² is this over f² (CODATA 2018)
 TROPOSPHERE_HEIGHT_M = 7e3  # m, height of a thin shell in place of a spherical troposphere

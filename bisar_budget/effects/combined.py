@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import phrases
+from bisar_budget.arrays import Floats
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import Floats
 
 Phases = Sequence[tuple[str, Any]]  # by row id, signed [rad]
 Moves = Sequence[tuple[str, tuple[Any, Any]]]  # by row id, east and north [m]

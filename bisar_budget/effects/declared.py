@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators, phrases
+from bisar_budget.arrays import Booleans, Floats, Indices
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, plain
 from bisar_budget.effects.sources import ErrorListing
@@ -30,12 +31,9 @@ from bisar_budget.ranges.exact_ranges import (
     Effect,
     ExactEffect,
     ExactRanges,
-    Floats,
     FullEffect,
-    Indices,
     Lanes,
     TimeTags,
-    Truths,
 )
 from bisar_budget.ranges.limit_search import LimitSearches, find_first_sizes
 from bisar_budget.ranges.point_paths import ROWS, PointPaths, tries_several_sizes
@@ -293,7 +291,7 @@ class ErrorBlock:
                     growth[index] = np.maximum(of_ranges, shift[index] ** 2 / apart) / 2
         return np.asarray(growth + bent)
 
-    def is_large(self, size: Floats) -> Truths:
+    def is_large(self, size: Floats) -> Booleans:
         """Whether effects of errors may not be proportional to their size, by the bounds of the second order."""
         size = np.abs(size)
         large = np.zeros(size.shape, dtype=bool)
@@ -302,12 +300,12 @@ class ErrorBlock:
         return large & (size > 0) & self._is_moving
 
     @cached_property
-    def is_declared_large(self) -> Truths:
+    def is_declared_large(self) -> Booleans:
         """Whether effects of the declared errors may not be proportional to their size."""
         return self.is_large(self.declared)
 
     @cached_property
-    def _is_moving(self) -> Truths:
+    def _is_moving(self) -> Booleans:
         moving = np.zeros((len(self.sources), 1), dtype=bool)
         moving[self.moves] = True
         return moving
@@ -329,7 +327,7 @@ class ErrorBlock:
                 self._exactly(effects, size, is_large)
         return effects
 
-    def _exactly(self, effects: Declared, size: Floats, is_large: Truths) -> None:
+    def _exactly(self, effects: Declared, size: Floats, is_large: Booleans) -> None:
         """Replace the effects of errors too large for a first order by the effects of exact ranges."""
         sizes = size[is_large]
         points = self.followed(is_large, np.abs(sizes))
@@ -352,7 +350,7 @@ class ErrorBlock:
         for (east, north), each in ((effects.displacement, ahead), (effects.opposite, back)):
             east[is_large], north[is_large] = each[point_paths.EAST], each[point_paths.NORTH]
 
-    def followed(self, errors: Truths, sizes: Floats) -> Floats:
+    def followed(self, errors: Booleans, sizes: Floats) -> Floats:
         """Rows of known points of some errors at sizes, by the positive and the negative sign, (2, rows, some)."""
         lanes = np.concatenate(self._lanes_of(errors))
         both = np.tile(sizes, 2)
@@ -366,7 +364,7 @@ class ErrorBlock:
         first_lane[self.moves, 0] = 2 * self.cases * np.arange(len(self.moves))
         return first_lane + np.arange(self.cases)
 
-    def _lanes_of(self, errors: Truths) -> tuple[Indices, Indices]:
+    def _lanes_of(self, errors: Booleans) -> tuple[Indices, Indices]:
         lanes = self._lane[errors]
         return lanes, lanes + self.cases
 
@@ -412,13 +410,13 @@ class ErrorBlock:
             source = self.sources[index]
             reached = [slant[platform] for platform in source.platforms]
             if reached:
-                nearer = np.minimum(*reached) if len(reached) > 1 else reached[0]
+                nearer = np.minimum(reached[0], reached[-1]) if len(reached) > 1 else reached[0]
                 size[index] = FARTHEST_RANGE_FRACTION * nearer / self.edge[index]
             else:
                 # A clock takes no platform anywhere. No range sum is shorter than the distance of the platforms, and
                 # this distance is at least the sum less twice the nearer range: by then an image has ended.
                 course = self.exact.clock_course(source.clock or ())
-                size[index] = 2 * np.minimum(*slant) / np.abs(course).max(axis=0)
+                size[index] = 2 * np.minimum(slant[0], slant[1]) / np.abs(course).max(axis=0)
         return size
 
     def allowed(self, model: str, limits: Sequence[Any], *, is_complete: bool) -> Allowed:
@@ -452,7 +450,7 @@ class ErrorBlock:
         )
         return Allowed(smallest, quadratic if is_complete else smallest, binding)
 
-    def ends_image(self, size: Floats) -> Truths:
+    def ends_image(self, size: Floats) -> Booleans:
         """Whether the image ends at the allowables that were found."""
         ends_there = np.zeros(size.shape, dtype=bool)
         if self._follows is not None:
@@ -658,7 +656,7 @@ class DeclaredErrors:
             self._does[key] = self.blocks[block].does(model, self.blocks[block].declared)
         return self._does[key]
 
-    def is_large(self, error: ErrorSource) -> Truths:
+    def is_large(self, error: ErrorSource) -> Booleans:
         """Cases in which effects of a declared error are not proportional to its size."""
         block, index = self.block_of(error)
         return np.asarray(block.is_declared_large[index])

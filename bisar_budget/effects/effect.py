@@ -13,7 +13,7 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
+from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector, plain_vector
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Effect, FullEffect
 
@@ -230,13 +230,14 @@ def indicated_point(
     east, north = seen_from
     state_numbers, look, rate = [], [0.0, 0.0], [0.0, 0.0]
     for state in (geometry.transmitter, geometry.receiver):
-        (x, y, z), velocity = state.at(piece.time)
+        position, velocity = map(plain_vector, state.at(piece.time))
+        x, y, z = position
         then = PlatformState(position=(x - east, y - north, z), velocity=velocity)
         slant_range = math.dist(state.position, (east, north, 0.0))
         state_numbers += [x - east, y - north, *velocity[:2], slant_range]
         for axis in range(2):
-            look[axis] += then.look[axis]
-            rate[axis] += then.look_rate[axis]
+            look[axis] += float(then.look[axis])
+            rate[axis] += float(then.look_rate[axis])
     if model == "published":
         (a, b), (c, d), (determinant,) = evaluators.published_ground_inverse(*state_numbers)
     else:

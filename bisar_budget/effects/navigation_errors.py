@@ -24,6 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators
+from bisar_budget.arrays import Floats
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import (
     Moves,
@@ -35,12 +36,11 @@ from bisar_budget.effects.random_effect import (
 )
 from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import PlatformState, Vector, cross, unit, without_rounding
+from bisar_budget.geometry import PlatformState, Vectors, cross, unit, without_rounding
 from bisar_budget.image_plane import nodes
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, LeverArm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import RAW, CommonMotionError, FlownPath, LogNoise, MotionError
-from bisar_budget.ranges.exact_ranges import Floats
 
 _IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
 NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
@@ -95,7 +95,7 @@ def _log_process(mission: Mission, name: str, figure: str) -> tuple[GaussMarkov,
     return GaussMarkov(figure, (x, y, z), float(np.ravel(correlation_time)[0])), axes[:, :, 0]
 
 
-def specific_force(mission: Mission, state: PlatformState) -> Vector:
+def specific_force(mission: Mission, state: PlatformState) -> Vectors:
     """Specific force of a platform, f = a − g, which accelerometers measure, in the axes of the scene. [m/s²]
 
     It is zero where the platform falls freely. On the Earth g includes the terms of the Earth's rotation

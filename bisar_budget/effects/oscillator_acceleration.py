@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bisar_budget.arrays import Floats
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import specific_force
@@ -29,7 +30,6 @@ from bisar_budget.geometry import BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.vibrations import FeltVibration, Vibration
-from bisar_budget.ranges.exact_ranges import Floats
 
 PHASE = (1.0, 2.0)  # S_φ = (Γ·f₀)²·S_a/f²
 _FELT_ACCELERATION_MPS2 = 1e-6  # m/s²; a smaller acceleration of a path counts as none

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators, phrases
+from bisar_budget.arrays import Booleans, Floats
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
@@ -21,7 +22,6 @@ from bisar_budget.mission.instruments import Oscillator, PowerLaw
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import Points, SortedPoints
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 DEFAULT_BANDWIDTH_HZ = 1e3  # Hz, upper end of noise for which the file states no end
 POOR_FIT_FRACTION = 0.2  # of an Allan deviation; a power law with a larger misfit does not describe it
@@ -237,7 +237,7 @@ def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: Any)
     return full.times(seen.factor)
 
 
-def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Truths:
+def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Booleans:
     """Cases in which the spectrum differs from the stated one: by another frequency of the mask, or by a poor fit."""
     in_doubt = np.full(seen.cases, bool(oscillator.mask_at_frequency_of_part))
     if oscillator.allan_deviation is None:

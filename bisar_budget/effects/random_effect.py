@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.arrays import Floats
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.declared import ImagePlane, published_planes
 from bisar_budget.effects.effect import Subject, plain
@@ -33,7 +34,7 @@ from bisar_budget.image_plane import LEADING, nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges, Floats
+from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges
 
 if TYPE_CHECKING:
     from bisar_budget.effects.oscillators import Noise

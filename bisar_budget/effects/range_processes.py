@@ -20,8 +20,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bisar_budget.arrays import Floats
 from bisar_budget.image_plane import LEADING
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 _ORDER_COUNT = 4  # Legendre orders 0 to 3, which displace and defocus
 _LAG_OCTAVE_COUNT = 44  # octaves of lag: half an aperture over the shortest correlation time that a file can state

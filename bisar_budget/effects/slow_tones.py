@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bisar_budget.arrays import Booleans, Floats, Indices
 from bisar_budget.effects.declared import FLOOR_RAD, SECOND_ORDER_FRACTION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.sources import exact_ranges
@@ -27,7 +28,7 @@ from bisar_budget.geometry import BistaticGeometry, Vectors
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
-from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, STILL, ExactRanges, Floats, Indices, Truths, followed
+from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, STILL, ExactRanges, followed
 
 TONE_PHASE_COUNT = 16  # phases in which exact ranges follow a large vibration
 ANGLES = 2 * math.pi * np.arange(TONE_PHASE_COUNT) / TONE_PHASE_COUNT
@@ -86,7 +87,7 @@ class SlowTone(NamedTuple):
     """
 
     subject: Subject
-    is_there: Truths
+    is_there: Booleans
     per_metre: TonePhases
     declared: TonePhases
     hears_part: bool

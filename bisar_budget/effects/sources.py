@@ -45,7 +45,7 @@ def exact_ranges(
 ) -> ExactRanges:
     """Exact ranges of a mission's cases at their scene centres, at `count` nodes or as many as the cases need."""
     T, is_heard = mission.collection.aperture_time, mission.has_direct_path
-    count = count or nodes_for(geometry, T, has_direct_path=is_heard)
+    count = count or int(nodes_for(geometry, T, has_direct_path=is_heard))
     return ExactRanges.of(geometry.both, mission.radar, T, count, cases, has_direct_path=is_heard)
 
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
+from bisar_budget.arrays import Floats
 from bisar_budget.image_plane import nodes
-from bisar_budget.ranges.exact_ranges import Floats
 
 SERIES_ANGLE_RAD = 0.5  # angle, or ratio; below it terms cancel and a series is exact to 1e-8
 

@@ -30,17 +30,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import phrases
+from bisar_budget.arrays import Booleans, Floats
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import Moves, RandomError, SensorCases
 from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, left_parts, tone
-from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vector, dot
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vector, Vectors, dot
 from bisar_budget.image_plane import nodes, nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.vibrations import AcceleratedSinusoid, FeltVibration, Spectrum, Vibration
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.units import format_quantity
 
 NEAR_CYCLES = 2.5  # per aperture; farther apart, two equal lines raise each other's echo by less than 1.1 dB
@@ -91,7 +91,7 @@ def near_lines(cycles: Sequence[float]) -> list[tuple[int, ...]]:
     return [tuple(np.flatnonzero(number == group).tolist()) for group in range(number.max() + 1)]
 
 
-def worst_phases(amplitudes: Any, cycles: Any, is_member: Truths | None = None) -> Worst:
+def worst_phases(amplitudes: Any, cycles: Any, is_member: Booleans | None = None) -> Worst:
     """Find the height of the echoes of several lines together in their worst phases.
 
     Parameters
@@ -190,11 +190,10 @@ class Line(NamedTuple):
     per_metre: Any = 1.0
 
 
-def sight_of(mission: Mission, name: str, geometry: Any = None) -> Vector:
+def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> Vectors:
     """Range, or range less the direct path, that a metre of a platform's motion removes. [-]"""
     sights = (geometry or mission.geometry).sights(has_direct_path=mission.has_direct_path)
-    sight: Vector = sights[PLATFORMS.index(name)]
-    return sight
+    return sights[PLATFORMS.index(name)]
 
 
 def seen_of_axes(
@@ -237,7 +236,7 @@ def counted(mission: Mission, name: str, value: Any, metric: str, geometry: Bist
     )
 
 
-def lines_of(mission: Mission, name: str, geometry: Any = None) -> list[Line]:
+def lines_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> list[Line]:
     """Sinusoids of one platform, along the line of sight."""
     error: MotionError = getattr(mission.platforms, name).motion_error
     lines = error.vibration.sinusoidal

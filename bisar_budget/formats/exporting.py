@@ -24,7 +24,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
-from bisar_budget.geometry import Axes, PlatformState, Vector
+from bisar_budget.geometry import Axes, PlatformState, Vector, plain_vector
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import Instant, parse_instant
@@ -354,8 +354,8 @@ def _scene_coordinates(plan: _Plan, axes: SceneAxes) -> _Leaves:
         **_xyz("IARP/ECF", axes.origin),
         **_degrees("IARP/LLH", reference_point),
         "IARP/LLH/HAE": reference_point.height,
-        **_xyz("ReferenceSurface/Planar/uIAX", axes.axes[0]),
-        **_xyz("ReferenceSurface/Planar/uIAY", axes.axes[1]),
+        **_xyz("ReferenceSurface/Planar/uIAX", plain_vector(axes.axes[0])),
+        **_xyz("ReferenceSurface/Planar/uIAY", plain_vector(axes.axes[1])),
         **{f"ImageArea/X1Y1/{axis}": -half for axis in "XY"},
         **{f"ImageArea/X2Y2/{axis}": half for axis in "XY"},
     }

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import numpy as np
 
 from bisar_budget import units
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.geometry import (
     STILL,
@@ -720,7 +721,7 @@ def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: floa
             )
 
 
-def least_baseline(apart: PlatformState, half: Any) -> Any:
+def least_baseline(apart: PlatformState, half: PerCase) -> Floats:
     """Least distance of the platforms over an aperture of half-length `half` [s]. [m]"""
     return norm(apart.place(half * _APERTURE_TIMES)).min(axis=0)
 

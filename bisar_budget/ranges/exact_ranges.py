@@ -31,21 +31,19 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
-from bisar_budget.geometry import GroundVector, PlatformState, Vectors, dot, norm
+from bisar_budget.geometry import GroundVector, PlatformState, VectorArrays, Vectors, dot, norm
 from bisar_budget.image_plane import FEWEST_NODES, LEADING, GroundMatrix, Sampling, band_variance, nodes
 
 if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Truths = NDArray[np.bool_]
+Shifts = Sequence[Sequence[Floats] | Floats]  # east, north and up of each platform, (nodes, lanes) or alike. [m]
 
 FINE_NODE_COUNT = 24  # nodes of courses less smooth than the courses of (22)
 RANGE_ROUNDING_FRACTION = 2e-15  # rounding error of a few operations, as a fraction of a range sum
@@ -128,10 +126,10 @@ class Effect(NamedTuple):
     phase at the aperture edge. [rad/unit]
     """
 
-    constant: Any
-    linear: Any
-    qpe: Any
-    cubic: Any
+    constant: PerCase
+    linear: PerCase
+    qpe: PerCase
+    cubic: PerCase
 
 
 class FullEffect(NamedTuple):
@@ -141,10 +139,10 @@ class FullEffect(NamedTuple):
     that is left at the displaced point. [rad/unit]
     """
 
-    east: Any
-    north: Any
-    qpe: Any
-    cubic: Any
+    east: PerCase
+    north: PerCase
+    qpe: PerCase
+    cubic: PerCase
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +162,7 @@ class TimeTags:
         case = self.case.take(lanes)
         return replace(self, case=case) if (case >= 0).any() else None
 
-    def put(self, platform: int, tag_s: Floats, along: Sequence[Floats], *, is_rate: bool = False) -> list[Any]:
+    def put(self, platform: int, tag_s: Floats, along: Sequence[PerCase], *, is_rate: bool = False) -> list[Floats]:
         """Insert a platform's shift by time tags (nodes, lanes) [m], or its rate per second, into other motions."""
         tagged = np.flatnonzero(self.case >= 0)
         (times,), tag_s = _take_cases([self.times], self.case[tagged]), tag_s[:, tagged]
@@ -201,9 +199,9 @@ class Lanes:
 
     case: Indices
     at_nodes: Floats
-    moves: tuple[Any, Any] = (0.0, 0.0)
+    moves: tuple[PerCase, PerCase] = (0.0, 0.0)
     direction: Vectors = (0.0, 0.0, 0.0)
-    order: Any = -1
+    order: PerCase = -1
     of_receiver: Vectors | None = None
     tags: TimeTags | None = None
 
@@ -237,7 +235,7 @@ class Lanes:
         """The lanes, one per case, for a new choice of cases: errors of `ExactRanges.at`."""
         return replace(self.of(case), case=np.arange(case.size))
 
-    def shifts(self, size: Any) -> list[Any]:
+    def shifts(self, size: PerCase) -> list[Sequence[Floats]]:
         """Shift of each platform at the nodes by errors of given sizes. [m]"""
         along = [self.at_nodes * (size * component) for component in self.direction]
         both = [along, along]
@@ -250,7 +248,7 @@ class Lanes:
             ]
         return [_weighted(shift, weight) for shift, weight in zip(both, self.moves, strict=True)]
 
-    def ways(self, size: Any) -> tuple[Sequence[Any], Sequence[Any]]:
+    def ways(self, size: PerCase) -> tuple[Sequence[PerCase], Sequence[PerCase]]:
         """Directions in which larger errors move transmitter and receiver; for time tags they turn with the paths."""
         if self.tags is None:
             return self.directions
@@ -260,7 +258,7 @@ class Lanes:
         )
         return of_transmitter, of_receiver
 
-    def clock(self, size: Any) -> Any:
+    def clock(self, size: PerCase) -> Floats:
         """Range error at the nodes by clock errors of given sizes. [m]"""
         transmitter, receiver = self.moves
         is_clock = 1.0 - np.maximum(transmitter, receiver)
@@ -284,7 +282,7 @@ class SmallErrors(NamedTuple):
     @classmethod
     def of(cls, errors: Sequence[Lanes]) -> "SmallErrors":
         """Small errors from lanes, one `Lanes` per error, whose lanes are the cases."""
-        courses: dict[Any, Floats] = {}
+        courses: dict[PerCase, Floats] = {}
         components = [
             component
             for lanes_of_error in errors
@@ -322,7 +320,7 @@ class ImagePoints(NamedTuple):
     at the centre.
     """
 
-    is_settled: Truths
+    is_settled: Booleans
     east: Floats
     north: Floats
     quadratic: Floats
@@ -387,8 +385,8 @@ class ExactRanges:
         k: Floats,
         band: Floats,
         sampling: Sampling,
-        tracks: Sequence[Vectors],
-        positions: Sequence[Vectors],
+        tracks: Sequence[VectorArrays],
+        positions: Sequence[VectorArrays],
         *,
         has_direct_path: bool = False,
     ) -> None:
@@ -406,7 +404,7 @@ class ExactRanges:
         cls,
         paths: Sequence[PlatformState],
         radar: "Radar",
-        aperture_time: Any,
+        aperture_time: PerCase,
         count: int,
         cases: int = 1,
         *,
@@ -414,7 +412,7 @@ class ExactRanges:
     ) -> "ExactRanges":
         """Exact ranges of collections, with paths of transmitter and receiver, at their scene centres."""
 
-        def of_each(value: Any) -> Floats:
+        def of_each(value: PerCase) -> Floats:
             return np.array(np.broadcast_to(np.asarray(value, dtype=float), (cases,)))
 
         half, k, band = (
@@ -456,7 +454,7 @@ class ExactRanges:
         return self.matrix.sine
 
     @cached_property
-    def is_turned(self) -> Truths:
+    def is_turned(self) -> Booleans:
         """Whether a line of sight turns by more than `MAX_TURN_RAD` between two times of the aperture, (n,)."""
         least = np.full(self.half.shape, math.inf)
         if self.fit.shape[1] > FEWEST_NODES:  # with fewer nodes no line of sight turns that far
@@ -486,7 +484,7 @@ class ExactRanges:
         return np.asarray(RANGE_ROUNDING_FRACTION * self.k * recorded)
 
     @cached_property
-    def _between(self) -> Vectors:
+    def _between(self) -> VectorArrays:
         """Position of the transmitter relative to the receiver at the nodes. [m]"""
         (x, y, z), (u, v, w) = self.tracks
         return (x - u, y - v, z - w)
@@ -497,7 +495,7 @@ class ExactRanges:
         return np.asarray(norm(self._between))
 
     @cached_property
-    def heard_along(self) -> tuple[Vectors, Vectors]:
+    def heard_along(self) -> tuple[VectorArrays, VectorArrays]:
         """Unit vectors along the direct path at the nodes: receiver to transmitter, transmitter to receiver."""
         x, y, z = (component / self.baselines for component in self._between)
         return ((x, y, z), (-x, -y, -z))
@@ -508,7 +506,7 @@ class ExactRanges:
         """Position error at the nodes by a unit of an error: 1, τ or τ²/2 of (22)."""
         return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
 
-    def clock_course(self, terms: Sequence[Any]) -> Floats:
+    def clock_course(self, terms: Sequence[PerCase]) -> Floats:
         """Range error at the nodes of a clock error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³, by its terms. [m]"""
         seconds = sum(term * self.times**power for power, term in enumerate(terms) if np.any(term))
         return np.asarray(SPEED_OF_LIGHT * seconds + np.zeros_like(self.times))
@@ -601,7 +599,7 @@ class ExactRanges:
         # Where terms cancel exactly, the rest is rounding and would give a limit where none exists.
         return FullEffect(_unless_rounding(east, seen_east), _unless_rounding(north, seen_north), *phases)
 
-    def left_of_small(self, range_error: Floats, moved: tuple[Any, Any]) -> Floats:
+    def left_of_small(self, range_error: Floats, moved: tuple[PerCase, PerCase]) -> Floats:
         """Range error that small errors (..., nodes, cases) leave at the point they move to, (..., cases). [m]"""
         (by_east, by_north), (east, north) = self.slopes, (np.asarray(component)[..., None, :] for component in moved)
         return np.asarray(range_error + by_east * east + by_north * north)
@@ -623,7 +621,9 @@ class ExactRanges:
         return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEADING)
 
     # ------------------------------------------------------------------ errors of any size
-    def phases(self, lanes: Lanes, size: Floats, near: tuple[Any, Any], *, is_at_fold: bool = False) -> ImagePoints:
+    def phases(
+        self, lanes: Lanes, size: Floats, near: tuple[Floats, Floats], *, is_at_fold: bool = False
+    ) -> ImagePoints:
         """Find the point to which errors of given sizes move a point at the centre, and the defocus there.
 
         The search starts `near` [m]. It finds a point where it settles at once, or, `is_at_fold`, where V leads down
@@ -632,13 +632,13 @@ class ExactRanges:
         """
         return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
-    def left_over(self, lanes: Lanes, size: Floats, point: tuple[Any, Any]) -> Floats:
+    def left_over(self, lanes: Lanes, size: Floats, point: tuple[PerCase, PerCase]) -> Floats:
         """Range error at the nodes that errors leave at ground points, (nodes, lanes). [m]"""
         room = self._room(lanes.case.size)
         measured = self._measured(lanes.clock(size), lanes.shifts(size), lanes.case, room)
         return _remaining(measured, *point, room[_MEASURED_ARRAY_COUNT:])
 
-    def _heard(self, shifts: Sequence[Any], case: Indices) -> Floats:
+    def _heard(self, shifts: Shifts, case: Indices) -> Floats:
         """The c·t̃ at the nodes by shifts of the platforms if the direct path is the clock. [m]"""
         a, b, c = (of_transmitter - of_receiver for of_transmitter, of_receiver in zip(*shifts, strict=True))
         x, y, z, baseline = _take_cases([*self._between, self.baselines], case)
@@ -687,7 +687,13 @@ class ExactRanges:
         return _against(matrix, weights, looks, distances, slope)
 
     def settled(
-        self, clock: Floats, shifts: Sequence[Any], near: Any, case: Indices, *, is_at_fold: bool = False
+        self,
+        clock: Floats,
+        shifts: Shifts,
+        near: Sequence[PerCase] | Floats,
+        case: Indices,
+        *,
+        is_at_fold: bool = False,
     ) -> ImagePoints:
         """Newton's method for the least of V, or `is_at_fold` a descent.
 
@@ -725,7 +731,7 @@ class ExactRanges:
         """Work arrays for a number of lanes, allocated once because allocation takes longer than filling them."""
         return np.empty((_ARRAY_COUNT, self.fit.shape[1], lanes))
 
-    def _measured(self, clock: Floats, shifts: Sequence[Any], case: Indices, room: Floats) -> list[Floats]:
+    def _measured(self, clock: Floats, shifts: Shifts, case: Indices, room: Floats) -> list[Floats]:
         """Parts of errors that `_seen` takes, (nodes, lanes): the clock error, and five of each platform, in `room`.
 
         If d is added to a platform's vector r, its range R grows by p/(R + √(R² + p)), with p = d·(2r + d). This form
@@ -856,7 +862,7 @@ class _PointSearch:
         self.measured, self.room = _take(self.measured, going), self.room[..., : going.size]
 
     def _keep(
-        self, is_done: Truths, remaining: Floats, slopes: Floats, step: tuple[Floats, Floats], turn: Floats
+        self, is_done: Booleans, remaining: Floats, slopes: Floats, step: tuple[Floats, Floats], turn: Floats
     ) -> None:
         """Store the lanes that have settled; a phase below the rounding counts as 0.
 
@@ -917,7 +923,7 @@ def _solved(bends: tuple[Floats, Floats, Floats], slope: Floats) -> tuple[Floats
 
 
 def _unresolved(
-    orders: Floats, squares: tuple[Floats, Floats], k: Floats, band: Floats, is_turned: Truths
+    orders: Floats, squares: tuple[Floats, Floats], k: Floats, band: Floats, is_turned: Booleans
 ) -> tuple[Floats, Floats]:
     """Hidden phase, and rms beyond the cubic, by orders 0 to 3 at the edge [m] and mean squares. [m²], [rad]"""
     _, slope, _, cubic = orders
@@ -931,14 +937,14 @@ def _unless_rounding(value: Floats, seen: Floats) -> Floats:
     return np.where(np.abs(value) <= ROUNDING * seen, 0.0, value)
 
 
-def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:
+def _weighted(along: Sequence[Floats], weight: PerCase) -> Sequence[Floats]:
     """Shift of a platform, multiplied by the weight with which lanes move the platform."""
     if np.ndim(weight):
         return [weight * component for component in along]
     return along if weight else STILL
 
 
-def _grow(platform: Sequence[Floats], east: Any, north: Any, room: Floats, distance: Floats) -> None:
+def _grow(platform: Sequence[Floats], east: PerCase, north: PerCase, room: Floats, distance: Floats) -> None:
     """Fill `room` with the growth of a platform's range to points, and `distance` with the range itself. [m]"""
     u, v, R, p, squared_range = platform
     grown, scratch = room[:2]
@@ -953,7 +959,7 @@ def _grow(platform: Sequence[Floats], east: Any, north: Any, room: Floats, dista
     grown /= scratch
 
 
-def _remaining(measured: Sequence[Floats], east: Any, north: Any, room: Floats) -> Floats:
+def _remaining(measured: Sequence[Floats], east: PerCase, north: PerCase, room: Floats) -> Floats:
     """Range error left at the nodes at points (lanes,), (nodes, lanes). [m]"""
     clock, first, second = measured[0], room[:3], room[3:6]
     _grow(measured[1:6], east, north, first, room[6])
@@ -963,7 +969,7 @@ def _remaining(measured: Sequence[Floats], east: Any, north: Any, room: Floats) 
     return remaining
 
 
-def _seen(measured: Sequence[Floats], east: Floats, north: Floats, room: Floats) -> tuple[Floats, Floats, Floats]:
+def _seen(measured: Sequence[Floats], east: PerCase, north: PerCase, room: Floats) -> tuple[Floats, Floats, Floats]:
     """Range error left at the nodes at points, (nodes, lanes) [m], and the view of both platforms, in `room`.
 
     The view has the components east and north of the lines of sight, (2, 2, nodes, lanes), and the ranges, (2, nodes,
@@ -980,7 +986,7 @@ def _seen(measured: Sequence[Floats], east: Floats, north: Floats, room: Floats)
     return remaining, both[:, 1:3], both[:, 3]
 
 
-def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Indices) -> ImagePoints:
+def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -> ImagePoints:
     """Find where errors of any course move a point at the centre, if necessary in steps from no error on.
 
     Parameters
@@ -1027,7 +1033,7 @@ def _within_ends(points: ImagePoints) -> ImagePoints:
     return ImagePoints(points.is_settled & ~is_gone, *(np.where(is_gone, math.nan, column) for column in points[1:]))
 
 
-def _take(arrays: Sequence[Floats], indices: Indices) -> list[Floats]:
+def _take(arrays: Sequence[Floats] | Floats, indices: Indices) -> list[Floats]:
     """Some lanes of arrays (nodes, lanes). An array that all lanes share stays as it is."""
     return [array if array.shape[-1] == 1 else array.take(indices, axis=-1) for array in arrays]
 

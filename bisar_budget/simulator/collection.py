@@ -155,7 +155,7 @@ class RangeLines:
         if not area:
             raise ValueError("range or Doppler does not change over the ground there: no image plane")
         wavelength = SPEED_OF_LIGHT / radar.center_frequency
-        return SPEED_OF_LIGHT / (radar.bandwidth * steepness), wavelength / (area / steepness)
+        return float(SPEED_OF_LIGHT / (radar.bandwidth * steepness)), float(wavelength / (area / steepness))
 
     def sampled(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
         """Cells for pixels to sample: `cells`, or finer cells across the lines. [m]
@@ -168,7 +168,7 @@ class RangeLines:
             return across, along
         first, middle, last = self._sums(np.asarray(centre, dtype=float))
         column = self._column(middle, last - first) * float(np.hypot(*middle))  # by a metre across the lines
-        wider = abs(float(((first + last) / 2 - middle) @ column)) * radar.center_frequency / SPEED_OF_LIGHT
+        wider = abs(float(((first + last) / 2 - middle) @ column)) * float(radar.center_frequency) / SPEED_OF_LIGHT
         return min(across, _MAX_SPECTRUM_CELLS / (1 / across + wider)), along
 
     def offsets(self, ground_points: Floats, centre: GroundVector, radar: Band) -> Floats:

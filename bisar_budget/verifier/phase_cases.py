@@ -293,7 +293,7 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
         measured_beyond_rad=beyond,
         displacement_published_m=published_displacement(study, sizes, scale),
         displacement_full_m=images.effect.displacement,
-        smear_azimuth_published_rad=(study.geometry.look_azimuth + math.pi / 2) % math.pi,
+        smear_azimuth_published_rad=(float(study.geometry.look_azimuth + math.pi / 2) % math.pi),
         verdict=verdict,
         reason=remark.then(unusual) if remark else unusual or None,
     )

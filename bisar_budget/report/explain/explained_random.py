@@ -444,7 +444,7 @@ def _integrals(
         values = dict(zip(("R_t", "R_r", "b"), ways, strict=True)) | {"c": SPEED_OF_LIGHT}
         yield step(
             "Heard over the baseline b, and a delay Δt later by the echo: S_left = S·4·sin²(πf·Δt)",
-            WorkedEquation("delay", "(R_t + R_r - b)/c", values, delay, "s"),
+            WorkedEquation("delay", "(R_t + R_r - b)/c", values, float(delay), "s"),
         )
     elif interval is None:
         piece_parts, density = [parts((piece,), T) for piece in pieces], "S"

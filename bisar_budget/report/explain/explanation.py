@@ -12,6 +12,7 @@ from bisar_budget.analysis.scene import at, differences_at
 from bisar_budget.analysis.spread import mainlobe_energy
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits, tone_limits
+from bisar_budget.arrays import Floats
 from bisar_budget.budget.aggregates import effect_parts, untaken_effects
 from bisar_budget.budget.declarations import missing_declarations
 from bisar_budget.budget.doubts import (
@@ -40,12 +41,12 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row
 from bisar_budget.findings.status import STATUS
+from bisar_budget.geometry import plain_vector
 from bisar_budget.mission.changes import name_of_error
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.vibrations import AcceleratedSinusoid
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explained_error import (
     RULES,
@@ -183,16 +184,17 @@ def collection_chain(findings: MissionFindings) -> Iterator[Step]:
     """Steps to look direction, smear direction and determinant of Q, which do not depend on errors."""
     values: dict[str, float] = {}
     for name, state in (("t", findings.geometry.transmitter), ("r", findings.geometry.receiver)):
-        (x, y, _), (v_x, v_y, _) = state.position, state.velocity
-        values |= {f"φ̄_{name}": state.azimuth, f"θ̄_{name}": state.elevation, f"R_{name}": state.slant_range}
+        (x, y, _), (v_x, v_y, _) = plain_vector(state.position), plain_vector(state.velocity)
+        values |= {f"φ̄_{name}": float(state.azimuth), f"θ̄_{name}": float(state.elevation)}
+        values[f"R_{name}"] = float(state.slant_range)
         values |= {f"x_{name}": x, f"y_{name}": y, f"v_x{name}": v_x, f"v_y{name}": v_y}
-    look, s = findings.geometry.look_azimuth, findings.geometry.range_gradient
+    look, s = float(findings.geometry.look_azimuth), findings.geometry.range_gradient
     yield step("(11), bistatic look direction", WorkedEquation("φ_b", notation.LOOK_AZIMUTH, values, look, "rad"))
     east, north = notation.SMEAR
     yield step(
         "(31), smear direction",
-        WorkedEquation("east", east, values, s[1], ""),
-        WorkedEquation("north", north, values, -s[0], ""),
+        WorkedEquation("east", east, values, float(s[1]), ""),
+        WorkedEquation("north", north, values, float(-s[0]), ""),
     )
     determinant = findings.analysed().published.plane.determinant
     yield step("(30), range held constant", WorkedEquation("det Q", notation.DETERMINANT, values, determinant, "1/s"))
