@@ -15,5 +15,5 @@ PerCaseFlag = bool | Booleans
 
 
 def absolute(value: PerCase) -> PerCase:
-    """Absolute value of a number, or of each number; `abs` alone loses the type of a number or an array."""
-    return abs(value)
+    """Absolute value of a number, or of each number of an array."""
+    return np.abs(value) if isinstance(value, np.ndarray) else abs(value)

@@ -393,10 +393,10 @@ class PlatformState:
     @property
     def squint(self) -> float | None:
         """Angle of the line of sight from broadside, positive forward; None for a still platform. One case. [rad]"""
-        speed = norm(self.velocity)
+        speed = float(norm(self.velocity))
         if speed == 0:
             return None
-        sine = -dot(self.look, self.velocity) / speed
+        sine = -float(dot(self.look, self.velocity)) / speed
         return math.asin(max(-1.0, min(1.0, sine))) if abs(sine) > ROUNDING else 0.0
 
     def has_frame(self, name: str, margin: float = 1.0) -> PerCaseFlag:

@@ -4,13 +4,14 @@ A check lists all of them, with the errors that the file does not declare, becau
 sizes. A sweep lists the declared errors, and the errors whose rows are asked for.
 """
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from bisar_budget import evaluators, phrases
+from bisar_budget.arrays import PerCase
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects.combined import squared
 from bisar_budget.effects.effect import (
@@ -61,6 +62,10 @@ def distribution_of(mission: Mission, source: ErrorSource) -> str:
     return "bound"
 
 
+# The evaluators take and give numbers, or arrays of cases.
+_published_motion: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.published_motion
+
+
 class ErrorListing:
     """The errors of cases of one mission, as their file states them. `DeclaredErrors` documents the parameters."""
 
@@ -86,10 +91,10 @@ class ErrorListing:
         return declared is not None or self.shown is None or row_subject.id in self.shown
 
     @cached_property
-    def _published(self) -> list[Any]:
+    def _published(self) -> list[tuple[tuple[PerCase, ...], ...]]:
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
         return [
-            evaluators.published_motion(*path.position, *path.velocity, path.slant_range, wavelength, T)
+            _published_motion(*path.position, *path.velocity, path.slant_range, wavelength, T)
             for path in self.geometry.both
         ]
 
@@ -100,7 +105,7 @@ class ErrorListing:
             published = [Effect._make(row) for row in self._published[platform_index][first : first + 3]]
             along = np.stack([self.exact.along(platform_index, axis) for axis in _AXES])
             effects = self.exact.effect(along * self.exact.powers[MOTION_UNITS[kind]])
-            full = [FullEffect._make(row) for row in zip(*effects, strict=True)]
+            full = [FullEffect._make(row) for row in zip(*map(np.asarray, effects), strict=True)]
             self._legs[platform_index, kind] = published, full
         return self._legs[platform_index, kind]
 

@@ -145,7 +145,8 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
         raise SimulationError(f"the declared errors leave no image of a point: {fault}") from None
     shift = max(abs(component) for component in effect.displacement)
     reach = max(max(abs(target.east), abs(target.north)) for target in targets.points)
-    cell = Case(Analysis(mission)).resolution[:2]
+    resolution = Case(Analysis(mission)).resolution
+    cell = float(resolution.range), float(resolution.cross_range)
     half = float(math.ceil(reach + shift + _AREA_MARGIN_CELLS * max(cell)))
     times: Floats = np.linspace(-T / 2, T / 2, _EXTENT_SAMPLES)
     flown = collection.flight(errors.smooth(), times)

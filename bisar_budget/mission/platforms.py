@@ -589,6 +589,11 @@ class Platform(NamedTuple):
             return PlatformState(
                 position=self.position, velocity=self.velocity, acceleration=acceleration, bends=bends
             )
+        # A file without position and velocity has these.
+        assert self.slant_range is not None
+        assert self.azimuth is not None
+        assert self.elevation is not None
+        assert self.speed is not None
         return state_from_angles(
             slant_range=self.slant_range,
             azimuth=self.azimuth,
@@ -723,7 +728,7 @@ def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: floa
 
 def least_baseline(apart: PlatformState, half: PerCase) -> Floats:
     """Least distance of the platforms over an aperture of half-length `half` [s]. [m]"""
-    return norm(apart.place(half * _APERTURE_TIMES)).min(axis=0)
+    return np.asarray(norm(apart.place(half * _APERTURE_TIMES)).min(axis=0))
 
 
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
@@ -747,4 +752,4 @@ def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
     if not state.is_quadratic:
         yield from (half * step / 32 for step in range(-31, 32))
     elif state.acceleration[2] > 0:
-        yield max(-half, min(half, -state.velocity[2] / state.acceleration[2]))
+        yield max(-half, min(half, -float(state.velocity[2]) / float(state.acceleration[2])))

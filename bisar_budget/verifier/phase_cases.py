@@ -180,7 +180,7 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
     walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # λN/2 over c/B
     blank = study.blank("mission.autofocus_pull_in", phase, "rad", budget_rad=budget)
     clock = next(s for s in study.sources if s.id == "timing.quadratic")
-    fields = refocused(study, [(clock, phase / abs(clock.effect.qpe))], budget, holds_hidden=False)
+    fields = refocused(study, [(clock, phase / abs(float(clock.effect.qpe)))], budget, holds_hidden=False)
     reason = reasons.range_walk(walk, range_walk_cap(study.mission))
     return blank._replace(boundary_autofocus=phase, **fields, verdict=fields["verdict_autofocus"], reason=reason)
 

@@ -59,7 +59,7 @@ from bisar_budget.effects.vibration import (
     power_of,
 )
 from bisar_budget.findings.row import Row
-from bisar_budget.geometry import PlatformState
+from bisar_budget.geometry import PlatformState, plain_vector
 from bisar_budget.mission.instruments import Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.propagation import ABOVE_THE_AIR, height_of
@@ -157,7 +157,7 @@ def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
         name = "the line of sight, u"
     else:
         state: PlatformState = getattr(mission.platforms, error.owner).state
-        east, north, up = (with_unit(force + 0.0, "m/s^2") for force in specific_force(mission, state))
+        east, north, up = (with_unit(float(force) + 0.0, "m/s^2") for force in specific_force(mission, state))
         yield step("Specific force f = a − g, which accelerometers measure", f"f = [{east}, {north}, {up}]")
         name = (
             "what a tilt turns of it into the line of sight, f_u = |u × f|"
@@ -551,7 +551,7 @@ def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
             yield from _slow("Vibration", line.frequency, line.left, line.free, mission, _PER_SENSITIVITY)
     if flies_a_turn(mission, name):
         state: PlatformState = getattr(mission.platforms, name).state
-        acceleration = float(np.linalg.norm(state.acceleration))
+        acceleration = float(np.linalg.norm(plain_vector(state.acceleration)))
         values = {"c": SPEED_OF_LIGHT, "a": acceleration}
         yield step(
             "Turn: the range error is c·Γ·(v(τ) − v(0)); the acceleration at mid-aperture is a frequency, which "
@@ -569,16 +569,16 @@ def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterat
     """Steps from a unit of the zenith delay to the delay of the leg over the aperture."""
     mission, delay = analysis.mission, error.subject.axis
     path: PlatformState = getattr(analysis.geometry, name)
-    (x, y, z), height = path.position, float(height_of(path.position))
+    (x, y, z), height = plain_vector(path.position), float(height_of(path.position))
     if delay == CONTENT and height < ABOVE_THE_AIR:
         yield step(f"The {name} flies at {height:.6g} m, below the ionosphere: no electrons on its leg")
         return
-    values = {"R": path.slant_range, "z": z}
+    values = {"R": float(path.slant_range), "z": z}
     if height < ABOVE_THE_AIR:
         title, formula = "Within the air, over a flat Earth: 1 over the sine of the elevation", "R/z"
     else:
         shell = TROPOSPHERE_HEIGHT_M if delay == DELAY else min(IONOSPHERE_HEIGHT_M, height)
-        values = {"p": (x * x + y * y) ** 0.5, "R": path.slant_range, "h": shell, "R_E": EARTH_RADIUS}
+        values = {"p": (x * x + y * y) ** 0.5, "R": float(path.slant_range), "h": shell, "R_E": EARTH_RADIUS}
         title = "Above the air, through a spherical shell at height h; p is the distance along the ground's plane"
         formula = "1/sqrt(1 - (p/R)^2/(1 + h/R_E)^2)"
     factor = float(leg_factor(delay, path.position, path.position))

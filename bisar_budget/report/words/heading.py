@@ -132,7 +132,8 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
         yield "Path", f"{name}: {path_words(path)}"
     yield (
         "Geometry",
-        f"bistatic angle {_degrees(float(geometry.bistatic_angle))}, look azimuth {_degrees(geometry.look_azimuth)}, "
+        f"bistatic angle {_degrees(float(geometry.bistatic_angle))}, "
+        f"look azimuth {_degrees(float(geometry.look_azimuth))}, "
         f"range and Doppler gradients {_degrees(float(geometry.gradient_angle))} apart, "
         f"wavelength {format_quantity(mission.wavelength, 'm', 4)}",
     )
