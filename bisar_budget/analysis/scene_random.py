@@ -171,6 +171,7 @@ def _at_random(
         if error.moves:
             yield what, _Moving(_at_nodes_of(errors, error.moves), size)
         elif kind in _CLOCKS:
+            assert error.full.covariance is not None, "the full model has one"
             yield what, _Clock.of(errors.exact, error.full.covariance, size)
         elif kind == "propagation":
             places = tuple(map(PLATFORMS.index, legs_of(what.owner)))

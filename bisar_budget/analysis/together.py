@@ -19,6 +19,7 @@ from bisar_budget.effects.combined import (
     phase_parts,
 )
 from bisar_budget.effects.declared import DeclaredErrors
+from bisar_budget.effects.effect import plain
 from bisar_budget.effects.random_effect import RandomError, factor
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import GroundVector
@@ -218,12 +219,12 @@ class Together:
     def phase_parts(self, phases: Phases, rule: str = "", case: int = 0) -> list[tuple[str, float]]:
         """List the parts of phases that the mission's rule, or the given rule, combines, signed. [rad]"""
         combined_parts = phase_parts(phases, rule or self.rule, self.groups)
-        return [(row_id, float(phase[case])) for row_id, phase in combined_parts]
+        return [(row_id, plain(phase, case)) for row_id, phase in combined_parts]
 
     def displacement_parts(self, case: int = 0) -> list[tuple[str, GroundVector]]:
         """List the parts of displacements that the mission's rule combines; empty if an error has no image. [m]"""
         named_moves = displacement_parts([*self.moves(self.rule), *self.undirected_moves], self.rule, self.groups)
-        combined_parts = [(row_id, (float(east[case]), float(north[case]))) for row_id, (east, north) in named_moves]
+        combined_parts = [(row_id, (plain(east, case), plain(north, case))) for row_id, (east, north) in named_moves]
         return [] if any(math.isnan(east) for _, (east, _) in combined_parts) else combined_parts
 
 

@@ -124,7 +124,7 @@ def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | N
         is_higher = height > level[cases_with_group]
         cases_with_group = cases_with_group[is_higher]
         phase[cases_with_group], frequency[cases_with_group], level[cases_with_group] = (
-            column[is_higher] for column in (*worst, height)
+            np.asarray(column)[is_higher] for column in (*worst, height)
         )
         is_of[:, cases_with_group] = members[:, cases_with_group]
     for first, second in pairs:

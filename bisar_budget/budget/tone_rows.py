@@ -154,7 +154,7 @@ class SpurRow(FamilyRow):
             evidence=oscillator.source,
             remarks=(
                 phrases.tone_lies(spur.frequency, spur.frequency * T),
-                *_folds(spur.left, spur.free, T, f"{spur.name}.oscillator"),
+                *_folds(spur.left, float(spur.free), T, f"{spur.name}.oscillator"),
                 *override_notes(spur.name, oscillator.overridden, "frequency"),
             ),
             binding_requirement=phase_requirement(case, row),
@@ -250,9 +250,9 @@ class AcceleratedRow(FamilyRow):
             info=missing,
             evidence=evidence(oscillator),
             remarks=(
-                phrases.tone_lies(tone.frequency, tone.frequency * T),
-                phrases.shakes_an_oscillator(float(tone.acceleration), tone.phase),
-                *_folds(tone.left, tone.free * tone.sensitivity, T, f"{tone.name}.oscillator.acceleration"),
+                phrases.tone_lies(float(tone.frequency), float(tone.frequency * T)),
+                phrases.shakes_an_oscillator(float(tone.acceleration), float(tone.phase)),
+                *_folds(tone.left, float(tone.free * tone.sensitivity), T, f"{tone.name}.oscillator.acceleration"),
                 *_whose(mission, tone.name),
                 *override_notes(tone.name, oscillator.overridden, SENSITIVITY),
             ),

@@ -11,18 +11,19 @@ cases, each error is a block, so that the arrays at work stay in a processor's c
 
 import math
 import weakref
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.arrays import Booleans, Floats, Indices
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase, PerCaseFlag
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, plain
 from bisar_budget.effects.sources import ErrorListing
-from bisar_budget.geometry import BistaticGeometry, GroundVector, angle_between_lines, norm
+from bisar_budget.geometry import BistaticGeometry, GroundVector, Vectors, angle_between_lines, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges import point_paths
@@ -72,18 +73,20 @@ class Declared(NamedTuple):
     hidden: Any = 0.0
     rest: Any = 0.0
 
-    def judged(self, gain: Any) -> Any:
+    def judged(self, gain: PerCase) -> PerCase:
         """Magnitude of the phase that counts against a limit raised by the gain of autofocus. [rad]
 
         Autofocus corrects the quadratic phase and no hidden phase: √(φ² − φ₂² + (φ₂/gain)²)·gain, with φ the phase of
         equal loss and φ₂ the quadratic phase.
         """
-        return np.hypot(self.qpe, gain * self.hidden)
+        phase: PerCase = np.hypot(self.qpe, gain * self.hidden)
+        return phase
 
     @property
-    def equal_loss(self) -> Any:
+    def equal_loss(self) -> PerCase:
         """Quadratic phase with the same loss of the peak as quadratic and hidden phase together. [rad]"""
-        return np.hypot(self.qpe, self.hidden)
+        phase: PerCase = np.hypot(self.qpe, self.hidden)
+        return phase
 
     @property
     def farthest(self) -> Any:
@@ -95,7 +98,7 @@ class Declared(NamedTuple):
         east, north = (np.where(is_ahead, a, -b) for a, b in ((x, u), (y, v)))
         return np.where(is_gone, math.nan, east), np.where(is_gone, math.nan, north)
 
-    def of(self, errors: Any) -> "Declared":
+    def of(self, errors: int | Indices | slice) -> "Declared":
         """The effects of some of the errors."""
         (x, y), (u, v) = self.displacement, self.opposite
         phases = self.qpe[errors], self.cubic[errors]
@@ -112,7 +115,7 @@ class Declared(NamedTuple):
         return Declared(qpe, cubic, moved, opposite, hidden, beyond_cubic)
 
 
-def point(displacement: tuple[Any, Any], case: int = 0) -> GroundVector | None:
+def point(displacement: tuple[PerCase, PerCase], case: int = 0) -> GroundVector | None:
     """A ground point in one case; None where no point exists. [m]"""
     east, north = (plain(component, case) for component in displacement)
     return None if math.isnan(east) else (east, north)
@@ -127,17 +130,17 @@ class Allowed(NamedTuple):
 
     smallest: Floats
     quadratic: Floats
-    binding: Any
+    binding: NDArray[np.int8]
 
 
 class ImagePlane(NamedTuple):
     """Q⁻¹ of each case: takes constant and linear range error to the displacement of the image."""
 
-    adjugate: tuple[Any, Any]
-    determinant: Any
-    is_singular: Any = False
+    adjugate: tuple[tuple[PerCase, ...], tuple[PerCase, ...]]
+    determinant: PerCase
+    is_singular: PerCaseFlag = False
 
-    def displacement(self, effect: Effect, size: Any) -> tuple[Floats, Floats]:
+    def displacement(self, effect: Effect, size: PerCase) -> tuple[PerCase, PerCase]:
         """Displacement on the ground by (25), with the Q of a model; NaN where Q has no inverse. [m]"""
         (a, b), (c, d) = self.adjugate
         scale = size / np.where(self.is_singular, math.nan, self.determinant)
@@ -148,17 +151,21 @@ class ImagePlane(NamedTuple):
         )
 
 
-def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, Any]:
+# The evaluators take and give numbers, or arrays of cases.
+_published_ground_inverse: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.published_ground_inverse
+
+
+def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, PerCase]:
     """Invert Q with the range held constant, (19) and (30); and the angle between its gradients. [deg]
 
     This Q can be singular where the true gradients are not: its second row is v/R, the true second row is v⊥/R. It
     also has no inverse where the look vectors all but cancel on the ground; it knows only the look vectors of
     mid-aperture.
     """
-    ground: list[Any] = []
+    ground: list[PerCase] = []
     for path in geometry.both:
         ground += [*path.position[:2], *path.velocity[:2], path.slant_range]
-    first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
+    first, second, (determinant,) = _published_ground_inverse(*ground)
     # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
     degrees = np.degrees(angle_between_lines((-second[1], first[1]), (second[0], -first[0])))
     is_short = np.hypot(second[0], second[1]) < MIN_GROUND_GRADIENT
@@ -168,9 +175,9 @@ def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, Any]:
 class OwnPlane(NamedTuple):
     """Displacement by effects that hold their own displacement, as the effects of the full model do."""
 
-    is_singular: Any = False
+    is_singular: PerCaseFlag = False
 
-    def displacement(self, effect: FullEffect, size: Any) -> tuple[Floats, Floats]:
+    def displacement(self, effect: FullEffect, size: PerCase) -> tuple[PerCase, PerCase]:
         """Displacement on the ground, east and north. [m]"""
         return effect.east * size + 0.0, effect.north * size + 0.0
 
@@ -256,7 +263,7 @@ class ErrorBlock:
         remaining_m = np.abs(size) * remaining_rad / exact.k + bent
         return np.asarray(turns * remaining_m * (1 + exact.band) / exact.matrix.least)
 
-    def _bent(self, size: Floats) -> Any:
+    def _bent(self, size: Floats) -> PerCase:
         """Distance by which errors take platforms from where small errors take them, (errors, cases). [m]
 
         Only a time tag is not proportional to its size. Where the direct path is the clock, each metre counts twice.
@@ -419,7 +426,7 @@ class ErrorBlock:
                 size[index] = 2 * np.minimum(slant[0], slant[1]) / np.abs(course).max(axis=0)
         return size
 
-    def allowed(self, model: str, limits: Sequence[Any], *, is_complete: bool) -> Allowed:
+    def allowed(self, model: str, limits: Sequence[PerCase | None], *, is_complete: bool) -> Allowed:
         """Allowable sizes of errors by a model.
 
         Parameters
@@ -459,7 +466,7 @@ class ErrorBlock:
             ends_there[self.moves] = (ends == sizes[:, None]).any(axis=1) & np.isfinite(sizes)
         return ends_there
 
-    def _limit(self, requirement: int, limit: Any) -> Floats:
+    def _limit(self, requirement: int, limit: PerCase | None) -> Floats:
         """A limit of each error; NaN: no limit. A pure phase error has the limit of the quadratic phase alone."""
         limit = math.nan if limit is None else limit
         limits = np.broadcast_to(limit, self.declared.shape)
@@ -507,6 +514,12 @@ class ErrorBlock:
         return smallest
 
 
+def _less(shift: Vectors, velocity: Vectors, tag_s: Floats) -> Vectors:
+    """A time tag's shift, less a shift along the velocity. [m]"""
+    (x, y, z), (u, v, w) = shift, velocity
+    return (x - tag_s * u, y - tag_s * v, z - tag_s * w)
+
+
 class DeclaredErrors:
     """The errors of cases that need the same number of nodes.
 
@@ -541,7 +554,7 @@ class DeclaredErrors:
         exact: ExactRanges,
         shown: Container[str] | None = None,
         *,
-        gain: Any = 1.0,
+        gain: PerCase = 1.0,
         is_complete: bool = False,
     ) -> None:
         self.mission, self.cases, self.geometries, self.exact = mission, cases, geometries, exact
@@ -551,7 +564,7 @@ class DeclaredErrors:
         published, self.published_angle_deg = published_planes(geometries)
         self.planes: dict[str, Any] = {"published": published, "full": OwnPlane()}
         half = exact.half
-        self.edge: dict[str, Any] = {"m": 1.0, "m/s": half, "m/s^2": half**2 / 2}
+        self.edge: dict[str, PerCase] = {"m": 1.0, "m/s": half, "m/s^2": half**2 / 2}
         quadratic, cubic, hidden, moved = exact.most_per_metre
         self.per_metre = np.array((quadratic + self.gain * hidden, cubic, moved))[:, None]
         quadratic, cubic = exact.k * np.hypot(*(np.abs(gradient[2:]) for gradient in exact.gradient))
@@ -565,7 +578,7 @@ class DeclaredErrors:
         self._place = {error.id: divmod(place, size) for place, error in enumerate(self.listed)}
         self._does: dict[tuple[str, int], Declared] = {}
 
-    def array(self, value: Any) -> Floats:
+    def array(self, value: PerCase | PerCaseFlag | None) -> Floats:
         """One number for each case, (cases,)."""
         return np.full(self.cases, value, dtype=float)
 
@@ -575,24 +588,28 @@ class DeclaredErrors:
         orders = [self._order(error) for error in errors]
         courses = np.array([self._course(error, order) for error, order in zip(errors, orders, strict=True)])
         at_nodes = np.moveaxis(courses[:, None] * np.array(signs)[:, None, None], 2, 0)
-        moves: list[list[Any]] = [[float(platform in platforms) for platforms in moved] for platform in (0, 1)]
-        u, v, order = (self._of_each(values, len(signs)) for values in (*moves, orders))
+        moves: list[list[PerCase]] = [[float(platform in platforms) for platforms in moved] for platform in (0, 1)]
+        numbers: tuple[Sequence[PerCase], ...] = (*moves, orders)
+        u, v, order = (self._of_each(values, len(signs)) for values in numbers)
         x, y, z = (self._of_each([error.direction[axis] for error in errors], len(signs)) for axis in (0, 1, 2))
-        of_receiver = None
+        of_receiver: Vectors | None = None
         if any(error.of_receiver is not None for error in errors):
             ways = [[error.direction_of(1)[axis] for error in errors] for axis in (0, 1, 2)]
-            of_receiver = tuple(self._of_each(along, len(signs)) for along in ways)
+            a, b, c = (self._of_each(along, len(signs)) for along in ways)
+            of_receiver = (a, b, c)
         case, tags = np.tile(self.each, len(errors) * len(signs)), None
         if any(error.is_time_tag for error in errors):
             is_tag = np.repeat([error.is_time_tag for error in errors], self.cases * len(signs))
             tags = TimeTags(self.geometries.both, self.exact.times, np.where(is_tag, case, -1))
         return Lanes(case, at_nodes.reshape(len(at_nodes), -1), (u, v), (x, y, z), order, of_receiver, tags)
 
-    def edge_of(self, error: ErrorSource) -> Any:
+    def edge_of(self, error: ErrorSource) -> PerCase:
         """Position error at the aperture's edge by a unit of an error, the larger of both platforms; 0 by a clock."""
         if not error.is_time_tag:
             return self.edge.get(error.unit, 0.0)
-        return np.max([norm(error.direction_of(platform)).max(axis=0) for platform in error.platforms], axis=0)
+        speeds = [np.max(norm(error.direction_of(platform)), axis=0) for platform in error.platforms]
+        fastest: PerCase = np.max(speeds, axis=0)
+        return fastest
 
     def bent(self, error: ErrorSource, size: Floats) -> Floats:
         """Distance of a time tag's shift, of either sign, from a shift along the velocity, platforms added. [m]"""
@@ -600,15 +617,7 @@ class DeclaredErrors:
         for platform in error.platforms:
             path, straight = self.geometries.both[platform], error.direction_of(platform)
             bend += np.max(
-                [
-                    norm(
-                        tuple(
-                            component - tag * way
-                            for component, way in zip(path.later(times, tag), straight, strict=True)
-                        )
-                    )
-                    for tag in (size, -size)
-                ],
+                [np.asarray(norm(_less(path.later(times, tag), straight, tag))) for tag in (size, -size)],
                 axis=(0, 1),
             )
         return bend
@@ -629,7 +638,7 @@ class DeclaredErrors:
         # A pure phase error: a quadratic that displaces nothing.
         return np.asarray(((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
 
-    def _of_each(self, values: Sequence[Any], signs: int) -> Any:
+    def _of_each(self, values: Sequence[PerCase], signs: int) -> PerCase:
         """One value of each error for its lanes, or the value that all share; turning directions at each node."""
         if any(np.ndim(value) > 1 for value in values):
             count = self.exact.fit.shape[1]
@@ -637,7 +646,7 @@ class DeclaredErrors:
             return np.repeat(turning[:, :, None], signs, axis=2).reshape(count, -1)
         if any(isinstance(value, np.ndarray) for value in values):
             return np.repeat([self.array(value) for value in values], signs, axis=0).reshape(-1)
-        return values[0] if len(set(values)) == 1 else np.repeat(values, signs * self.cases)
+        return values[0] if len(set(values)) == 1 else np.repeat(np.array(values), signs * self.cases)
 
     def block_of(self, error: ErrorSource) -> tuple[ErrorBlock, int]:
         """The block that contains an error, and the error's index in the block."""
@@ -669,7 +678,7 @@ class DeclaredErrors:
         block, index = self.block_of(error)
         return block.quadratic_by_sign[:, index]
 
-    def doubts(self, model: str, is_over: Any) -> Any:
+    def doubts(self, model: str, is_over: PerCaseFlag) -> PerCaseFlag:
         """Cases in which a model that does not gate raises a doubt. The published model knows no direct path."""
         return False if model == "published" and self.has_direct_path else is_over
 
@@ -723,7 +732,7 @@ class Model:
         `limits` are the limits of quadratic and cubic phase [rad], and of the displacement. [m]
         """
         block, index = self.errors.block_of(source)
-        limits_of_block: list[Any] = []
+        limits_of_block: list[PerCase | None] = []
         for limit in limits:
             of_all = np.full(block.declared.shape, math.nan)
             of_all[index] = math.nan if limit is None else limit

@@ -8,12 +8,12 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import combinations, pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.arrays import Booleans, Floats
+from bisar_budget.arrays import Booleans, Floats, PerCase
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
@@ -227,7 +227,7 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     )
 
 
-def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: Any) -> RandomEffect | None:
+def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: PerCase) -> RandomEffect | None:
     """Effect of the assumed noise below the first point of a mask; None where that noise hardly counts."""
     mask = oscillator.phase_noise
     if mask is None or np.all(mask[0][0] * seen.aperture_time <= COVERED_CYCLES):
@@ -295,7 +295,7 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_be
         return remaining
     interval = None if sync is None else sync.interval
     for (alike, exchanged), cases in seen.alike((oscillator, interval)):
-        spectra: dict[Any, list[int]] = {}
+        spectra: dict[tuple[PowerLawPiece, ...], list[int]] = {}
         for case in cases.tolist():  # the fit to an Allan deviation depends on the aperture
             pieces = noise_of(alike, 1.0, float(times[case])).pieces
             spectra.setdefault(pieces[:1] if is_below_mask else pieces, []).append(case)
@@ -312,7 +312,7 @@ def _left_of(
     if sync is None or interval is not None:
         return left_parts(pieces, aperture_time, interval)
 
-    def of_cases(value: Any) -> Floats:
+    def of_cases(value: PerCase | None) -> Floats:
         return np.broadcast_to(np.asarray(value), (seen.cases,))[cases_of_spectrum]
 
     if sync.is_holdover:

@@ -16,11 +16,11 @@ Derived here. Time series check it in `tests/effects/test_changing_air.py`; draw
 """
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.arrays import Floats
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.image_plane import LEADING
 from bisar_budget.ranges.exact_ranges import ExactRanges
 
@@ -59,7 +59,7 @@ def effects_of_courses(exact: ExactRanges, weights: Floats, courses: Floats) -> 
     return RangeEffects(np.einsum("fec,gec->fgc", effects, effects), sizes, beyond.sum(axis=0))
 
 
-def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, beyond: Any) -> RangeEffects:
+def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, beyond: PerCase) -> RangeEffects:
     """Effects of a process.
 
     Parameters

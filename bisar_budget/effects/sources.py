@@ -6,7 +6,7 @@ sizes. A sweep lists the declared errors, and the errors whose rows are asked fo
 
 from collections.abc import Callable, Container, Iterator, Sequence
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -87,7 +87,7 @@ class ErrorListing:
         yield from self._of_terrain()
         yield from self._stated_elsewhere()
 
-    def _is_listed(self, row_subject: Subject, declared: Any) -> bool:
+    def _is_listed(self, row_subject: Subject, declared: object) -> bool:
         return declared is not None or self.shown is None or row_subject.id in self.shown
 
     @cached_property
@@ -126,7 +126,7 @@ class ErrorListing:
             # Where the file states an error along other axes, its scene axes are listed only if all rows are.
             if self.shown is not None and row_subject.id not in self.shown and not (in_scene and values is not None):
                 continue
-            on_axis = None
+            on_axis: PerCase | None = None
             if values is not None:
                 if in_scene:
                     on_axis = values[axis] * self.factor
@@ -189,9 +189,9 @@ class ErrorListing:
         self,
         row_subject: Subject,
         unit: str,
-        value: Any,
+        value: PerCase | None,
         path: KeyPath,
-        terms: tuple[Any, ...],
+        terms: tuple[PerCase, ...],
         no_limit: Note,
         equation: str = "Table I row 1",
         evidence: str | None = None,
@@ -223,7 +223,12 @@ class ErrorListing:
         sync = self.mission.synchronization
         if sync is None:
             return
-        frequency: tuple[Any, ...] = (sync.age if sync.is_holdover else 0.0, 1.0, 0.0, 0.0)
+        frequency: tuple[PerCase, ...] = (
+            sync.age if sync.is_holdover and sync.age is not None else 0.0,
+            1.0,
+            0.0,
+            0.0,
+        )
         if sync.is_direct_path:
             frequency = self._delay_of_the_echo
         for kind, unit, value, terms in (
@@ -236,7 +241,7 @@ class ErrorListing:
                 yield self._of_terms(row_subject, unit, value, path, terms, no_limit, evidence=sync.source)
 
     @property
-    def _delay_of_the_echo(self) -> tuple[Any, ...]:
+    def _delay_of_the_echo(self) -> tuple[PerCase, ...]:
         """Terms of the delay of the echo after the direct path, which a wrong clock measures wrong. [s]"""
         exact = self.exact
         seconds = (sum(exact.ranges) - exact.baselines) / SPEED_OF_LIGHT
@@ -260,7 +265,7 @@ class ErrorListing:
         if value is None and not (is_set and self._is_listed(row_subject, value)):
             return
         path = ("platforms", name, "oscillator", "aging")
-        terms: tuple[Any, ...] = (0.0, 0.0, 0.5 * (sync is None), 0.0)
+        terms: tuple[PerCase, ...] = (0.0, 0.0, 0.5 * (sync is None), 0.0)
         if is_set:
             terms = (age**2 / 2, age, 0.5, 0.0)
         no_limit = (
@@ -347,7 +352,13 @@ class ErrorListing:
             yield self._of_time_tag("mission", (0, 1), common.time_tag, key, common.source, note)
 
     def _of_time_tag(
-        self, owner: str, platform_indices: Sequence[int], value: Any, key: KeyPath, source: str | None, *notes: Note
+        self,
+        owner: str,
+        platform_indices: Sequence[int],
+        value: PerCase,
+        key: KeyPath,
+        source: str | None,
+        *notes: Note,
     ) -> ErrorSource:
         ways = [self._velocities(path) for path in self.geometry.both]
         moved = np.sum(
@@ -433,8 +444,8 @@ def _scene_axes(name: str, kind: str) -> tuple[tuple[Subject, KeyPath, str, Note
 
 
 def _along_scene_axis(
-    declared: Sequence[Any], axes: tuple[Vectors, Vectors, Vectors], axis: int, distribution: str
-) -> Any:
+    declared: Sequence[PerCase], axes: tuple[Vectors, Vectors, Vectors], axis: int, distribution: str
+) -> PerCase:
     """Size along one axis of the scene of errors stated along the axes of another frame.
 
     The three errors are independent, so one-sigma values add as squares and bounds add as magnitudes: a signed
@@ -445,7 +456,7 @@ def _along_scene_axis(
     return np.copysign(size, a + b + c)
 
 
-def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[Any]) -> Any:
+def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[PerCase]) -> PerCase:
     """Sigma of position or velocity error along a direction in the frame's axes: √(dᵀCd)."""
     parts = [sigma * along for sigma, along in zip(covariance.of(kind), direction, strict=True)]
     return np.sqrt(squared(covariance.block(kind), parts))
@@ -461,7 +472,7 @@ def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:
     return type(effects[0])(*map(_total, zip(*effects, strict=True)))
 
 
-def _total(terms: Sequence[Any]) -> Any:
+def _total(terms: Sequence[PerCase]) -> PerCase:
     """Sum of terms. Where terms cancel exactly, the rest is rounding and would give a false limit: it becomes 0."""
     total = sum(terms)
     return np.where(np.abs(total) > ROUNDING * sum(np.abs(term) for term in terms), total, 0.0)

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import phrases
-from bisar_budget.arrays import Booleans, Floats
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import Moves, RandomError, SensorCases
@@ -61,8 +61,8 @@ _STEEP_PIECE_COUNT = 16  # flat pieces in place of a steep piece, which is narro
 class Worst(NamedTuple):
     """Lines in their worst phases: the amplitude of one line with an echo as high, and the position of that echo."""
 
-    amplitude: Any
-    cycles: Any
+    amplitude: PerCase
+    cycles: PerCase
 
 
 def near_groups(cycles: Floats) -> NDArray[np.intp]:
@@ -91,7 +91,9 @@ def near_lines(cycles: Sequence[float]) -> list[tuple[int, ...]]:
     return [tuple(np.flatnonzero(number == group).tolist()) for group in range(number.max() + 1)]
 
 
-def worst_phases(amplitudes: Any, cycles: Any, is_member: Booleans | None = None) -> Worst:
+def worst_phases(
+    amplitudes: Sequence[PerCase] | Floats, cycles: Sequence[PerCase] | Floats, is_member: Booleans | None = None
+) -> Worst:
     """Find the height of the echoes of several lines together in their worst phases.
 
     Parameters
@@ -185,9 +187,9 @@ class Line(NamedTuple):
     `per_metre` is the size of a metre of it in the unit of its row: (2πf)² where the file states its acceleration.
     """
 
-    amplitude: Any
+    amplitude: PerCase
     frequency: Any
-    per_metre: Any = 1.0
+    per_metre: PerCase = 1.0
 
 
 def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> Vectors:
@@ -198,7 +200,7 @@ def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = No
 
 def seen_of_axes(
     mission: Mission, name: str, *, is_vector: bool, geometry: BistaticGeometry | None = None
-) -> list[Any]:
+) -> list[PerCase]:
     """Share of a metre along each axis of a platform's error that the range contains, rms over the aperture. [-]
 
     The line of sight turns. The rms bounds the height of every echo, and gives the spread. A vibration that is no
@@ -217,23 +219,32 @@ def seen_of_axes(
     floor = ROUNDING * np.sqrt(mean @ sum(component * component for component in sight))
     along = [np.sqrt(mean @ np.square(dot(way, sight))) for way in ways]
     seen = [np.where(component > floor, component, 0.0) for component in along]
-    return seen if np.ndim(T) or seen[0].size > 1 else [component.item() for component in seen]
+    if np.ndim(T) or seen[0].size > 1:
+        return [*seen]
+    return [component.item() for component in seen]
 
 
-def counted(mission: Mission, name: str, value: Any, metric: str, geometry: BistaticGeometry | None = None) -> Any:
+def counted(
+    mission: Mission,
+    name: str,
+    value: PerCase | Vectors,
+    metric: str,
+    geometry: BistaticGeometry | None = None,
+) -> PerCase:
     """Amplitude (`pslr`) or rms (`islr`) of a platform's vibration along the line of sight, by `seen_of_axes`. [m]
 
     Projections of amplitudes add, because the axes may vibrate in any phase. Rms values count as independent and add
     as squares.
     """
-    is_vector = isinstance(value, tuple)
-    seen = seen_of_axes(mission, name, is_vector=is_vector, geometry=geometry)
-    projections = [along * size for along, size in zip(seen, value if is_vector else (value,), strict=True)]
-    return (
+    sizes = value if isinstance(value, tuple) else (value,)
+    seen = seen_of_axes(mission, name, is_vector=isinstance(value, tuple), geometry=geometry)
+    projections = [along * size for along, size in zip(seen, sizes, strict=True)]
+    total: PerCase = (
         sum(map(np.abs, projections))
         if metric == "pslr"
         else np.sqrt(sum(projection * projection for projection in projections))
     )
+    return total
 
 
 def lines_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> list[Line]:
@@ -272,17 +283,19 @@ def projected(
 
 
 # ---------------------------------------------------------------------- below one cycle per aperture
-def quadratic_part(cycles: Any) -> Any:
+def quadratic_part(cycles: PerCase) -> PerCase:
     """Worst quadratic phase at the aperture edge of a sinusoid, over its peak phase: 7.5·j₂(π·cycles).
 
     It is the least-squares quadratic of cos(πnx) over the aperture. Where n is small it is the Taylor term (πn)²/2.
     """
-    return np.abs(tone(math.pi * cycles)[0])
+    phase: PerCase = np.abs(tone(math.pi * cycles)[0])
+    return phase
 
 
-def cubic_part(cycles: Any) -> Any:
+def cubic_part(cycles: PerCase) -> PerCase:
     """Worst cubic phase at the aperture edge: 17.5·j₃(π·cycles), the least-squares cubic of sin(πnx)."""
-    return np.abs(tone(math.pi * cycles)[1])
+    phase: PerCase = np.abs(tone(math.pi * cycles)[1])
+    return phase
 
 
 class DeclaredPhase(NamedTuple):
@@ -295,13 +308,13 @@ class DeclaredPhase(NamedTuple):
 
     row_id: str
     owner: str
-    qpe_rad: Any
+    qpe_rad: PerCase
     cubic_rad: Any
-    coverage: Any = 1.0
-    is_there: Any = True
-    hidden_rad: Any = 0.0
+    coverage: PerCase = 1.0
+    is_there: PerCaseFlag = True
+    hidden_rad: PerCase = 0.0
 
-    def judged(self, gain: Any) -> Any:
+    def judged(self, gain: PerCase) -> PerCase:
         """Magnitude of the phase that counts against a limit raised by autofocus' gain: `Declared.judged`. [rad]"""
         return np.hypot(self.qpe_rad, gain * self.hidden_rad)
 
@@ -328,7 +341,7 @@ def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
 
 
 # ---------------------------------------------------------------------- by a spectrum
-def power_of(vibration: Vibration | FeltVibration) -> Any:
+def power_of(vibration: Vibration | FeltVibration) -> PerCase:
     """Factor of power by which `spectrum_level` shifts a spectrum."""
     return 1.0 if vibration.spectrum_level is None else 10 ** (np.asarray(vibration.spectrum_level) / 10)
 
@@ -362,7 +375,11 @@ def _mean(slope: float, low: float, high: float, at_low: float, at_high: float) 
 
 
 def spectrum_parts(
-    seen: SensorCases, spectrum: Spectrum, law: tuple[float, float], interval: Any = None, delay: Any = None
+    seen: SensorCases,
+    spectrum: Spectrum,
+    law: tuple[float, float],
+    interval: float | None = None,
+    delay: PerCase | None = None,
 ) -> Parts:
     """Parts over the aperture of a spectrum times a law, (cases,) each, see `spectrum_pieces`.
 

@@ -318,7 +318,7 @@ class PointCollection:
             return Flight(transmitter, receiver, clock, clock)
         square = self.radar.center_frequency**2
         group = errors.electrons.at(slow_time)
-        seen = clock + seen_course(group, errors.electrons.mean, CONTENT) / square
+        seen = clock + seen_course(group, np.asarray(errors.electrons.mean), CONTENT) / square
         return Flight(transmitter, receiver, clock, seen, group)
 
     def record(

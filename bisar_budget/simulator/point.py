@@ -401,7 +401,7 @@ def declared_errors(mission: Mission) -> Errors:
         wideband = declared.vibration.wideband
         error = error._replace(
             sinusoids=_sinusoids(mission, name),
-            wideband_rms=counted(mission, name, wideband.rms, "islr") if wideband else 0.0,
+            wideband_rms=float(counted(mission, name, wideband.rms, "islr") if wideband else 0.0),
             course=getattr(errors, name).course,
         )
         errors = errors.of(name, error)
@@ -536,7 +536,7 @@ def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
     error: DeclaredError = getattr(mission.platforms, name).motion_error
     line = error.vibration.sinusoidal[entry]
     if not isinstance(line.displacement, tuple):
-        return [PathSinusoid(lines_of(mission, name)[entry].amplitude, line.frequency)]
+        return [PathSinusoid(float(lines_of(mission, name)[entry].amplitude), line.frequency)]
     axes, sight = getattr(mission.geometry, name).frame(error.frame), sight_of(mission, name)
     return [
         PathSinusoid(size, line.frequency, 0.0 if dot(axis, sight) >= 0 else math.pi, axis)

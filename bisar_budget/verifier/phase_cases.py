@@ -56,7 +56,7 @@ def slow_vibration(study: Study, vibration: Subject) -> Verdict:
     lines = sinusoids_of(mission, name, entry)
     use = float(tone.declared.judged(1.0)[0]) / budget
     if not use or (len(lines) == 1 and lines[0].axis is None):
-        lines, use = [PathSinusoid(size, line.frequency)], 1.0
+        lines, use = [PathSinusoid(size, float(line.frequency))], 1.0
     try:
         worst = [_worst_phase(study, name, sine._replace(amplitude=sine.amplitude / use)) for sine in lines]
         images = [study.images(errors) for errors in worst]

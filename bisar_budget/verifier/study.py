@@ -130,7 +130,7 @@ class Study:
     def errors(self, source: ErrorSource, size: float) -> Errors:
         """Return the errors of an image with one error of a size."""
         if source.clock is not None:
-            return Errors(clock=tuple(size * term for term in source.clock))
+            return Errors(clock=tuple(size * float(term) for term in source.clock))
         kind, errors = source.subject.kind, Errors()
         if kind == "terrain":  # a higher scene: both platforms measured too high
             kind = "position"

@@ -173,7 +173,7 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
         order = tuple(CLOCK_UNITS).index(source.subject.axis)
         terms = {order: size}
     else:
-        terms = {order: size * term for order, term in enumerate(source.clock or ()) if term}
+        terms = {order: size * float(term) for order, term in enumerate(source.clock or ()) if term}
         title = "Terms of the clock error t̃ at mid-aperture"
         lines: list[str | WorkedEquation] = []
         if kind == "frequency" and mission.has_direct_path:

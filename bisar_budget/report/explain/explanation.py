@@ -33,7 +33,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.air_delays import CONTENT, ELECTRON_DELAY_M3_PER_S2, dispersed_legs, leg_factor
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
+from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource, plain
 from bisar_budget.effects.slow_tones import SlowTone
 from bisar_budget.effects.vibration import lines_of, near_lines, seen_of_axes, worst_phases
 from bisar_budget.faults import KeyPath, changes_words, printable
@@ -435,10 +435,10 @@ def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: in
     seen = seen_of_axes(mission, platform, is_vector=is_vector)
     if not is_vector:
         if mission.has_direct_path:
-            text = f"{number(value)}*{number(seen[0])}"
+            text = f"{number(value)}*{number(float(seen[0]))}"
             yield step(title, Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
         return
-    products = [f"{number(size)}*{number(along)}" for size, along in zip(value, seen, strict=True)]
+    products = [f"{number(size)}*{number(float(along))}" for size, along in zip(value, seen, strict=True)]
     if is_sinusoid:
         text, rule = (
             " + ".join(f"|{product}|" for product in products),
@@ -459,12 +459,12 @@ def _near_lines(mission: Mission, platform: str, index: int, total: float) -> It
     near = [lines[member] for member in members]
     worst = worst_phases([line.amplitude for line in near], [line.frequency * T for line in near])
     sizes = " + ".join(
-        f"{number(line.amplitude)}*{number(abs(np.sinc(worst.cycles - line.frequency * T)))}" for line in near
+        f"{number(float(line.amplitude))}*{number(abs(np.sinc(worst.cycles - line.frequency * T)))}" for line in near
     )
     entries = ", ".join(map(str, members))
     title = (
-        f"Entries {entries} lie near each other: at x = {number(worst.cycles)} cells each adds A·|sinc(x − f·T)|, "
-        "sinc(x) = sin(πx)/(πx), in the worst phases"
+        f"Entries {entries} lie near each other: at x = {number(float(worst.cycles))} cells each adds "
+        "A·|sinc(x − f·T)|, sinc(x) = sin(πx)/(πx), in the worst phases"
     )
     yield step(title, f"declared = {sizes} = {total:.6g} m")
 
@@ -546,7 +546,8 @@ def _spatial_variance(analysis: Analysis, findings: MissionFindings, row: Row) -
         return
     east, north = at(scene.radius, scene.azimuth)
     differences = differences_at(analysis.errors, scene.radius, scene.azimuth, analysis.random)
-    sizes_by_name = phase_parts(differences, findings.combine, analysis.groups)
+    named_phases = phase_parts(differences, findings.combine, analysis.groups)
+    sizes_by_name = [(row_id, plain(phase)) for row_id, phase in named_phases]
     yield step(
         f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less at the centre"
     )
@@ -746,8 +747,6 @@ def _displacing(analysis: Analysis, row: Row) -> Iterator[Step]:
     names = {error.id for error in analysis.random if error.displaces_unknown}
     for contribution in analysis.together(model).own:
         if contribution.row_id in names:
-            qpe, cubic = (
-                with_unit(float(phase[0]), "rad") for phase in (contribution.qpe_rad, contribution.cubic_rad)
-            )
+            qpe, cubic = (with_unit(plain(phase), "rad") for phase in (contribution.qpe_rad, contribution.cubic_rad))
             lines.append(f"{printable(contribution.row_id)}: QPE {qpe}, cubic {cubic}")
     yield step("Not in the displacement, by an amount that is not computed", *lines)
