@@ -8,7 +8,7 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.analysis.together import Together
-from bisar_budget.arrays import Floats
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.effects.effect import plain
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
 from bisar_budget.phrases import Note
@@ -62,14 +62,14 @@ class Allocation(NamedTuple):
         return needed_sentence(qpe / math.sqrt(room) / (self.qpe.of(owner) * math.pi), caps(mission))
 
 
-def _gain(n_pull: Any, qpe_total: Any) -> Any:
+def _gain(n_pull: float | None, qpe_total: float) -> PerCase:
     if n_pull is None:
         return 1.0
     gain = evaluators.autofocus_gain(n_pull, qpe_total)
     return gain * (gain > 1) + 1.0 * (gain <= 1)  # the larger number, also of arrays
 
 
-def autofocus_gain_of(mission: Mission) -> Any:
+def autofocus_gain_of(mission: Mission) -> PerCase:
     """Return the factor on QPE limits by a mission's autofocus. It does not depend on the division of the budget."""
     return _gain(effective_n_pull(mission), mission.requirements.quadratic_phase_error)
 

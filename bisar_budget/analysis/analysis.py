@@ -6,7 +6,6 @@ Cases of one shape are analysed together. `Case` gives plain numbers of a single
 import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from bisar_budget.analysis.peak_loss import peak_loss_db
 from bisar_budget.analysis.spread import Tone, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.tone_displacement import ToneDisplacement, tone_displacements
-from bisar_budget.arrays import Floats
+from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
 from bisar_budget.effects.combined import Correlated, correlated_errors
 from bisar_budget.effects.declared import Declared, DeclaredErrors, Model
 from bisar_budget.effects.effect import ErrorSource, Subject, plain
@@ -209,7 +208,7 @@ class Case:
     def __init__(self, analysis: Analysis, mission: Mission | None = None, place: int = 0) -> None:
         self.analysis, self.mission, self.place = analysis, mission or analysis.mission, place
 
-    def number(self, column: Any) -> float:
+    def number(self, column: PerCase | PerCaseFlag) -> float:
         """The number of this case in a column (cases,). A single number counts for every case."""
         return plain(column, self.place)
 

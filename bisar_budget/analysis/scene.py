@@ -17,13 +17,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.scene_random import RandomPhases
-from bisar_budget.arrays import Booleans, Floats, Indices
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.combined import combined, combined_phase, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
@@ -100,6 +100,9 @@ class Rims:
         return Rims(self.azimuth[some], self.difference[some], self.phases[..., some])
 
 
+Selection = int | Booleans | Indices | tuple[Indices, ...]  # of the cases
+
+
 class Heights(NamedTuple):
     """Heights and their azimuths; of heights alike the larger azimuth is the higher."""
 
@@ -116,7 +119,7 @@ class Heights(NamedTuple):
         """The highest of these and others, one by one."""
         return Heights(*map(np.array, zip(self, *others, strict=True))).highest
 
-    def of(self, some: Any) -> "Heights":
+    def of(self, some: Selection) -> "Heights":
         """Some of them."""
         return Heights(self.height[some], self.azimuth[some])
 
@@ -124,7 +127,7 @@ class Heights(NamedTuple):
         """These in some places, in the rest others."""
         return Heights(*(np.where(is_own, *both) for both in zip(self, others, strict=True)))
 
-    def put(self, some: Any, others: "Heights") -> None:
+    def put(self, some: Selection, others: "Heights") -> None:
         """Put others into some places."""
         self.height[some], self.azimuth[some] = others
 
@@ -291,7 +294,11 @@ class ScenePhases:
         return Rims(top.azimuth % (2 * math.pi), np.where(has_image, top.height, math.inf), phases)
 
 
-def at(radius: Any, azimuth: Any) -> tuple[Any, Any]:
+@overload
+def at(radius: float, azimuth: float) -> tuple[float, float]: ...
+@overload
+def at(radius: Floats, azimuth: Floats) -> tuple[Floats, Floats]: ...
+def at(radius: PerCase, azimuth: PerCase) -> tuple[PerCase, PerCase]:
     """Place on the ground, east and north. [m]"""
     return radius * np.cos(azimuth), radius * np.sin(azimuth)
 
@@ -562,7 +569,7 @@ class Corrections:
         How far it is searched for. [m]
     """
 
-    def __init__(self, edges: SceneEdges, total: Any) -> None:
+    def __init__(self, edges: SceneEdges, total: PerCase) -> None:
         self.edges, self.phases, self.total = edges, edges.phases, edges.phases.errors.array(total)
         self.farthest = np.maximum(FARTHEST * self.phases.nearest, edges.radius)
 

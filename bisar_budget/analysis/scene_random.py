@@ -21,7 +21,7 @@ What is stated by its effect alone is that all over the scene. Against exact ran
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -150,7 +150,7 @@ class _Delay(NamedTuple):
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
         """Quadratic phase of each course, (courses, places). [rad]"""
-        along: Any = 0.0
+        along = np.zeros(())
         for place, middle in zip(self.places, self.middles, strict=True):
             x, y, z = (part[of] for part in middle)
             along = along + group_at_nodes(self.delay, there.tracks[place], (x, y, z), self.metres[of])
@@ -207,6 +207,6 @@ def _between(sensed: int, count: int) -> Floats:
     return np.asarray(np.polynomial.legendre.legvander(nodes(count).places, order[-1]) @ fit)
 
 
-def _of(array: Any, some: Indices) -> Any:
+def _of(array: Floats, some: Indices) -> Floats:
     """Some cases of an array (…, cases); what all share is there once."""
     return array if array.shape[-1] == 1 else array.take(some, axis=-1)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.analysis.tone_displacement import ToneDisplacement
-from bisar_budget.arrays import Floats
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.effects.combined import (
     Correlated,
     Moves,
@@ -98,7 +98,7 @@ class Together:
         """Phases that count against the share of an owner; all phases count against the mission's."""
         return [phase for phase in self.phases if split.includes(phase.owner, owner)]
 
-    def judged_parts(self, members: Sequence[DeclaredPhase], rule: str = "", gain: Any = None) -> Phases:
+    def judged_parts(self, members: Sequence[DeclaredPhase], rule: str = "", gain: PerCase | None = None) -> Phases:
         """List the judged phases that a rule combines, with the mission's gain or the given gain. [rad]
 
         Under root-sum-square the six phases of a covariance are one phase, by their correlations.
@@ -115,7 +115,7 @@ class Together:
                     judged[group.id] = np.hypot(size, gain * self._hidden_of_groups[group.id])
         return list(judged.items())
 
-    def judged(self, members: Sequence[DeclaredPhase], rule: str = "", gain: Any = None) -> Floats:
+    def judged(self, members: Sequence[DeclaredPhase], rule: str = "", gain: PerCase | None = None) -> Floats:
         """Combine the judged phases of errors by the mission's rule, or by the given rule. [rad]"""
         return self.errors.array(combined_phase(self.judged_parts(members, rule, gain), rule or self.rule))
 

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise, rests
-from bisar_budget.arrays import Booleans
+from bisar_budget.arrays import Booleans, Floats, PerCaseFlag
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations, swings_nothing
 from bisar_budget.budget.dispersion_row import dispersion_rows
@@ -223,7 +222,7 @@ class _Judgement:
         return ErrorRows(self.judging, self.analysis, self._limits)
 
     @cached_property
-    def _limits(self) -> Mapping[str, Any]:
+    def _limits(self) -> Mapping[str, Floats]:
         """Limit on the quadratic phase of each owner, gain of autofocus included. [rad]"""
         allocation = self.analysis.allocation
         return {owner: self.judging.array(allocation.qpe_allowed(owner)) for owner in _OWNERS}
@@ -332,7 +331,7 @@ class RowStatuses:
         self.subjects = [row.subject for row in rows]
         self.status, self.why = np.array([row.status for row in rows]), np.array([row.why for row in rows])
 
-    def _settle(self, rows: Sequence[bool], is_so: Any, why: Why) -> None:
+    def _settle(self, rows: Sequence[bool], is_so: PerCaseFlag, why: Why) -> None:
         """Set `rows` to not evaluated in the cases where `is_so`, (rows, cases) or (cases,)."""
         are_settled = np.array(rows, dtype=bool)[:, None] & is_so
         self.status = np.where(are_settled, CODE["not_evaluated"], self.status)

@@ -6,14 +6,14 @@ platform's share, autofocus included, the cubic phase by the full requirement.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Case
-from bisar_budget.arrays import Booleans, Floats
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, REQUIREMENTS, Judged, Judging
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
 from bisar_budget.effects.effect import Subject
@@ -42,7 +42,7 @@ class NearPhases(NamedTuple):
         allocation: Allocation,
         owner: str,
         is_near: Booleans,
-        phases: tuple[Any, Any, Any, Any],
+        phases: tuple[PerCase, PerCase, PerCase, PerCase],
     ) -> "NearPhases":
         """Phases of an owner's tone: quadratic, cubic, equal-loss and judged phase. [rad]"""
         quadratic, cubic, equal_loss, judged = (np.where(is_near, phase, math.nan) for phase in phases)
@@ -71,8 +71,8 @@ class NearPhases(NamedTuple):
         declared: Floats,
         by_echoes: Floats | None,
         *,
-        doubt: Any = False,
-        is_unknown: Any = False,
+        doubt: PerCaseFlag = False,
+        is_unknown: PerCaseFlag = False,
     ) -> Judged:
         """Judge the tone by its echoes and by its phases.
 

@@ -9,14 +9,14 @@ rule of `UntakenEffect`.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
-from bisar_budget.arrays import Booleans, Floats
+from bisar_budget.arrays import Booleans, Floats, PerCase
 from bisar_budget.budget.aggregates import untaken_effects
 from bisar_budget.budget.judged_requirements import EXAMPLES, NEGLIGIBLE_FRACTION, TAKEN_BY, UntakenEffect
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, Judged
@@ -198,12 +198,12 @@ def _uses(analysis: Analysis, errors: Sequence[RandomError], model: str) -> Iter
             yield _use(analysis, subject("mission", key).id, key, size, getattr(mission.requirements, key), model)
 
 
-def _use(analysis: Analysis, row_id: str, key: str, size: Any, limit: Any, model: str) -> AirUse:
+def _use(analysis: Analysis, row_id: str, key: str, size: PerCase, limit: PerCase, model: str) -> AirUse:
     sizes = np.broadcast_to(np.asarray(size, dtype=float), (analysis.cases,))
     return AirUse(row_id, key, sizes, sizes / limit, np.zeros(analysis.cases, dtype=bool), model)
 
 
-def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> Any:
+def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCase:
     """Size of a delay's effect, as the requirement limits it, with the gain of autofocus. [rad] or [m]
 
     For a displacement the size is the increase by the change of the delay, by root-sum-square: the image moves by the
@@ -218,10 +218,12 @@ def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> Any:
             model
         )
         added = np.square(effect.displacement) - np.square(stays.displacement)
-        return np.sqrt(np.maximum(added, 0.0)) * error.declared
-    return {QUADRATIC: judged_effect.quadratic, CUBIC: judged_effect.cubic, ISLR: judged_effect.spread}[
+        grown: PerCase = np.sqrt(np.maximum(added, 0.0)) * error.declared
+        return grown
+    size: PerCase = {QUADRATIC: judged_effect.quadratic, CUBIC: judged_effect.cubic, ISLR: judged_effect.spread}[
         key
     ] * np.asarray(error.declared)
+    return size
 
 
 def _keys(mission: Mission) -> list[str]:

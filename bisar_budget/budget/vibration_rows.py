@@ -19,7 +19,7 @@ from bisar_budget.analysis.vibration_limits import (
     tone_limits,
     vibration_limits,
 )
-from bisar_budget.arrays import Booleans, Floats
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, REQUIREMENTS, FamilyRow, Judged, Judging, worded
 from bisar_budget.budget.near_phases import NearPhases, phase_over, phase_requirement
 from bisar_budget.effects.declared import CUBIC, OTHER_MODEL, QUADRATIC
@@ -36,6 +36,7 @@ from bisar_budget.effects.vibration import (
     worst_phases,
 )
 from bisar_budget.findings.row import Row
+from bisar_budget.geometry import Vector
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.units import format_quantity
@@ -69,7 +70,7 @@ class Vibrations:
             for name, lines_of_platform in lines.items()
         }
 
-    def _columns(self, numbers: Sequence[Any]) -> Floats:
+    def _columns(self, numbers: Sequence[PerCase]) -> Floats:
         return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
 
     def rows(self, model: str) -> Iterator["VibrationRow"]:
@@ -106,7 +107,7 @@ class Vibrations:
         limits: VibrationLimits | None,
         is_there: Booleans,
         *,
-        doubt: Any = False,
+        doubt: PerCaseFlag = False,
         phases: NearPhases | None = None,
         **others: Any,
     ) -> "VibrationRow":
@@ -276,8 +277,8 @@ class VibrationRow(FamilyRow):
     level: Any = math.nan
     is_over_other: Any = False
     is_over_both: Any = False
-    without_autofocus: Any = 0.0
-    per_metre: Any = 1.0
+    without_autofocus: PerCase = 0.0
+    per_metre: PerCase = 1.0
 
     def in_unit(self, per_metre: Floats) -> "VibrationRow":
         """The row in the unit that the file uses for the line."""
@@ -383,7 +384,7 @@ def _row(
     )
 
 
-def _seen(case: Case, vibration_row: VibrationRow, error: MotionError, value: Any) -> tuple[Note, ...]:
+def _seen(case: Case, vibration_row: VibrationRow, error: MotionError, value: float | Vector) -> tuple[Note, ...]:
     metres = case.number(vibration_row.judged.declared) / case.number(vibration_row.per_metre)
     seen = projected(case.mission, value, error, metres, is_slow=vibration_row.is_slow)
     stated = () if seen or _unit(case, vibration_row) == "m" else (phrases.amplitude_of_acceleration(metres),)

@@ -160,7 +160,7 @@ def _echo_level(echo: Echo) -> Iterator[Step]:
         worked = WorkedEquation("l", "φ/2", {"φ": echo.phase}, echo.level, "")
         yield step(f"Amplitude over that of the response; above {LARGEST_ECHO:g} rad half the phase", worked)
         return
-    j0, j1 = bessel(echo.phase)
+    j0, j1 = map(float, bessel(echo.phase))
     yield step(
         "Amplitude over that of the response, J₁(φ)/J₀(φ)",
         WorkedEquation("J_0", "", {}, j0, ""),

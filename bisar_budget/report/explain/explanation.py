@@ -325,7 +325,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
         *_limit("published", published, values, by_models[0], is_power=is_power),
     )
     if by_echoes:
-        amplitude_part = amplitude_share(split, platform)
+        amplitude_part = float(amplitude_share(split, platform))
         shares = {"s_t": split.transmitter, "s_r": split.receiver}
         yield step(
             "Both platforms at one frequency: echoes add in amplitude, its part a",
@@ -335,7 +335,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
         values = {
             "a": amplitude_part,
             "λ": wavelength,
-            "φ": echo_phase(level),
+            "φ": float(echo_phase(level)),
         }
         title = "First principles; φ is the phase whose echoes have this level, J₁(φ)/J₀(φ) = l"
         powers = {"PSLR": ratio, "s_t": split.transmitter, "s_r": split.receiver}
