@@ -18,3 +18,8 @@ NumbersOrWords = NDArray[Any]
 """A column of a table: numbers in SI, or words."""
 Records = NDArray[np.void]
 """Records of a file, with named fields."""
+
+
+def absolute(value: PerCase) -> PerCase:
+    """Absolute value of a number, or of each number of an array."""
+    return np.abs(value) if isinstance(value, np.ndarray) else abs(value)

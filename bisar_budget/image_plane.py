@@ -13,15 +13,13 @@ with H.
 import math
 from dataclasses import dataclass
 from functools import cache, cached_property, reduce
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
 from bisar_budget.geometry import BistaticGeometry
-
-Floats = NDArray[np.float64]
 
 # Path of a platform in half an aperture over its slant range, and the number of nodes that serves up to this path:
 # it changes phases by less than 1e-6 of themselves up to a path of 0.5, and by less than 1e-4 beyond.
@@ -43,11 +41,11 @@ class Band(Protocol):
     """A radar, by its band. [Hz]"""
 
     @property
-    def center_frequency(self) -> Any:
+    def center_frequency(self) -> PerCase:
         """Centre of the band."""
 
     @property
-    def bandwidth(self) -> Any:
+    def bandwidth(self) -> PerCase:
         """Width of the band, evenly filled."""
 
 
@@ -100,7 +98,9 @@ def nodes(count: int) -> Sampling:
     return Sampling(slow_times, ((np.arange(4) + 0.5) * LEGENDRE_LEADING)[:, None] * orders.T * weights)
 
 
-def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_path: bool = False) -> Any:
+def nodes_for(
+    geometry: BistaticGeometry, aperture_time_s: PerCase, *, has_direct_path: bool = False
+) -> int | Indices:
     """Number of nodes that cases need, for the lines of sight, and for the direct path if it counts."""
     half = aperture_time_s / 2
     turning = (*geometry.both, *((geometry.apart,) if has_direct_path else ()))
@@ -114,7 +114,7 @@ def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_pa
     return count if np.ndim(way) else int(count)
 
 
-def band_variance(radar: Band) -> Any:
+def band_variance(radar: Band) -> PerCase:
     """b² of an evenly filled band: the variance of its frequencies over the square of its centre."""
     return (radar.bandwidth / radar.center_frequency) ** 2 / 12
 
@@ -221,7 +221,7 @@ class GroundMatrix:
         average = self.fit[0] @ values
         return np.asarray(self.fit[0][:, None] * ((1 + self.band) * (values - average) + self.band * average))
 
-    def turned_from(self, centre: "GroundMatrix", case: NDArray[np.intp]) -> Floats:
+    def turned_from(self, centre: "GroundMatrix", case: Indices) -> Floats:
         """Area that gradients span, over their area at the centre of some cases; below 0 if turned around."""
         determinant, orientation = centre.determinant, centre.orientation
         if determinant.size > 1:
@@ -230,7 +230,9 @@ class GroundMatrix:
         return np.where(orientation * self.orientation < 0, -area, area)
 
 
-def spans_ground(geometry: BistaticGeometry, radar: Band, aperture_time_s: Any, cases: int = 1) -> tuple[Any, Any]:
+def spans_ground(
+    geometry: BistaticGeometry, radar: Band, aperture_time_s: PerCase, cases: int = 1
+) -> tuple[Booleans, Floats]:
     """Whether lines of sight turn within the aperture, and the sine of `GroundMatrix.sine`, (cases,).
 
     Full circles, and apertures that pass through a moment at which range and Doppler gradient are parallel, have an

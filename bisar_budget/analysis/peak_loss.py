@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bisar_budget.analysis.spread import CUBIC_POWER, noise, rests
+from bisar_budget.arrays import Floats
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.image_plane import FINEST_NODES, SIGHT_POLYNOMIAL_COUNT, nodes
-from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges, Floats
+from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges
 
 if TYPE_CHECKING:
     from bisar_budget.analysis.analysis import Analysis

@@ -17,12 +17,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.scene_random import RandomPhases
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.constants import UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.combined import combined, combined_phase, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
@@ -31,7 +32,7 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.image_plane import MIN_SINE, degeneracy
 from bisar_budget.mission.model import Mission, Shares
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Indices, Lanes, SmallErrors, Truths
+from bisar_budget.ranges.exact_ranges import ExactRanges, Lanes, SmallErrors
 from bisar_budget.ranges.point_paths import ROWS, PointPaths
 from bisar_budget.units import format_quantity
 
@@ -120,7 +121,7 @@ class ScenePlaces:
     clearance: Floats
 
     @property
-    def has_image(self) -> Truths:
+    def has_image(self) -> Booleans:
         """Whether an image can be formed there."""
         return np.asarray(self.clearance > 1)
 
@@ -147,6 +148,9 @@ class Rims:
         return Rims(self.azimuth[indices], self.difference[indices], self.phases[..., indices])
 
 
+Selection = int | Booleans | Indices | tuple[Indices, ...]  # of the cases
+
+
 class Heights(NamedTuple):
     """Heights and their azimuths; of heights alike the larger azimuth is the higher."""
 
@@ -163,15 +167,15 @@ class Heights(NamedTuple):
         """The highest of these and the candidates, element by element."""
         return Heights(*map(np.array, zip(self, *candidates, strict=True))).highest
 
-    def of(self, indices: Any) -> "Heights":
+    def of(self, indices: Selection) -> "Heights":
         """Heights of some indices."""
         return Heights(self.height[indices], self.azimuth[indices])
 
-    def where(self, is_kept: Truths, replacements: "Heights") -> "Heights":
+    def where(self, is_kept: Booleans, replacements: "Heights") -> "Heights":
         """These where they are kept, elsewhere the replacements."""
         return Heights(*(np.where(is_kept, *both) for both in zip(self, replacements, strict=True)))
 
-    def put(self, indices: Any, heights: "Heights") -> None:
+    def put(self, indices: Selection, heights: "Heights") -> None:
         """Put heights at indices."""
         self.height[indices], self.azimuth[indices] = heights
 
@@ -199,7 +203,8 @@ class ScenePhases:
         self.is_large = np.zeros(self.centre.shape, dtype=bool)
         for index, error in enumerate(self.members):
             self.is_large[index] = errors.is_large(error)
-        self.nearest = errors.array(np.minimum(*(path.slant_range for path in errors.geometries.both)))
+        transmitter, receiver = errors.geometries.both
+        self.nearest = errors.array(np.minimum(transmitter.slant_range, receiver.slant_range))
 
     def ranges_at(self, radius: Floats, azimuth: Floats, of: Indices) -> ExactRanges:
         """Exact ranges of places."""
@@ -242,7 +247,7 @@ class ScenePhases:
         """Phase of each error there less that at the centre; by the worse sign of the large ones. [rad]"""
         return self.around(radius, azimuth, of, self.is_large.take(of, axis=1))[1]
 
-    def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Truths) -> tuple[Floats, Floats, Floats]:
+    def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Booleans) -> tuple[Floats, Floats, Floats]:
         """The same were all errors small; with some taken exactly, (errors, places); and how gradients turn.
 
         That is the least of what range and Doppler gradients span where each of these leads, over what they span
@@ -339,7 +344,11 @@ class ScenePhases:
         return Rims(top.azimuth % (2 * math.pi), np.where(has_image, top.height, math.inf), phases)
 
 
-def at(radius: Any, azimuth: Any) -> tuple[Any, Any]:
+@overload
+def at(radius: float, azimuth: float) -> tuple[float, float]: ...
+@overload
+def at(radius: Floats, azimuth: Floats) -> tuple[Floats, Floats]: ...
+def at(radius: PerCase, azimuth: PerCase) -> tuple[PerCase, PerCase]:
     """Place on the ground, east and north. [m]"""
     return radius * np.cos(azimuth), radius * np.sin(azimuth)
 
@@ -431,7 +440,7 @@ class _Climb:
         differences = self.phases.differences(self.radius, azimuth, self.of)
         return Heights(self.phases.together(differences, self.of), azimuth)
 
-    def _bent(self) -> Truths:
+    def _bent(self) -> Booleans:
         """Which of the large errors differ otherwise than small ones do: seen at three places, two harmonics show."""
         thirds = self.rims.azimuth + 2 * math.pi * np.arange(_SCENE.probe_count)[:, None] / _SCENE.probe_count
         radius, of, large = (
@@ -528,7 +537,7 @@ class SceneEdges:
         return self.largest.height
 
     @property
-    def has_doubt(self) -> Truths:
+    def has_doubt(self) -> Booleans:
         """Whether an error is over its limit at the edge alone."""
         return np.asarray((self.over > 0).any(axis=0))
 
@@ -632,7 +641,7 @@ class Corrections:
         How far it is searched for. [m]
     """
 
-    def __init__(self, edges: SceneEdges, total: Any) -> None:
+    def __init__(self, edges: SceneEdges, total: PerCase) -> None:
         self.edges, self.phases, self.total = edges, edges.phases, edges.phases.errors.array(total)
         self.farthest = np.maximum(_SCENE.max_radius_fraction * self.phases.nearest, edges.radius)
 

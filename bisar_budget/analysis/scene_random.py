@@ -21,10 +21,11 @@ What is stated by its effect alone is that all over the scene. Against exact ran
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.arrays import Floats, Indices
 from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.air_delays import (
     group_at_nodes,
@@ -44,9 +45,9 @@ from bisar_budget.effects.random_effect import (
     factor,
 )
 from bisar_budget.effects.vibration import slow_moves
-from bisar_budget.geometry import Vectors
+from bisar_budget.geometry import VectorArrays
 from bisar_budget.image_plane import nodes
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Indices
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 _CLOCKS = ("oscillator", "synchronization")  # kinds of errors that move nothing
 
@@ -149,14 +150,14 @@ class _Delay(NamedTuple):
 
     platform_indices: tuple[int, ...]
     delay: str
-    middles: Sequence[Vectors]
+    middles: Sequence[VectorArrays]
     metres: Floats
     courses: Floats
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
         """Quadratic phase of each course, (courses, places). [rad]"""
-        along: Any = 0.0
+        along = np.zeros(())
         for platform_index, middle in zip(self.platform_indices, self.middles, strict=True):
             x, y, z = (component[of] for component in middle)
             along = along + group_at_nodes(self.delay, there.tracks[platform_index], (x, y, z), self.metres[of])
@@ -177,6 +178,7 @@ def _at_random(
         if error.moves:
             yield subject, _Moving(_at_nodes_of(errors, error.moves), size)
         elif kind in _CLOCKS:
+            assert error.full.covariance is not None, "the full model has one"
             yield subject, _Clock.of(errors.exact, error.full.covariance, size)
         elif kind == "propagation":
             legs = tuple(map(PLATFORMS.index, legs_of(subject.owner)))
@@ -215,6 +217,6 @@ def _between(sensed: int, count: int) -> Floats:
     return np.asarray(np.polynomial.legendre.legvander(nodes(count).places, order[-1]) @ fit)
 
 
-def _of(array: Any, cases: Indices) -> Any:
+def _of(array: Floats, cases: Indices) -> Floats:
     """Some cases of an array (…, cases); what all share is there once."""
     return array if array.shape[-1] == 1 else array.take(cases, axis=-1)

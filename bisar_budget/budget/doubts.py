@@ -19,17 +19,17 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.constants import ONE_PEAK_DB
 from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, Subject
 from bisar_budget.effects.navigation_errors import residual_subject
 from bisar_budget.findings.row import Row
-from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, norm, unit
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, norm, unit
 from bisar_budget.mission.covariance import MOTION_KINDS
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath, LogNoise, MotionError, Platform
 from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 LEAST_M = 1e-3  # smallest doubt of a path that counts against a declared error, zero included
 NEGLIGIBLE_USE_FRACTION = 0.1  # of a requirement, by the doubt of a path or by a velocity that its source states
@@ -88,7 +88,7 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
     return doubts
 
 
-def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Truths]:
+def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Booleans]:
     """Cases in which a platform's path is in doubt by more than the file declares, by platform and kind of error."""
     doubted = {}
     for name in PLATFORMS:
@@ -103,7 +103,7 @@ def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Tru
 
 
 # ---------------------------------------------------------------------- how far the truth may be from a path
-def strays(mission: Mission, name: str) -> Any:
+def strays(mission: Mission, name: str) -> PerCaseFlag:
     """Whether the truth may be farther from a platform's path than the file declares, in each case.
 
     If no error is declared, age, interpolation and residual count if they are unusual, or if such an error would use
@@ -114,7 +114,7 @@ def strays(mission: Mission, name: str) -> Any:
     if path is None:
         return False
     if declared is not None:
-        return np.asarray(path.doubt_m) > np.maximum(declared, LEAST_M)
+        return np.asarray(np.asarray(path.doubt_m) > np.maximum(declared, LEAST_M))
     is_large = np.asarray(path.doubt_m) > LEAST_M
     if not is_large.any() or path.is_doubted:
         return is_large
@@ -147,7 +147,7 @@ def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, kind: str = 
 
 
 # ---------------------------------------------------------------------- errors that the source of a path states
-def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) -> Any:
+def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) -> PerCaseFlag:
     """Whether the source of a path states a larger error than the file declares, in each case.
 
     An error is larger if it has more variance in any direction. For a source without directions the root-sum-squares
@@ -173,7 +173,7 @@ def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) 
     is_open = stated.is_typical and platform.motion_error.stated(kind) is None and not platform.motion_error.random
     if is_more.any() and (kind == "velocity" or is_open):
         is_more = is_more & _matters(mission, name, kind, stated_covariance)
-    return is_more
+    return np.asarray(is_more)
 
 
 def _stated_covariance(stated: StatedAccuracy, kind: str, platform: Platform) -> Floats | None:
@@ -211,7 +211,7 @@ def _declared_covariance(platform: Platform, kind: str) -> Floats:
     return np.asarray(np.swapaxes(axes, -1, -2) @ _stack(along) @ axes)
 
 
-def _stack(rows: Sequence[Sequence[Any]]) -> Floats:
+def _stack(rows: Sequence[Sequence[PerCase]]) -> Floats:
     """A matrix (..., 3, 3) from its elements, numbers or arrays (cases,)."""
     elements = np.broadcast_arrays(*(np.asarray(element, dtype=float) for row in rows for element in row))
     return np.moveaxis(np.array(elements).reshape(3, 3, *elements[0].shape), (0, 1), (-2, -1))
@@ -251,26 +251,27 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
 
 
 # ---------------------------------------------------------------------- the residual of a log
-def leaves_unsaid(mission: Mission, name: str) -> Any:
+def leaves_unsaid(mission: Mission, name: str) -> PerCaseFlag:
     """Whether a log has too large a residual, and the file does not state whether the processor uses its fixes."""
     log = _unsaid_log(mission, name)
     return False if log is None else np.asarray(residual_phase(mission, name)) > MOST_RESIDUAL_RAD
 
 
-def residual_phase(mission: Mission, name: str) -> Any:
+def residual_phase(mission: Mission, name: str) -> PerCase:
     """Phase of the residual of a log's fixes along the line of sight, rms over the aperture. [rad]"""
     path: FlownPath | None = getattr(mission.platforms, name).path
     if path is None or path.log_noise is None:
         return 0.0
     residual, half = _stack(path.log_noise.residual), np.asarray(mission.collection.aperture_time) / 2
-    square = 0.0
+    square: PerCase = 0.0
     for weight, time in ((1 / 6, -half), (2 / 3, 0.0 * half), (1 / 6, half)):  # Simpson, over the aperture
         sight = np.stack(np.broadcast_arrays(*_sight(mission, name, time)), axis=-1)
         square = square + weight * np.einsum("...i,...ij,...j->...", sight, residual, sight)
-    return 2 * np.pi / np.asarray(mission.radar.wavelength) * np.sqrt(np.maximum(square, 0.0))
+    phase: PerCase = 2 * np.pi / np.asarray(mission.radar.wavelength) * np.sqrt(np.maximum(square, 0.0))
+    return phase
 
 
-def is_coarse(mission: Mission, name: str) -> Any:
+def is_coarse(mission: Mission, name: str) -> PerCaseFlag:
     """Whether a step of a log's fixes is too coarse, and the file does not state whether the processor uses them.
 
     A step is too coarse if it exceeds a tenth of the declared position error along any direction. If the file
@@ -316,7 +317,7 @@ def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
 
 
 # ---------------------------------------------------------------------- the effect of a doubt
-def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Any:
+def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Booleans:
     """Whether an error of a platform, by its covariance, uses more than a negligible part of a requirement."""
     needs, half = mission.requirements, np.asarray(mission.collection.aperture_time) / 2
     with np.errstate(all="ignore"):
@@ -332,7 +333,7 @@ def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Any:
             moved = _moved(mission.geometry, constant, linear)
             spread = np.sqrt(np.einsum("...ai,...ij,...aj->...", moved, covariance, moved))
             matters = matters | np.logical_not(spread < NEGLIGIBLE_USE_FRACTION * np.asarray(needs.location_error))
-    return matters
+    return np.asarray(matters)
 
 
 def _range_errors(mission: Mission, name: str, kind: str, half: Floats) -> Sequence[Floats]:
@@ -363,12 +364,14 @@ def _range_errors(mission: Mission, name: str, kind: str, half: Floats) -> Seque
 def _sight(mission: Mission, name: str, time: Any) -> Any:
     """Range that a metre of a platform's motion along each axis adds at a slow time, less the direct path's range."""
     platforms = mission.platforms
-    sight = unit(getattr(platforms, name).state.place(time))
+    path: PlatformState = getattr(platforms, name).state
+    sight = unit(path.place(time))
     if not mission.has_direct_path:
         return sight
     sign = 1.0 if name == "transmitter" else -1.0
     baseline = unit(platforms.geometry.apart.place(time))
-    return [towards - sign * along for towards, along in zip(sight, baseline, strict=True)]
+    x, y, z = (towards - sign * along for towards, along in zip(sight, baseline, strict=True))
+    return (x, y, z)
 
 
 def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floats:
@@ -393,7 +396,7 @@ def orbit_notes(case: Case, rows: Sequence[Row]) -> Iterator[Note]:
         position, velocity = error.stated("position"), error.stated("velocity") or (0.0, 0.0, 0.0)
         if state.fall is None or error.covariance is not None or position is None:
             continue
-        rate = norm(state.fall.orbit_rate(state))
+        rate = float(norm(state.fall.orbit_rate(state)))
         sizes = math.hypot(*position), math.hypot(*velocity)
         uses = [row.utilization or 0.0 for row in rows if row.owner == name and row.subject.kind == "position"]
         if rate * sizes[0] > sizes[1] and max(uses, default=0.0) > NEGLIGIBLE_USE_FRACTION:
@@ -460,7 +463,7 @@ def collection_notes(case: Case) -> Iterator[Note]:
     for name, state in zip(PLATFORMS, case.geometry.both, strict=True):
         if not state.is_straight:
             yield phrases.path_curves(name)
-        turn = norm(state.look_rate) * mission.collection.aperture_time / 2
+        turn = float(norm(state.look_rate)) * mission.collection.aperture_time / 2
         if turn > _TURNING_RAD:
             yield phrases.sight_turns(name, turn)
     if case.peak_loss_db is not None and case.peak_loss_db > ONE_PEAK_DB:

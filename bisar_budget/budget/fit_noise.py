@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bisar_budget.arrays import Floats
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.sources import ErrorListing, exact_ranges
 from bisar_budget.geometry import PlatformState
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
-from bisar_budget.ranges.exact_ranges import Floats
 
 MAX_UNSAID_CHANGE_FRACTION = 0.05  # largest change of an allowable without a warning
 _DECISIVE_EFFECT_FRACTION = (

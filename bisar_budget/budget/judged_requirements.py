@@ -10,17 +10,17 @@ Every number is an array over the cases, (n,): a check is one case.
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.continued_masks import MIN_USE_FRACTION
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, Codes
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.findings.status import BROKEN, RANK, STATUS
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 REQUIREMENT_KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
 REQUIREMENT_UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
@@ -49,8 +49,8 @@ class UntakenEffect(NamedTuple):
 
     kind: str  # cubic, spread or tone
     total: Floats
-    is_negligible: Truths
-    makers: Mapping[str, Truths]
+    is_negligible: Booleans
+    makers: Mapping[str, Booleans]
     least: Floats
     parts: Mapping[str, Floats]
 
@@ -68,8 +68,8 @@ class RequirementState(NamedTuple):
     decider: NDArray[np.intp]
     user: NDArray[np.intp]
     utilization: Floats
-    judges: Truths  # (rows, n)
-    is_unjudged: Truths
+    judges: Booleans  # (rows, n)
+    is_unjudged: Booleans
 
 
 def first_highest(uses: Floats) -> NDArray[np.intp]:
@@ -77,13 +77,13 @@ def first_highest(uses: Floats) -> NDArray[np.intp]:
     return np.asarray(is_as_high(uses, uses.max(axis=0)).argmax(axis=0))
 
 
-def is_as_high(uses: Any, other_uses: Any) -> Truths:
+def is_as_high(uses: PerCase, other_uses: PerCase) -> Booleans:
     """Whether `uses` are as high as `other_uses`, but for rounding."""
     with np.errstate(invalid="ignore"):  # an infinite utilization is as high as itself
         return np.asarray((uses >= other_uses - EQUAL_USE_FRACTION * np.abs(other_uses)) | (uses == other_uses))
 
 
-def negligible_rad(mission: Mission) -> Any:
+def negligible_rad(mission: Mission) -> PerCase:
     """Total below which an effect that no requirement covers is negligible. [rad]"""
     return np.minimum(NEGLIGIBLE_FRACTION * np.asarray(mission.requirements.quadratic_phase_error), SMALL_RAD)
 
@@ -102,13 +102,13 @@ def requirement_states(
     utilization: Floats,
     judges: Codes,
     quadratic_use: Floats,
-    waived: Mapping[str, Any],
+    waived: Mapping[str, PerCaseFlag],
     *,
     before: Codes,
-    in_doubt: Truths,
-    has_noise: Any,
-    is_misplaced: Any,
-    unjudged: Mapping[str, Any],
+    in_doubt: Booleans,
+    has_noise: PerCaseFlag,
+    is_misplaced: PerCaseFlag,
+    unjudged: Mapping[str, PerCaseFlag],
 ) -> list[RequirementState]:
     """Judge every requirement.
 

@@ -25,6 +25,7 @@ from bisar_budget.analysis.spread import (
     spread_limit,
     stated_powers,
 )
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.continued_masks import (
     MIN_USE_FRACTION,
     continuation_note,
@@ -52,7 +53,6 @@ from bisar_budget.mission.platforms import FlownPath, MotionError
 from bisar_budget.mission.readers import SortedPoints
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 ISLR = "islr"
 RANDOM_REQUIREMENTS = (QUADRATIC, CUBIC, ISLR, LOCATION)  # in the order of the effects of an error
@@ -68,14 +68,14 @@ class Limits(NamedTuple):
     displacement: Any
 
 
-def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: Any = 1.0) -> Limits:
+def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: PerCase = 1.0) -> Limits:
     """Limits on the errors of an owner by a model; `gain` is the gain of autofocus."""
     spread = spread_limit(mission, allocation, owner, model)
     needs = mission.requirements
     return Limits(allocation.qpe_limit(owner) * gain, needs.cubic_phase_error, spread, needs.location_error)
 
 
-def held_effect(mission: Mission, effect: RandomEffect, coverage: Any, gain: Any = 1.0) -> RandomEffect:
+def held_effect(mission: Mission, effect: RandomEffect, coverage: PerCase, gain: PerCase = 1.0) -> RandomEffect:
     """An effect as requirements limit it: without a cubic requirement, the cubic phase adds to ISLR, at one sigma.
 
     The quadratic phase of the result is the judged phase, with the `gain` of autofocus. `coverage` is the coverage
@@ -88,7 +88,7 @@ def held_effect(mission: Mission, effect: RandomEffect, coverage: Any, gain: Any
     return effect._replace(spread=np.sqrt(effect.spread**2 + CUBIC_POWER * cubic**2))
 
 
-def sizes_at(effect: RandomEffect, limits: Limits) -> list[Any]:
+def sizes_at(effect: RandomEffect, limits: Limits) -> list[PerCase]:
     """Size at which an error reaches each of `RANDOM_REQUIREMENTS`, in their order; infinite if never. [unit]"""
     with np.errstate(all="ignore"):
         return [
@@ -106,7 +106,7 @@ class RandomRows:
         self.judging, self.analysis, self.mission = judging, analysis, analysis.mission
         self.allocation, self.errors = analysis.allocation, analysis.random
 
-    def _table(self, values: Sequence[Any]) -> Floats:
+    def _table(self, values: Sequence[PerCase | PerCaseFlag]) -> Floats:
         """Table (values, cases) of numbers, or of arrays (cases,)."""
         table = np.empty((len(values), self.judging.cases))
         for row, value in zip(table, values, strict=True):
@@ -201,7 +201,7 @@ class RandomRows:
             row = judged.at(error_index, error.subject)
             yield RandomRow(row.in_decibel() if error.unit == "dB" else row, error_index, *columns_of_error)
 
-    def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Truths:
+    def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Booleans:
         """Whether an error's use of a requirement depends on noise below the first point of its mask."""
         rests_on_mask = np.zeros(sizes.shape[1:], dtype=bool)
         for row, error in enumerate(self.errors):
@@ -313,7 +313,7 @@ class RandomRow(FamilyRow):
     """
 
     place: int
-    is_over_other: Truths
+    is_over_other: Booleans
     bound_by_other: NDArray[np.intp]
     without_autofocus: Floats
 
@@ -425,7 +425,7 @@ class StatedRow(FamilyRow):
         )
 
 
-def _is_open(mission: Mission, error: RandomError) -> Any:
+def _is_open(mission: Mission, error: RandomError) -> PerCaseFlag:
     """Whether the file lacks a spectrum that makes part of an error, per case: ISLR cannot be judged without it."""
     is_shaken = error.subject.kind == "oscillator" and error.subject.axis == "acceleration"
     return is_shaken and lacks_a_spectrum(mission, error.owner)
@@ -524,7 +524,7 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
     elif sync.age is not None and sync.averaging is not None:
         yield phrases.left_since_setting(sync.age, sync.averaging)
     else:
-        yield phrases.heard_twice(mission.geometry.echo_delay)
+        yield phrases.heard_twice(float(mission.geometry.echo_delay))
 
 
 def _air_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:

@@ -16,6 +16,7 @@ from itertools import compress
 
 import numpy as np
 
+from bisar_budget.arrays import Booleans, Floats
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS
 from bisar_budget.design.geometric_program import Rows, largest_sizes
@@ -28,7 +29,6 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import Entry
 from bisar_budget.mission.quantities import QuestionError, tree_of
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.workers import Progress, unseen
 
 
@@ -183,7 +183,7 @@ class _SizeSearch:
                 sizes, is_extended = self._free_sizes(sizes, ~is_limited), True
         return self._kept(sizes, before)
 
-    def _free_sizes(self, sizes: Floats, is_free: Truths) -> Floats:
+    def _free_sizes(self, sizes: Floats, is_free: Booleans) -> Floats:
         """For errors without an apparent limit, the size just before they begin to use budget; others unchanged."""
         extended = sizes.copy()
         for index in np.flatnonzero(is_free).tolist():

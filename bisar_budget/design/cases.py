@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bisar_budget.arrays import Floats
 from bisar_budget.faults import Fault, InvalidValueError, shown
 from bisar_budget.json_types import JsonObject
 from bisar_budget.mission.changes import parts_of
@@ -24,7 +25,6 @@ from bisar_budget.mission.quantities import (
     number_of,
 )
 from bisar_budget.mission.readers import DIRECTION, TextList
-from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.resources import special_file
 from bisar_budget.units import Dimension, normal_unit, parse_quantity
 

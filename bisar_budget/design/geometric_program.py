@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.ranges.exact_ranges import Floats, Truths
+from bisar_budget.arrays import Booleans, Floats
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Rows(NamedTuple):
         """The rows, followed by other rows."""
         return Rows(*(np.concatenate(both) for both in zip(self, further, strict=True)))
 
-    def of_sizes(self, chosen: Truths) -> "Rows":
+    def of_sizes(self, chosen: Booleans) -> "Rows":
         """The rows for some of the sizes."""
         return self._replace(share=self.share[:, chosen])
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.arrays import Booleans, Floats
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import NEGLIGIBLE_FRACTION, SMALL_RAD
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Why
@@ -26,7 +27,6 @@ from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.mission.changes import ACCEPTED_ERRORS
 from bisar_budget.mission.model import MetricSplits, Mission
 from bisar_budget.mission.quantities import QuestionError, tree_of, with_number
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 PROBE_FACTORS = (0.8, 1.2)  # of a size, at which the effect of an error is measured
 _MAX_STEP_RATIO = 3.0  # of utilization to allowed utilization, after a step of the search
@@ -81,8 +81,8 @@ class Near(NamedTuple):
     sizes: Floats
     part: Floats
     room: Floats
-    is_limit: Truths
-    is_free: Truths
+    is_limit: Booleans
+    is_free: Booleans
 
     def rows(self, of: str = "") -> Rows:
         """Rows of a geometric program: all rows that limit a size, or the row with the id `of`."""
@@ -236,8 +236,8 @@ class SpecifiedMission:
             share: Floats = np.where(is_lost, (base - less) / (1 - low), (more - less) / (high - low))
         share = np.where(share > _ROW_ROUNDING_FRACTION * base, share, 0.0)
         room = allowed**row_uses.powers - (base[:, 0] - share.sum(axis=1))
-        is_limit: Truths = np.any(share > 0, axis=1)
+        is_limit: Booleans = np.any(share > 0, axis=1)
         if (room[is_limit] <= 0).any():
             return None
-        is_free: Truths = ~np.any(share > 0, axis=0)
+        is_free: Booleans = ~np.any(share > 0, axis=0)
         return Near(row_uses, allowed, sizes, share, room, is_limit, is_free)

@@ -272,7 +272,7 @@ def sensitivity(
     hold_to_decisions([judged], row)
     mission_standing = standing(judged, None, frozenset())
     nearest = min(path.slant_range for path in judged.analysis.geometry.both)
-    numbers, skipped = stated_numbers(tree_of(variation.mission), nearest)
+    numbers, skipped = stated_numbers(tree_of(variation.mission), float(nearest))
     neighbours = _Neighbours(variation, numbers, mission_standing.row, row, today)
     at_file = neighbours.uses([(None, 0)])[0] if mission_standing.row else ""
     if isinstance(at_file, str):

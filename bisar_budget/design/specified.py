@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget import units
+from bisar_budget.arrays import Floats
 from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
@@ -19,7 +20,6 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import Entry, OscillatorPart, PartError, entries, folders
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.quantities import Number, QuestionError, as_number, number_of
-from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
 ORDERED_DIGITS = 2  # of an ordered number

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bisar_budget.analysis.analysis import Analysis, by_nodes
+from bisar_budget.arrays import Booleans, Indices
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import first_highest
 from bisar_budget.budget.judged_rows import COMPLETE_FIELDS, REQUIREMENTS, Judged, statuses
@@ -32,7 +33,6 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, number_of, tree_of, with_number
 from bisar_budget.mission.stacked import picked, stacked
 from bisar_budget.mission.tree import Tree, read_tree
-from bisar_budget.ranges.exact_ranges import Indices, Truths
 from bisar_budget.workers import Progress, unseen
 
 # Numbers of cases after which progress is reported: the first ones, and then the interval.
@@ -157,7 +157,7 @@ def _verdict(
     }
 
 
-def _waived_by(judged: JudgedMission, row_id: str | None, is_waived: Truths) -> Values:
+def _waived_by(judged: JudgedMission, row_id: str | None, is_waived: Booleans) -> Values:
     """Ids of the waivers of waived cases (cases,), as the file writes them; empty for cases that are not waived."""
     ids = np.full(is_waived.shape, "", dtype=object)
     for waiver_id, covers in judged.covering(row_id) if is_waived.any() else ():

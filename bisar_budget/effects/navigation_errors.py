@@ -16,14 +16,15 @@ its own row. The effect of attitude through the arm alone has a row that counts 
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bisar_budget import evaluators
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import (
     Moves,
@@ -35,12 +36,11 @@ from bisar_budget.effects.random_effect import (
 )
 from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import PlatformState, Vector, cross, unit, without_rounding
+from bisar_budget.geometry import PlatformState, Vectors, cross, unit, without_rounding
 from bisar_budget.image_plane import nodes
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, LeverArm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import RAW, CommonMotionError, FlownPath, LogNoise, MotionError
-from bisar_budget.ranges.exact_ranges import Floats
 
 _IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
 SPREADING_NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
@@ -95,7 +95,7 @@ def _log_process(mission: Mission, name: str, figure: str) -> tuple[GaussMarkov,
     return GaussMarkov(figure, (x, y, z), float(np.ravel(correlation_time)[0])), axes[:, :, 0]
 
 
-def specific_force(mission: Mission, state: PlatformState) -> Vector:
+def specific_force(mission: Mission, state: PlatformState) -> Vectors:
     """Specific force of a platform, f = a − g, which accelerometers measure, in the axes of the scene. [m/s²]
 
     It is zero where the platform falls freely. On the Earth g includes the terms of the Earth's rotation
@@ -175,13 +175,17 @@ def _moves_by_imu(
     )
 
 
-def _at_mid_aperture(mission: Mission, index: int, along: Any) -> tuple[Any, ...]:
+# The evaluators take and give numbers, or arrays of cases.
+_inertial_phases: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.inertial_phases
+
+
+def _at_mid_aperture(mission: Mission, index: int, along: PerCase) -> tuple[PerCase, ...]:
     """Quadratic phase, cubic phase and rest by a unit with the component `along` the line of sight. [rad]"""
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
-    return evaluators.inertial_phases(along, along, along, wavelength, T)[index]
+    return _inertial_phases(along, along, along, wavelength, T)[index]
 
 
-def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> list[Any]:
+def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> tuple[PerCase, PerCase]:
     """Sigmas of the displacement by a unit with the component `along` the line of sight of mid-aperture. [m]"""
     fit = seen.exact.fit[:2]
     if kind in SPREADING_NOISE:
@@ -239,7 +243,7 @@ def body_axes(state: PlatformState, times: Floats) -> Floats:
     return np.array((along, leftward, cross(along, leftward)))
 
 
-def arm_at(state: PlatformState, arm: Any, times: Floats) -> Floats:
+def arm_at(state: PlatformState, arm: Vectors, times: Floats) -> Floats:
     """The arm at slow times [s] along the axes of the scene, (3, *times.shape). [m]"""
     return np.asarray(sum(length * axis for length, axis in zip(arm, body_axes(state, times), strict=True)))
 
@@ -301,6 +305,7 @@ def _with_arm(
     along = [seen.range_errors(platform_index, way) for way in (directions[:, :, None], swings)]
     stated = seen.error(PLATFORMS[platform_index]).lever_arm
     assert stated is not None
+    assert stated.arm is not None
     at_middle = swung(about, arm_at(state, stated.arm, np.zeros((1, seen.cases))))[:, :, 0]
     at_mid_aperture = [np.einsum("ac,eac->ec", seen.vector(state.look), way) for way in (directions, at_middle)]
     fit, half, k, count = seen.exact.fit, seen.exact.half, seen.exact.k, len(times)
@@ -410,7 +415,7 @@ def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
         yield _noise(seen, process, {name: axes}, key)
 
 
-def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, Any]]:
+def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, PerCase]]:
     """Sigmas (3, cases) [m], axes (3, 3, cases) and correlation time [s] of the residual, and of the grid."""
     residual, grid = (
         np.moveaxis(
@@ -443,8 +448,8 @@ class _Process(NamedTuple):
     """A Gauss-Markov process, its subject, and its sigmas [m]; numbers may be arrays (cases,)."""
 
     subject: Subject
-    sigma: Sequence[Any]
-    correlation_time: Any
+    sigma: Sequence[PerCase]
+    correlation_time: PerCase
     spreads: bool = True
 
     @classmethod

@@ -14,10 +14,11 @@ direction is unknown. The worst direction counts, that is, the length of Γ time
 
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import specific_force
@@ -29,7 +30,6 @@ from bisar_budget.geometry import BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.vibrations import FeltVibration, Vibration
-from bisar_budget.ranges.exact_ranges import Floats
 
 PHASE_LAW = (1.0, 2.0)  # S_φ = (Γ·f₀)²·S_a/f²
 _FELT_ACCELERATION_MPS2 = 1e-6  # m/s²; a smaller acceleration of a path counts as none
@@ -40,7 +40,7 @@ class Felt(NamedTuple):
     """The vibration that an oscillator feels, stated for it or for its platform, and its sensitivity. [s²/m]"""
 
     vibration: Vibration | FeltVibration
-    sensitivity: Any
+    sensitivity: PerCase
     is_own: bool
 
 
@@ -55,7 +55,7 @@ def felt(mission: Mission, name: str) -> Felt | None:
     return Felt(vibration, oscillator.acceleration_sensitivity, felt_vibration is not None)
 
 
-def lacks_a_spectrum(mission: Mission, name: str) -> Any:
+def lacks_a_spectrum(mission: Mission, name: str) -> PerCaseFlag:
     """Cases in which an oscillator feels a wideband vibration: its phase f₀Γ·4π²·f·σ/g needs a frequency."""
     felt_vibration = felt(mission, name)
     if (
@@ -93,12 +93,12 @@ class AcceleratedTone(NamedTuple):
 
     name: str
     entry: int
-    frequency: Any
-    acceleration: Any
-    free: Any
-    sensitivity: Any
+    frequency: PerCase
+    acceleration: PerCase
+    free: PerCase
+    sensitivity: PerCase
     left: LeftTone
-    echo: Any
+    echo: PerCase
     in_quadrature: str | None
 
     @property
@@ -107,12 +107,12 @@ class AcceleratedTone(NamedTuple):
         return subject(self.name, "oscillator", "acceleration", entry=self.entry)
 
     @property
-    def per_unit(self) -> Any:
+    def per_unit(self) -> PerCase:
         """Peak phase of the tone's echo at the centre frequency by a unit of Γ. [rad/(s²/m)]"""
         return self.free * self.echo
 
     @property
-    def phase(self) -> Any:
+    def phase(self) -> PerCase:
         """Peak phase of the tone's echo at the centre frequency. [rad]"""
         return self.per_unit * self.sensitivity
 
@@ -195,14 +195,14 @@ def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] 
     return seen.of_courses(courses, courses)
 
 
-def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) -> Floats:
+def turn_courses(state: PlatformState, moments: Floats, interval: PerCase | None = None) -> Floats:
     """Time error by a unit of Γ along each axis, v(τ) − v(0), or its rest after exchanges, (n, moments, …).
 
     The axes are the axes of the scene. The exchanges begin anywhere in their interval. Each of several beginnings has
     an equal part of the mean square.
     """
 
-    def gained(tau: Any) -> Floats:
+    def gained(tau: PerCase) -> Floats:
         now, middle = state.at(tau)[1], state.velocity
         return np.array([np.broadcast_to(a - b, np.shape(tau)) for a, b in zip(now, middle, strict=True)])
 
@@ -222,7 +222,7 @@ def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) ->
     return np.concatenate(courses)
 
 
-def _falls(mission: Mission, state: PlatformState) -> Any:
+def _falls(mission: Mission, state: PlatformState) -> PerCaseFlag:
     """Whether a platform falls freely: accelerometers measure less than the acceleration of its path."""
     return norm(specific_force(mission, state)) < norm(state.acceleration)
 
@@ -237,8 +237,9 @@ def flies_a_turn(mission: Mission, name: str) -> bool:
 def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
     """Effect of two independent errors that grow with the same unit."""
     quadratic, cubic, spread, east, north = (np.hypot(*both) for both in zip(first[:5], second[:5], strict=True))
-    has_covariance = first.covariance is not None and second.covariance is not None
-    covariance = first.covariance + second.covariance if has_covariance else None
+    covariance = None
+    if first.covariance is not None and second.covariance is not None:
+        covariance = first.covariance + second.covariance
     hidden, higher_orders = np.hypot(first.hidden, second.hidden), np.hypot(first.rest, second.rest)
     return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, higher_orders)
 

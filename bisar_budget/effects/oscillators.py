@@ -8,11 +8,12 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import combinations, pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bisar_budget import evaluators, phrases
+from bisar_budget.arrays import Booleans, Floats, PerCase
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
@@ -21,7 +22,6 @@ from bisar_budget.mission.instruments import Oscillator, PowerLaw
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import Points, SortedPoints
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 DEFAULT_BANDWIDTH_HZ = 1e3  # Hz, upper end of noise for which the file states no end
 POOR_FIT_FRACTION = 0.2  # of an Allan deviation; a power law with a larger misfit does not describe it
@@ -214,7 +214,7 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     )
 
 
-def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: Any) -> RandomEffect | None:
+def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: PerCase) -> RandomEffect | None:
     """Effect of the assumed noise below the first point of a mask; None where that noise hardly counts."""
     mask = oscillator.phase_noise
     if mask is None or np.all(mask[0][0] * seen.aperture_time <= COVERED_CYCLES):
@@ -224,7 +224,7 @@ def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: Any)
     return full.times(seen.factor)
 
 
-def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Truths:
+def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Booleans:
     """Cases in which the spectrum differs from the stated one: by another frequency of the mask, or by a poor fit."""
     in_doubt = np.full(seen.cases, bool(oscillator.mask_at_frequency_of_part))
     if oscillator.allan_deviation is None:
@@ -282,7 +282,7 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_be
         return remaining
     interval = None if sync is None else sync.interval
     for (alike, exchanged), cases in seen.alike((oscillator, interval)):
-        spectra: dict[Any, list[int]] = {}
+        spectra: dict[tuple[PowerLawPiece, ...], list[int]] = {}
         for case in cases.tolist():  # the fit to an Allan deviation depends on the aperture
             pieces = noise_of(alike, 1.0, float(times[case])).pieces
             spectra.setdefault(pieces[:1] if is_below_mask else pieces, []).append(case)
@@ -299,7 +299,7 @@ def _left_of(
     if sync is None or interval is not None:
         return left_parts(pieces, aperture_time, interval)
 
-    def of_cases(value: Any) -> Floats:
+    def of_cases(value: PerCase | None) -> Floats:
         return np.broadcast_to(np.asarray(value), (seen.cases,))[cases_of_spectrum]
 
     if sync.is_holdover:

@@ -4,13 +4,14 @@ A check lists all of them, with the errors that the file does not declare, becau
 sizes. A sweep lists the declared errors, and the errors whose rows are asked for.
 """
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from bisar_budget import evaluators, phrases
+from bisar_budget.arrays import PerCase
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.combined import squared
 from bisar_budget.effects.effect import (
@@ -24,7 +25,7 @@ from bisar_budget.effects.effect import (
     subject,
 )
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, Vectors
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, VectorArrays, Vectors
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
 
 AnyEffect = TypeVar("AnyEffect", Effect, FullEffect)
+AnyVector = TypeVar("AnyVector", VectorArrays, Vectors)
 _UNIT_VECTORS: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _PUBLISHED_UNIT = Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0)  # effect of a pure phase error
 _FULL_UNIT = FullEffect(east=0.0, north=0.0, qpe=1.0, cubic=0.0)
@@ -45,7 +47,7 @@ def exact_ranges(
 ) -> ExactRanges:
     """Exact ranges of a mission's cases at their scene centres, at `count` nodes or as many as the cases need."""
     T, is_heard = mission.collection.aperture_time, mission.has_direct_path
-    count = count or nodes_for(geometry, T, has_direct_path=is_heard)
+    count = count or int(nodes_for(geometry, T, has_direct_path=is_heard))
     return ExactRanges.of(geometry.both, mission.radar, T, count, cases, has_direct_path=is_heard)
 
 
@@ -59,6 +61,10 @@ def distribution_of(mission: Mission, source: ErrorSource) -> str:
     if source.is_common and mission.common_motion_error is not None:
         return mission.common_motion_error.distribution
     return "bound"
+
+
+# The evaluators take and give numbers, or arrays of cases.
+_published_motion: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.published_motion
 
 
 class ErrorListing:
@@ -82,14 +88,14 @@ class ErrorListing:
         yield from self._of_terrain()
         yield from self._stated_elsewhere()
 
-    def _is_listed(self, row_subject: Subject, declared: Any) -> bool:
+    def _is_listed(self, row_subject: Subject, declared: object) -> bool:
         return declared is not None or self.shown is None or row_subject.id in self.shown
 
     @cached_property
-    def _published(self) -> list[Any]:
+    def _published(self) -> list[tuple[tuple[PerCase, ...], ...]]:
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
         return [
-            evaluators.published_motion(*path.position, *path.velocity, path.slant_range, wavelength, T)
+            _published_motion(*path.position, *path.velocity, path.slant_range, wavelength, T)
             for path in self.geometry.both
         ]
 
@@ -100,7 +106,7 @@ class ErrorListing:
             published = [Effect._make(row) for row in self._published[platform_index][first : first + 3]]
             along = np.stack([self.exact.along(platform_index, axis) for axis in _UNIT_VECTORS])
             effects = self.exact.effect(along * self.exact.powers[MOTION_UNITS[kind]])
-            full = [FullEffect._make(row) for row in zip(*effects, strict=True)]
+            full = [FullEffect._make(row) for row in zip(*map(np.asarray, effects), strict=True)]
             self._legs[platform_index, kind] = published, full
         return self._legs[platform_index, kind]
 
@@ -114,7 +120,7 @@ class ErrorListing:
 
     def _flown(
         self, kind: str, directions: Mapping[int, Vectors], frame: str
-    ) -> tuple[FullEffect, tuple[Vectors, Vectors], tuple[Vectors, Vectors] | None] | None:
+    ) -> tuple[FullEffect, tuple[VectorArrays, VectorArrays], tuple[Vectors, Vectors] | None] | None:
         """Effect of a unit of an error of platforms in free fall; None if no platform of the error is in free fall.
 
         A platform in free fall follows the dynamics of its orbit. The velocity of `ric` is that against the stars: a
@@ -141,7 +147,7 @@ class ErrorListing:
         if all(self._motions[platform_index] is None for platform_index in directions):
             return None
         moved = np.zeros_like(self.exact.times)
-        shifts, rates = dict[int, Vectors](), dict[int, Vectors]()
+        shifts, rates = dict[int, VectorArrays](), dict[int, Vectors]()
         for platform_index, direction in directions.items():
             motions, fall = self._motions[platform_index], self.geometry.both[platform_index].fall
             is_at_rest = kind == "position" and frame == "ric" and fall is not None
@@ -181,7 +187,7 @@ class ErrorListing:
             # Where the file states an error along other axes, its scene axes are listed only if all rows are.
             if self.shown is not None and row_subject.id not in self.shown and not (in_scene and values is not None):
                 continue
-            on_axis = None
+            on_axis: PerCase | None = None
             if values is not None:
                 if in_scene:
                     on_axis = values[axis] * self.factor
@@ -249,9 +255,9 @@ class ErrorListing:
         self,
         row_subject: Subject,
         unit: str,
-        value: Any,
+        value: PerCase | None,
         path: KeyPath,
-        terms: tuple[Any, ...],
+        terms: tuple[PerCase, ...],
         no_limit: Note,
         equation: str = "Table I row 1",
         evidence: str | None = None,
@@ -283,7 +289,12 @@ class ErrorListing:
         sync = self.mission.synchronization
         if sync is None:
             return
-        frequency: tuple[Any, ...] = (sync.age if sync.is_holdover else 0.0, 1.0, 0.0, 0.0)
+        frequency: tuple[PerCase, ...] = (
+            sync.age if sync.is_holdover and sync.age is not None else 0.0,
+            1.0,
+            0.0,
+            0.0,
+        )
         if sync.is_direct_path:
             frequency = self._delay_of_the_echo
         for kind, unit, value, terms in (
@@ -296,7 +307,7 @@ class ErrorListing:
                 yield self._of_terms(row_subject, unit, value, path, terms, no_limit, evidence=sync.source)
 
     @property
-    def _delay_of_the_echo(self) -> tuple[Any, ...]:
+    def _delay_of_the_echo(self) -> tuple[PerCase, ...]:
         """Terms of the delay of the echo after the direct path, which a wrong clock measures wrong. [s]"""
         exact = self.exact
         seconds = (sum(exact.ranges) - exact.baselines) / SPEED_OF_LIGHT_MPS
@@ -320,7 +331,7 @@ class ErrorListing:
         if value is None and not (is_set and self._is_listed(row_subject, value)):
             return
         path = ("platforms", name, "oscillator", "aging")
-        terms: tuple[Any, ...] = (0.0, 0.0, 0.5 * (sync is None), 0.0)
+        terms: tuple[PerCase, ...] = (0.0, 0.0, 0.5 * (sync is None), 0.0)
         if is_set:
             terms = (age**2 / 2, age, 0.5, 0.0)
         no_limit = (
@@ -412,7 +423,13 @@ class ErrorListing:
             yield self._of_time_tag("mission", (0, 1), common.time_tag, key, common.source, note)
 
     def _of_time_tag(
-        self, owner: str, platform_indices: Sequence[int], value: Any, key: KeyPath, source: str | None, *notes: Note
+        self,
+        owner: str,
+        platform_indices: Sequence[int],
+        value: PerCase,
+        key: KeyPath,
+        source: str | None,
+        *notes: Note,
     ) -> ErrorSource:
         ways = [self._velocities(path) for path in self.geometry.both]
         moved = np.sum(
@@ -498,8 +515,8 @@ def _scene_axes(name: str, kind: str) -> tuple[tuple[Subject, KeyPath, str, Note
 
 
 def _along_scene_axis(
-    declared: Sequence[Any], axes: tuple[Vectors, Vectors, Vectors], axis: int, distribution: str
-) -> Any:
+    declared: Sequence[PerCase], axes: tuple[Vectors, Vectors, Vectors], axis: int, distribution: str
+) -> PerCase:
     """Size along one axis of the scene of errors stated along the axes of another frame.
 
     The three errors are independent, so one-sigma values add as squares and bounds add as magnitudes: a signed
@@ -510,7 +527,7 @@ def _along_scene_axis(
     return np.copysign(size, a + b + c)
 
 
-def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[Any]) -> Any:
+def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[PerCase]) -> PerCase:
     """Sigma of position or velocity error along a direction in the frame's axes: √(dᵀCd)."""
     parts = [sigma * along for sigma, along in zip(covariance.of(kind), direction, strict=True)]
     return np.sqrt(squared(covariance.block(kind), parts))
@@ -522,7 +539,7 @@ def _along(effects: Sequence[AnyEffect], direction: Vectors) -> AnyEffect:
     return type(effects[0])(*map(_total, terms))
 
 
-def _of_both_platforms(vectors: Mapping[int, Vectors]) -> tuple[Vectors, Vectors]:
+def _of_both_platforms(vectors: Mapping[int, AnyVector]) -> tuple[AnyVector, AnyVector]:
     """Vectors of both platforms from the vectors of the platforms that have an error: the other's is not used."""
     first = next(iter(vectors.values()))
     return vectors.get(0, first), vectors.get(1, first)
@@ -532,7 +549,7 @@ def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:
     return type(effects[0])(*map(_total, zip(*effects, strict=True)))
 
 
-def _total(terms: Sequence[Any]) -> Any:
+def _total(terms: Sequence[PerCase]) -> PerCase:
     """Sum of terms. Where terms cancel exactly, the rest is rounding and would give a false limit: it becomes 0."""
     total = sum(terms)
     return np.where(np.abs(total) > VECTOR_ROUNDING_FRACTION * sum(np.abs(term) for term in terms), total, 0.0)

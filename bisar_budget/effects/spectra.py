@@ -11,14 +11,14 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache, partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.image_plane import nodes
-from bisar_budget.ranges.exact_ranges import Floats
 
 SERIES_ANGLE_RAD = 0.5  # angle, or ratio; below it terms cancel and a series is exact to 1e-8
 
@@ -32,16 +32,16 @@ class Parts(NamedTuple):
     other phase, even and odd orders are uncorrelated.
     """
 
-    quadratic: Any
-    cubic: Any
-    left: Any
-    constant: Any = math.inf
-    linear: Any = math.inf
-    constant_quadratic: Any = -math.inf
-    linear_cubic: Any = -math.inf
-    constant_linear: Any = 0.0
-    constant_cubic: Any = 0.0
-    linear_quadratic: Any = 0.0
+    quadratic: PerCase
+    cubic: PerCase
+    left: PerCase
+    constant: PerCase = math.inf
+    linear: PerCase = math.inf
+    constant_quadratic: PerCase = -math.inf
+    linear_cubic: PerCase = -math.inf
+    constant_linear: PerCase = 0.0
+    constant_cubic: PerCase = 0.0
+    linear_quadratic: PerCase = 0.0
 
     @property
     def covariance(self) -> Floats:
@@ -62,7 +62,7 @@ class Parts(NamedTuple):
         """All parts, (parts, ...)."""
         return np.array(np.broadcast_arrays(*self))
 
-    def times(self, power: Any) -> "Parts":
+    def times(self, power: PerCase) -> "Parts":
         """Parts of a phase with `power` times the power."""
         return Parts(*(mean_square * power for mean_square in self))
 
@@ -78,7 +78,7 @@ class Parts(NamedTuple):
         return self._replace(constant=nothing, constant_quadratic=nothing)
 
 
-def gauss_markov(aperture_time: Any, correlation_time: Any) -> Parts:
+def gauss_markov(aperture_time: PerCase, correlation_time: PerCase) -> Parts:
     """Parts of a stationary process of variance 1 and correlation exp(−|t|/τ_c)."""
     ratio = np.asarray(aperture_time / (2 * correlation_time))
     (slow,) = evaluators.gauss_markov_parts_slow(np.minimum(ratio, SERIES_ANGLE_RAD))
@@ -87,7 +87,7 @@ def gauss_markov(aperture_time: Any, correlation_time: Any) -> Parts:
     return Parts(*(np.where(ratio < SERIES_ANGLE_RAD, *both)[()] for both in zip(slow, exact, strict=True)))
 
 
-def tone(angle: Any) -> Floats:
+def tone(angle: PerCase) -> Floats:
     """Amplitudes of the parts of a tone of amplitude 1, each in its worst phase, and the power share of the rest.
 
     `angle` is πfT. The rows are quadratic phase, cubic phase, the share of the tone's power beyond the cubic,
@@ -100,7 +100,7 @@ def tone(angle: Any) -> Floats:
     return np.where(angle < SERIES_ANGLE_RAD, slow, exact)
 
 
-def held(step: Any) -> Any:
+def held(step: PerCase) -> PerCase:
     """Spectrum of samples joined by straight lines, over the spectrum of white noise of their variance: sinc⁴."""
     return np.sinc(step / (2 * math.pi)) ** 4
 
@@ -147,7 +147,7 @@ class PowerLawPiece(NamedTuple):
     density: float
     slope: float
 
-    def at(self, f: Any) -> Any:
+    def at(self, f: PerCase) -> PerCase:
         """Density of the power law at frequencies. [rad²/Hz]"""
         return self.density * f**-self.slope
 
@@ -168,7 +168,7 @@ def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
     return total
 
 
-def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, above: Any = 0.0) -> Parts:
+def parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, above: PerCase = 0.0) -> Parts:
     """Integrate a spectrum with the parts of a tone, to 1e-4.
 
     Parameters
@@ -196,7 +196,7 @@ def left_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval:
     return Parts(*parts_of_times.rows[:, time_index])
 
 
-def _like(total: Floats, aperture_time: Any) -> Parts:
+def _like(total: Floats, aperture_time: PerCase) -> Parts:
     """Parts as numbers or as arrays, like the aperture times."""
     return Parts(*total) if np.ndim(aperture_time) else Parts(*total[:, 0].tolist())
 
@@ -351,7 +351,7 @@ def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Fl
 _FOLLOWED_DELAY_CYCLES = 12  # turns of a tone within the delay up to which panels resolve them
 
 
-def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, delay: Any) -> Parts:
+def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: PerCase) -> Parts:
     """Integrate the difference of a clock's phase between two times, `delay` apart: S·4 sin²(πfΔt).
 
     Parameters
@@ -379,7 +379,7 @@ def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, delay: Any)
 
 
 # ---------------------------------------------------------------------- synchronisation
-def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, interval: float) -> Parts:
+def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, interval: float) -> Parts:
     """Integrate the rest of a spectrum after synchronisation: the phase less the straight lines between its samples.
 
     Straight lines pass sinc²(f·T_s) of a tone, and fold every tone at a distance of m/T_s onto it. They leave of a
@@ -396,17 +396,17 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, inte
     edges = [[*_exchange_edges(T, rate), *images] for T in times.tolist()]
     total = _over_panels(lambda f, cases: _unjoined(pieces, f, rate), edges, last, scale)
     _add_fast(total, pieces, last, scale, 1.0)  # straight lines pass no fast noise
-    total += parts(_far_images(pieces, images, rate), times)[:_INTEGRAL_COUNT]
+    total += np.array(parts(_far_images(pieces, images, rate), times)[:_INTEGRAL_COUNT])
     return _like(total, aperture_time)
 
 
-def link_parts(aperture_time: Any, interval: float) -> Parts:
+def link_parts(aperture_time: PerCase, interval: float) -> Parts:
     """Parts of samples of variance 1 with straight lines between: one-sided 2·T_s·sinc⁴(f·T_s), ⅔ in all."""
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     edges = [_exchange_edges(T, rate) for T in times.tolist()]
     last = np.full(times.shape, _FOLLOWED_IMAGE_COUNT * rate)
     total = _over_panels(
-        lambda f, cases: 2 * interval * held(2 * math.pi * f * interval), edges, last, math.pi * times
+        lambda f, cases: np.asarray(2 * interval * held(2 * math.pi * f * interval)), edges, last, math.pi * times
     )
     return _like(total, aperture_time)
 

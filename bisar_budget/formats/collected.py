@@ -20,7 +20,18 @@ import numpy as np
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.faults import printable
 from bisar_budget.formats.containers import Element
-from bisar_budget.geometry import FRAME_AXES, STRAIGHT, Axes, PlatformState, Vector, cross, dot, norm, unit
+from bisar_budget.geometry import (
+    FRAME_AXES,
+    STRAIGHT,
+    Axes,
+    PlatformState,
+    Vector,
+    cross,
+    dot,
+    norm,
+    plain_vector,
+    unit,
+)
 from bisar_budget.json_types import JsonDocument, JsonObject
 from bisar_budget.paths.accuracy import with_rate
 from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes
@@ -127,7 +138,7 @@ def reference_of(seen: Seen, slow_time: float) -> ReferenceGeometry:
     """Ranges and bistatic angle at a slow time."""
     t, r = (track.state.at(slow_time)[0] for track in (seen.transmitter, seen.receiver))
     angle = math.atan2(norm(cross(unit(t), unit(r))), dot(unit(t), unit(r)))
-    return ReferenceGeometry(slow_time, norm(t), norm(r), angle)
+    return ReferenceGeometry(slow_time, float(norm(t)), float(norm(r)), angle)
 
 
 def fitted(times: Floats, positions: Floats, aperture_time_s: float, wavelength_m: float) -> Fitted:
@@ -233,7 +244,11 @@ def declared(
     _require_size(np.sqrt(np.abs(covariance).max(axis=1)), frame)
     if name not in MISSION_FRAMES:
         raise frame.fault(f"must be one of {', '.join(MISSION_FRAMES)} (got {name!r})")
-    target = state.frame("scene") if name == "ECF" else axes.radial(state.position, state.velocity)
+    target = (
+        state.frame("scene")
+        if name == "ECF"
+        else axes.radial(plain_vector(state.position), plain_vector(state.velocity))
+    )
     source = _axes_of(name, state, axes)
     turn: Floats = np.array(target) @ np.array(source).T  # from the file's frame into the mission's frame
     turn_of_both = np.kron(np.eye(2), turn)
@@ -268,8 +283,8 @@ def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
         x, y, z = zip(*axes.axes, strict=True)
         return x, y, z
     if name == "RIC_ECI":
-        return axes.radial(state.position, state.velocity)
-    radial = unit(axes.turned(axes.earth_fixed(state.position)))
+        return axes.radial(plain_vector(state.position), plain_vector(state.velocity))
+    radial = unit(axes.turned(axes.earth_fixed(plain_vector(state.position))))
     across = unit(cross(radial, state.velocity))
     return radial, cross(across, radial), across
 
@@ -554,13 +569,13 @@ def _fit(track: Fitted) -> str:
 def _platform(imported: Imported, track: Fitted, error: DeclaredMotionError | None) -> JsonObject:
     state = track.state
     platform: JsonObject = {
-        "position": _triple(state.position, "m", 6),
-        "velocity": _triple(state.velocity, "m/s", 9),
+        "position": _triple(plain_vector(state.position), "m", 6),
+        "velocity": _triple(plain_vector(state.velocity), "m/s", 9),
     }
     if state.acceleration != STRAIGHT:
-        platform["acceleration"] = _triple(state.acceleration, "m/s^2")
+        platform["acceleration"] = _triple(plain_vector(state.acceleration), "m/s^2")
     for bend, (key, per, factor) in zip(state.bends, _BENDS, strict=False):
-        platform[key] = _triple((bend[0] * factor, bend[1] * factor, bend[2] * factor), per)
+        platform[key] = _triple(plain_vector((bend[0] * factor, bend[1] * factor, bend[2] * factor)), per)
     if error is not None:
         platform["motion_error"] = _error(imported, error)
     return platform

@@ -27,7 +27,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
-from bisar_budget.geometry import Axes, PlatformState, Vector
+from bisar_budget.geometry import Axes, PlatformState, Vector, plain_vector
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.paths.accuracy import block_turned, with_rate
 from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes, axes_at, geodetic
@@ -156,7 +156,8 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
         raise SimulationError(f"the declared errors leave no image of a point: {fault}") from None
     shift = max(abs(component) for component in effect.displacement)
     reach = max(max(abs(target.east), abs(target.north)) for target in targets.points)
-    cell = Case(Analysis(mission)).resolution[:2]
+    resolution = Case(Analysis(mission)).resolution
+    cell = float(resolution.range), float(resolution.cross_range)
     half = float(math.ceil(reach + shift + _AREA_MARGIN_CELLS * max(cell)))
     times: Floats = np.linspace(-T / 2, T / 2, _EXTENT_SAMPLES)
     flown = collection.flight(errors.smooth(), times)
@@ -367,8 +368,8 @@ def _scene_coordinates(plan: _Plan, axes: SceneAxes) -> _Leaves:
         **_xyz("IARP/ECF", axes.origin),
         **_degrees("IARP/LLH", reference_point),
         "IARP/LLH/HAE": reference_point.height,
-        **_xyz("ReferenceSurface/Planar/uIAX", axes.axes[0]),
-        **_xyz("ReferenceSurface/Planar/uIAY", axes.axes[1]),
+        **_xyz("ReferenceSurface/Planar/uIAX", plain_vector(axes.axes[0])),
+        **_xyz("ReferenceSurface/Planar/uIAY", plain_vector(axes.axes[1])),
         **{f"ImageArea/X1Y1/{axis}": -half for axis in "XY"},
         **{f"ImageArea/X2Y2/{axis}": half for axis in "XY"},
     }

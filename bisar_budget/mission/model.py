@@ -608,7 +608,8 @@ def _at_a_glance(state: PlatformState) -> str:
     """Position and motion of a platform in a line."""
     speed = math.hypot(*state.velocity)
     moves = "stands still" if state.is_still else f"moves at {format_quantity(speed, 'm/s', 4)}"
-    return f"{format_quantity(state.slant_range, 'm', 4)} away, {math.degrees(state.elevation):.1f}° high, {moves}"
+    slant_range = format_quantity(float(state.slant_range), "m", 4)
+    return f"{slant_range} away, {math.degrees(state.elevation):.1f}° high, {moves}"
 
 
 def has_instruments(mission: Mission) -> bool:

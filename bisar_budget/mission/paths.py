@@ -372,7 +372,7 @@ def _orbit_path(
     instants = [later(center, fraction * half) for fraction in (0.0, -0.5, 0.5, -1.0, 1.0)]
     orbit_doubts = max((orbit.doubts(instant) for instant in instants), key=len)
     doubt = max(orbit.doubt(instant) for instant in instants)
-    _hold_to_range(doubt, fitted.state.slant_range, orbit_doubts, orbit.remedy, name)
+    _hold_to_range(doubt, float(fitted.state.slant_range), orbit_doubts, orbit.remedy, name)
     age = None if orbit.epoch is None else center.since(orbit.epoch)
     doubts = (*orbit_doubts, *fitted.doubts)
     return _flown(fitted, orbit.words, file)._replace(

@@ -609,6 +609,11 @@ class Platform(NamedTuple):
                 position=self.position, velocity=self.velocity, acceleration=acceleration, bends=bends
             )
             return _with_fall(state)
+        # A file without position and velocity has these.
+        assert self.slant_range is not None
+        assert self.azimuth is not None
+        assert self.elevation is not None
+        assert self.speed is not None
         state = state_from_angles(
             slant_range=self.slant_range,
             azimuth=self.azimuth,
@@ -778,4 +783,4 @@ def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
     if not state.is_quadratic:
         yield from (half * step / 32 for step in range(-31, 32))
     elif state.acceleration[2] > 0:
-        yield max(-half, min(half, -state.velocity[2] / state.acceleration[2]))
+        yield max(-half, min(half, -float(state.velocity[2]) / float(state.acceleration[2])))

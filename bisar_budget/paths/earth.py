@@ -5,14 +5,14 @@ Earth-fixed axes: x through Greenwich on the equator, z through the north pole. 
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.arrays import PerCase
 from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2, EARTH_RADIUS_M
-from bisar_budget.geometry import Axes, Vector, cross, dot, unit
+from bisar_budget.geometry import Axes, Vector, Vectors, cross, dot, unit
 
 Floats = NDArray[np.float64]
 
@@ -53,22 +53,34 @@ class SceneAxes:
         turned: Floats = (earth_fixed - np.array(self.origin)) @ np.array(self.axes).T
         return turned
 
-    def turned(self, earth_fixed: Vector) -> Vector:
+    @overload
+    def turned(self, earth_fixed: Vector) -> Vector: ...
+    @overload
+    def turned(self, earth_fixed: Vectors) -> Vectors: ...
+    def turned(self, earth_fixed: Vectors) -> Vectors:
         """A direction or velocity in the scene's axes."""
         east, north, up = self.axes
         return (dot(east, earth_fixed), dot(north, earth_fixed), dot(up, earth_fixed))
 
-    def earth_fixed(self, position: Vector) -> Vector:
+    @overload
+    def earth_fixed(self, position: Vector) -> Vector: ...
+    @overload
+    def earth_fixed(self, position: Vectors) -> Vectors: ...
+    def earth_fixed(self, position: Vectors) -> Vectors:
         """A position in the scene in Earth-fixed axes. [m]"""
         x, y, z = self.turned_back(position)
         return (x + self.origin[0], y + self.origin[1], z + self.origin[2])
 
-    def turned_back(self, vector: Vector) -> Vector:
+    @overload
+    def turned_back(self, vector: Vector) -> Vector: ...
+    @overload
+    def turned_back(self, vector: Vectors) -> Vectors: ...
+    def turned_back(self, vector: Vectors) -> Vectors:
         """A direction or velocity of the scene in Earth-fixed axes."""
         x, y, z = (dot(axis, vector) for axis in zip(*self.axes, strict=True))
         return (x, y, z)
 
-    def radial(self, position: Vector, velocity: Vector) -> Axes:
+    def radial(self, position: Vectors, velocity: Vectors) -> Axes:
         """Axes of the `ric` frame of a platform, in the scene's axes.
 
         Radial: away from the Earth's centre. Cross-track: normal of the plane of the position and of the velocity
@@ -83,7 +95,11 @@ class SceneAxes:
         return self.turned(radial), self.turned(cross(across, radial)), self.turned(across)
 
 
-def free_fall(position: Vector, velocity: Vector, axes: SceneAxes | None) -> Vector:
+@overload
+def free_fall(position: Vector, velocity: Vector, axes: SceneAxes | None) -> Vector: ...
+@overload
+def free_fall(position: Vectors, velocity: Vectors, axes: SceneAxes | None) -> Vectors: ...
+def free_fall(position: Vectors, velocity: Vectors, axes: SceneAxes | None) -> Vectors:
     """Acceleration of a body in free fall, in the axes of a scene. [m/s²]
 
     Parameters

@@ -138,13 +138,14 @@ def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
     Numbers of the path may be arrays (cases,). The 5 % are those of gravity μ/r².
     """
     fall = of_scene(axes)
-    offset = tuple(x - c for x, c in zip(path.position, fall.centre, strict=True))
-    distance = norm(offset)
+    x, y, z = (component - centre for component, centre in zip(path.position, fall.centre, strict=True))
+    distance = norm((x, y, z))
     is_high = distance - EARTH_RADIUS_M > LEAST_FALLING_HEIGHT_M
     if not np.any(is_high):
         return None
     falling = free_fall(path.position, path.velocity, axes)
-    apart = norm(tuple(a - b for a, b in zip(path.acceleration, falling, strict=True)))
+    u, v, w = (stated - fallen for stated, fallen in zip(path.acceleration, falling, strict=True))
+    apart = norm((u, v, w))
     falls = is_high & (apart <= FREE_FALL_FRACTION * EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**2)
     if not np.any(falls):
         return None

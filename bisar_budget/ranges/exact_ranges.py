@@ -34,18 +34,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
-from bisar_budget.geometry import GroundVector, PlatformState, Vectors, dot, norm
+from bisar_budget.geometry import GroundVector, PlatformState, VectorArrays, Vectors, dot, norm
 from bisar_budget.image_plane import FEWEST_PATH_NODES, LEGENDRE_LEADING, GroundMatrix, Sampling, band_variance, nodes
 
 if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Truths = NDArray[np.bool_]
+Shifts = Sequence[Sequence[Floats] | Floats]  # east, north and up of each platform, (nodes, lanes) or alike. [m]
 
 FINE_NODE_COUNT = 24  # nodes of courses less smooth than the courses of (22)
 RANGE_ROUNDING_FRACTION = 2e-15  # rounding error of a few operations, as a fraction of a range sum
@@ -128,10 +126,10 @@ class Effect(NamedTuple):
     phase at the aperture edge. [rad/unit]
     """
 
-    constant: Any
-    linear: Any
-    qpe: Any
-    cubic: Any
+    constant: PerCase
+    linear: PerCase
+    qpe: PerCase
+    cubic: PerCase
 
 
 class FullEffect(NamedTuple):
@@ -141,10 +139,10 @@ class FullEffect(NamedTuple):
     that is left at the displaced point. [rad/unit]
     """
 
-    east: Any
-    north: Any
-    qpe: Any
-    cubic: Any
+    east: PerCase
+    north: PerCase
+    qpe: PerCase
+    cubic: PerCase
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -291,7 +289,7 @@ class ImagePoints(NamedTuple):
     at the centre.
     """
 
-    is_settled: Truths
+    is_settled: Booleans
     east: Floats
     north: Floats
     quadratic: Floats
@@ -356,8 +354,8 @@ class ExactRanges:
         k: Floats,
         band: Floats,
         sampling: Sampling,
-        tracks: Sequence[Vectors],
-        positions: Sequence[Vectors],
+        tracks: Sequence[VectorArrays],
+        positions: Sequence[VectorArrays],
         *,
         has_direct_path: bool = False,
     ) -> None:
@@ -375,7 +373,7 @@ class ExactRanges:
         cls,
         paths: Sequence[PlatformState],
         radar: "Radar",
-        aperture_time: Any,
+        aperture_time: PerCase,
         count: int,
         cases: int = 1,
         *,
@@ -383,7 +381,7 @@ class ExactRanges:
     ) -> "ExactRanges":
         """Exact ranges of collections, with paths of transmitter and receiver, at their scene centres."""
 
-        def of_each(value: Any) -> Floats:
+        def of_each(value: PerCase) -> Floats:
             return np.array(np.broadcast_to(np.asarray(value, dtype=float), (cases,)))
 
         half, k, band = (
@@ -441,7 +439,7 @@ class ExactRanges:
         return np.asarray(POINT_SETTINGS.near_fold_fraction**2 * self.matrix.determinant)
 
     @cached_property
-    def is_turned(self) -> Truths:
+    def is_turned(self) -> Booleans:
         """Whether a line of sight turns by more than `MAX_TURN_RAD` between two times of the aperture, (n,)."""
         least = np.full(self.half.shape, math.inf)
         if self.fit.shape[1] > FEWEST_PATH_NODES:  # with fewer nodes no line of sight turns that far
@@ -471,7 +469,7 @@ class ExactRanges:
         return np.asarray(RANGE_ROUNDING_FRACTION * self.k * recorded)
 
     @cached_property
-    def _between(self) -> Vectors:
+    def _between(self) -> VectorArrays:
         """Position of the transmitter relative to the receiver at the nodes. [m]"""
         (x, y, z), (u, v, w) = self.tracks
         return (x - u, y - v, z - w)
@@ -482,7 +480,7 @@ class ExactRanges:
         return np.asarray(norm(self._between))
 
     @cached_property
-    def heard_along(self) -> tuple[Vectors, Vectors]:
+    def heard_along(self) -> tuple[VectorArrays, VectorArrays]:
         """Unit vectors along the direct path at the nodes: receiver to transmitter, transmitter to receiver."""
         x, y, z = (component / self.baselines for component in self._between)
         return ((x, y, z), (-x, -y, -z))
@@ -493,7 +491,7 @@ class ExactRanges:
         """Position error at the nodes by a unit of an error: 1, τ or τ²/2 of (22)."""
         return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
 
-    def clock_course(self, terms: Sequence[Any]) -> Floats:
+    def clock_course(self, terms: Sequence[PerCase]) -> Floats:
         """Range error at the nodes of a clock error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³, by its terms. [m]"""
         seconds = np.zeros_like(self.times)
         for term in reversed(terms):
@@ -589,7 +587,7 @@ class ExactRanges:
         # Where terms cancel exactly, the rest is rounding and would give a limit where none exists.
         return FullEffect(_unless_rounding(east, seen_east), _unless_rounding(north, seen_north), *phases)
 
-    def left_of_small(self, range_error: Floats, moved: tuple[Any, Any]) -> Floats:
+    def left_of_small(self, range_error: Floats, moved: tuple[PerCase, PerCase]) -> Floats:
         """Range error that small errors (..., nodes, cases) leave at the point they move to, (..., cases). [m]"""
         (by_east, by_north), (east, north) = self.slopes, (np.asarray(component)[..., None, :] for component in moved)
         return np.asarray(range_error + by_east * east + by_north * north)
@@ -611,7 +609,9 @@ class ExactRanges:
         return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEGENDRE_LEADING)
 
     # ------------------------------------------------------------------ errors of any size
-    def phases(self, lanes: Lanes, size: Floats, near: tuple[Any, Any], *, is_at_fold: bool = False) -> ImagePoints:
+    def phases(
+        self, lanes: Lanes, size: Floats, near: tuple[Floats, Floats], *, is_at_fold: bool = False
+    ) -> ImagePoints:
         """Find the point to which errors of given sizes move a point at the centre, and the defocus there.
 
         The search starts `near` [m]. It finds a point where it settles at once, or, `is_at_fold`, where V leads down
@@ -620,7 +620,7 @@ class ExactRanges:
         """
         return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
-    def left_over(self, lanes: Lanes, size: Floats, point: tuple[Any, Any]) -> Floats:
+    def left_over(self, lanes: Lanes, size: Floats, point: tuple[PerCase, PerCase]) -> Floats:
         """Range error at the nodes that errors leave at ground points, (nodes, lanes). [m]"""
         lane_count = lanes.case.size
         room = self._room(lane_count)
@@ -921,7 +921,7 @@ def _solved(bends: Sequence[Floats], slope: Floats) -> Floats:
 
 
 def _unresolved(
-    orders: Floats, squares: tuple[Floats, Floats], k: Floats, band: Floats, is_turned: Truths
+    orders: Floats, squares: tuple[Floats, Floats], k: Floats, band: Floats, is_turned: Booleans
 ) -> tuple[Floats, Floats]:
     """Hidden phase, and rms beyond the cubic, by orders 0 to 3 at the edge [m] and mean squares. [m²], [rad]"""
     _, slope, _, cubic = orders
@@ -954,7 +954,7 @@ def _grown(measured: Floats, point: Floats, room: Floats) -> tuple[Floats, Float
     return grown, looks, distances
 
 
-def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Indices) -> ImagePoints:
+def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -> ImagePoints:
     """Find where errors of any course move a point at the centre, if necessary in steps from no error on.
 
     Parameters
@@ -1001,7 +1001,7 @@ def _within_ends(points: ImagePoints) -> ImagePoints:
     return ImagePoints(points.is_settled & ~is_gone, *(np.where(is_gone, math.nan, column) for column in points[1:]))
 
 
-def _take(arrays: Sequence[Floats], indices: Indices) -> list[Floats]:
+def _take(arrays: Sequence[Floats] | Floats, indices: Indices) -> list[Floats]:
     """Some lanes of arrays (nodes, lanes). An array that all lanes share stays as it is."""
     return [array if array.shape[-1] == 1 else array.take(indices, axis=-1) for array in arrays]
 

@@ -7,11 +7,10 @@ no crest between smaller sizes may be above it. All searches take each step toge
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 
-from bisar_budget.ranges.exact_ranges import Floats, Indices, Truths
+from bisar_budget.arrays import Booleans, Floats, Indices
 from bisar_budget.ranges.point_paths import (
     AREA,
     CUBIC,
@@ -111,14 +110,14 @@ class LimitSearches:
     first: Floats
     largest: Floats
     group: Indices
-    is_alone: Truths
+    is_alone: Booleans
 
     @classmethod
     def joined(cls, searches: "list[LimitSearches]") -> "LimitSearches":
         """All searches of a list."""
         return cls(*(np.concatenate([getattr(each, field.name) for each in searches]) for field in fields(cls)))
 
-    def of(self, index: Any) -> "LimitSearches":
+    def of(self, index: Indices) -> "LimitSearches":
         """Some of the searches."""
         return LimitSearches(*(getattr(self, field.name)[index] for field in fields(self)))
 
@@ -187,7 +186,7 @@ class _SearchState:
         self.size = np.where(is_known, points[SIZE], math.nan)
         self.square = np.where(is_known, searches.square(points), math.nan)
         reaches = self.square >= 1 - 2 * LIMIT_FRACTION
-        self.is_between: Truths = np.asarray(reaches.any(axis=1))
+        self.is_between: Booleans = np.asarray(reaches.any(axis=1))
         first_above = np.where(self.is_between, reaches.argmax(axis=1), self.count)
         self._set_slopes(every)
         self.doubtful = self._doubtful_sizes(first_above)
@@ -230,7 +229,7 @@ class _SearchState:
         is_below = np.arange(1, self.size.shape[1]) < first_above[:, None]
         return np.where(is_below & (low < self.bound[:, None]), size, math.nan)
 
-    def _between(self, every: Indices, first_above: Indices) -> tuple[Floats, Truths]:
+    def _between(self, every: Indices, first_above: Indices) -> tuple[Floats, Booleans]:
         """Size at which a cubic between known points reaches the limit, and whether it is close enough."""
         high = np.minimum(first_above, self.size.shape[1] - 1)
         low = high - 1
@@ -274,7 +273,7 @@ class _SearchState:
         power = np.where(below < above, rise / growth, 2.0)
         return np.asarray(self.size[every, high] * self.square[every, high] ** (-1 / power))
 
-    def _ahead(self, every: Indices, last: Indices) -> tuple[Floats, Truths]:
+    def _ahead(self, every: Indices, last: Indices) -> tuple[Floats, Booleans]:
         """Size at which a parabola through the last points reaches the limit, and whether it is close enough."""
         before = np.maximum(last - 1, 0)
         slope = self.slope[every, last]

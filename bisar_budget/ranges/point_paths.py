@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bisar_budget.arrays import Booleans, Floats, Indices
 from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
-from bisar_budget.ranges.exact_ranges import POINT_SETTINGS, ExactRanges, Floats, Indices, Lanes, Truths
+from bisar_budget.ranges.exact_ranges import POINT_SETTINGS, ExactRanges, Lanes
 
 # Rows of a known point: the size of the error [unit], then the fields of `ImagePoints`.
 SIZE, EAST, NORTH, QUADRATIC, CUBIC, HIDDEN, REST, AREA = ROWS = range(8)
@@ -216,7 +217,7 @@ class PointPaths:
         return lane[order], index[order], size[order], to_fold[order]
 
     def _shorten_step(
-        self, lane: Indices, point: Floats, before: Floats, reached: Floats, to_fold: Floats, is_end: Truths
+        self, lane: Indices, point: Floats, before: Floats, reached: Floats, to_fold: Floats, is_end: Booleans
     ) -> None:
         """Note the ends of paths where a step missed, or make the next step shorter."""
         end = _end_between(before, point)
@@ -312,7 +313,7 @@ class PointPaths:
         return np.where(is_start, u, east), np.where(is_start, v, north)
 
 
-def _is_near(last: Floats, point: Floats, expected: tuple[Floats, Floats]) -> Truths:
+def _is_near(last: Floats, point: Floats, expected: tuple[Floats, Floats]) -> Booleans:
     """Whether points are near enough to their prediction to be on the path."""
     stray = np.hypot(point[EAST] - expected[0], point[NORTH] - expected[1])
     predicted_step = np.hypot(expected[0] - last[EAST], expected[1] - last[NORTH])

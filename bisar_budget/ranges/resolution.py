@@ -11,14 +11,15 @@ is 0.886 as wide.
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.image_plane import Band, nodes
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 BENT_EDGE_FRACTION = 0.05  # of half the support; edges that bend less leave the closed widths right to 1 %
 _HALF_POWER = 0.5
@@ -37,13 +38,13 @@ class Resolution(NamedTuple):
     A support that is no parallelogram may have no null. Then the first minimum counts.
     """
 
-    range: Any
-    cross_range: Any
-    range_half_power: Any
-    cross_range_half_power: Any
+    range: PerCase
+    cross_range: PerCase
+    range_half_power: PerCase
+    cross_range_half_power: PerCase
 
 
-def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aperture_time_s: Any) -> Resolution:
+def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aperture_time_s: PerCase) -> Resolution:
     """Resolution at the scene centre, (cases,)."""
     cases, matrix = exact.half.size, exact.matrix
     with np.errstate(all="ignore"):
@@ -79,19 +80,19 @@ def cells_of_support(sight: Floats, axes: Floats, radar: Band) -> Floats:
     return SPEED_OF_LIGHT_MPS / extent
 
 
-def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, across: Floats) -> Any:
+def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, across: Floats) -> Booleans:
     """Whether the support is close enough to a parallelogram for the closed widths."""
     band = np.hypot(*exact.gradient[:, 0]) * relative_band / 2
     _, _, *bends = np.abs(np.einsum("aon,an->on", exact.gradient, conjugate))
     _, turn, *bends_across = np.abs(np.einsum("aon,an->on", exact.gradient, across))
-    return (sum(bends) <= BENT_EDGE_FRACTION * band) & (sum(bends_across) <= BENT_EDGE_FRACTION * turn)
+    return np.asarray((sum(bends) <= BENT_EDGE_FRACTION * band) & (sum(bends_across) <= BENT_EDGE_FRACTION * turn))
 
 
-def _slopes(geometry: BistaticGeometry, half: Floats, some: Any, count: int) -> Floats:
-    """Sum of both lines of sight over the ground in some cases, at `count` nodes, (2, nodes, some)."""
-    slopes = np.zeros((2, count, some.size))
+def _slopes(geometry: BistaticGeometry, half: Floats, indices: Indices, count: int) -> Floats:
+    """Sum of both lines of sight over the ground in some cases, at `count` nodes, (2, nodes, cases)."""
+    slopes = np.zeros((2, count, indices.size))
     for path in geometry.both:
-        x, y, z = path.of(some).place(nodes(count).places[:, None] * half[some])
+        x, y, z = path.of(indices).place(nodes(count).places[:, None] * half[indices])
         slopes += np.array(np.broadcast_arrays(x, y)) / np.sqrt(x * x + y * y + z * z)
     return slopes
 

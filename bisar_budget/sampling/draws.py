@@ -18,12 +18,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.arrays import Floats
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.faults import printable
 from bisar_budget.geometry import PlatformState
 from bisar_budget.memory import is_spacious
-from bisar_budget.ranges.exact_ranges import NO_SHIFTS, ExactRanges, Floats, ImagePoints, followed
+from bisar_budget.ranges.exact_ranges import NO_SHIFTS, ExactRanges, ImagePoints, followed
 
 if TYPE_CHECKING:
     from bisar_budget.workers import MapBlocks

@@ -99,7 +99,7 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
     singles = {source.id: source for source in analysis.stated}
     for group in analysis.groups:
         members = [singles.pop(row_id) for row_id in group.ids]
-        values, vectors = eigensystem(group.correlation)
+        values, vectors = eigensystem([[float(rho) for rho in row] for row in group.correlation])
         for index, value in enumerate(values):
             # To six decimals a correlation matrix may have an eigenvalue just below zero.
             scale = math.sqrt(max(0.0, value)) / factor

@@ -156,7 +156,7 @@ class RangeLines:
         if not area:
             raise ValueError("range or Doppler does not change over the ground there: no image plane")
         wavelength = SPEED_OF_LIGHT_MPS / radar.center_frequency
-        return SPEED_OF_LIGHT_MPS / (radar.bandwidth * steepness), wavelength / (area / steepness)
+        return float(SPEED_OF_LIGHT_MPS / (radar.bandwidth * steepness)), float(wavelength / (area / steepness))
 
     def sampled(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
         """Cells for pixels to sample: `cells`, or finer cells across the lines. [m]
@@ -169,7 +169,9 @@ class RangeLines:
             return across, along
         first, middle, last = self._sums(np.asarray(centre, dtype=float))
         column = self._column(middle, last - first) * float(np.hypot(*middle))  # by a metre across the lines
-        wider = abs(float(((first + last) / 2 - middle) @ column)) * radar.center_frequency / SPEED_OF_LIGHT_MPS
+        wider = (
+            abs(float(((first + last) / 2 - middle) @ column)) * float(radar.center_frequency) / SPEED_OF_LIGHT_MPS
+        )
         return min(across, _MAX_SPECTRUM_CELLS / (1 / across + wider)), along
 
     def offsets(self, ground_points: Floats, centre: GroundVector, radar: Band) -> Floats:
@@ -319,7 +321,7 @@ class PointCollection:
             return Flight(transmitter, receiver, clock, clock)
         square = self.radar.center_frequency**2
         group = errors.electrons.at(slow_time)
-        seen = clock + seen_course(group, errors.electrons.mean, CONTENT) / square
+        seen = clock + seen_course(group, np.asarray(errors.electrons.mean), CONTENT) / square
         return Flight(transmitter, receiver, clock, seen, group)
 
     def record(

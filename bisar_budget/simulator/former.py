@@ -88,7 +88,7 @@ class ExactRangeFormer:
 
     def _formed(self, history: PhaseHistory, points: Floats) -> Complexes:
         formed = matched_filter(history, points) if self.is_direct else backprojection(history, points, self.kernel)
-        formed *= self.lines.baseband(points, SPEED_OF_LIGHT_MPS / self.radar.center_frequency)
+        formed *= self.lines.baseband(points, SPEED_OF_LIGHT_MPS / float(self.radar.center_frequency))
         return formed
 
 

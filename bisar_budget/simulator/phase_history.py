@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
-from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector, Vectors
+from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector, VectorArrays
 from bisar_budget.image_plane import LEGENDRE_LEADING, Sampling, band_variance
 from bisar_budget.mission.model import Radar
 from bisar_budget.ranges.exact_ranges import ExactEffect, ExactRanges, followed
@@ -517,7 +517,7 @@ def exact_effect(
     return ExactEffect((east, north), *phases)
 
 
-def _columns(positions: Floats) -> Vectors:
+def _columns(positions: Floats) -> VectorArrays:
     """Components x, y and z of positions (..., 3), each (..., 1)."""
     x, y, z = np.moveaxis(positions, -1, 0)[..., None]
     return x, y, z

@@ -13,7 +13,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.combined import correlated_errors, likely_error
 from bisar_budget.effects.effect import PLATFORMS, LinePiece, gradients_of, indicated_point
 from bisar_budget.effects.vibration import counted, lines_of, sight_of
-from bisar_budget.geometry import GroundVector, PlatformState, dot
+from bisar_budget.geometry import GroundVector, PlatformState, dot, plain_vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError as DeclaredError
 from bisar_budget.ranges.exact_ranges import ExactEffect
@@ -402,7 +402,7 @@ def declared_errors(mission: Mission) -> Errors:
         wideband = declared.vibration.wideband
         error = error._replace(
             sinusoids=_sinusoids(mission, name),
-            wideband_rms=counted(mission, name, wideband.rms, "islr") if wideband else 0.0,
+            wideband_rms=float(counted(mission, name, wideband.rms, "islr") if wideband else 0.0),
             course=getattr(errors, name).course,
         )
         errors = errors.of(name, error)
@@ -422,11 +422,11 @@ def _turned(vectors: Sequence[Sequence[float] | None], state: PlatformState, fra
     for vector in vectors:
         components = (0.0, 0.0, 0.0) if vector is None else vector
         x, y, z = (factor * sum(d * axis[i] for d, axis in zip(components, axes, strict=True)) for i in range(3))
-        turned.append((x, y, z))
+        turned.append(plain_vector((x, y, z)))
     position, velocity, acceleration = (*turned, (0.0, 0.0, 0.0))[:3]
     if frame == "ric" and state.fall is not None:
         u, v, w = (a + b for a, b in zip(velocity, state.fall.rate_against_stars(position), strict=True))
-        velocity = (u, v, w)
+        velocity = plain_vector((u, v, w))
     return PathError(position, velocity, acceleration)
 
 
@@ -542,7 +542,7 @@ def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
     error: DeclaredError = getattr(mission.platforms, name).motion_error
     line = error.vibration.sinusoidal[entry]
     if not isinstance(line.displacement, tuple):
-        return [PathSinusoid(lines_of(mission, name)[entry].amplitude, line.frequency)]
+        return [PathSinusoid(float(lines_of(mission, name)[entry].amplitude), line.frequency)]
     axes, sight = getattr(mission.geometry, name).frame(error.frame), sight_of(mission, name)
     return [
         PathSinusoid(size, line.frequency, 0.0 if dot(axis, sight) >= 0 else math.pi, axis)

@@ -147,7 +147,7 @@ def zenith_delays(
     """Delays at the zenith in declared sigmas, (draws, times): constant, or correlated over time."""
     correlation_time = correlation_time_of(mission, error.owner)
     if correlation_time is not None:
-        return _correlated(correlation_time, times, draws, rng)
+        return _correlated(float(correlation_time), times, draws, rng)
     return np.multiply.outer(rng.standard_normal(draws), np.ones(times.size))
 
 
@@ -435,8 +435,8 @@ def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...
     metres, T = mission.radar.wavelength / (2 * math.pi), mission.collection.aperture_time
     return tuple(
         PathSinusoid(
-            metres * tone.free * tone.sensitivity * share,
-            frequency,
+            float(metres * tone.free * tone.sensitivity * share),
+            float(frequency),
             0.0 if tone.in_quadrature is None or index else math.pi / 2,
         )
         for tone in accelerated_tones(mission)
@@ -457,11 +457,11 @@ def _folded_tones(mission: Mission, error: RandomError) -> list[tuple[float, flo
     tones: list[tuple[float, LeftTone]] = []
     if error.subject.axis == "acceleration":
         of_platform = [tone for tone in accelerated_tones(mission) if tone.name == name]
-        tones = [(tone.free, tone.left) for tone in of_platform if tone.frequency * T >= SLOWEST_ECHO_CYCLES]
+        tones = [(float(tone.free), tone.left) for tone in of_platform if tone.frequency * T >= SLOWEST_ECHO_CYCLES]
     elif error.subject.kind == "oscillator":
-        tones = [(spur.free, spur.left) for spur in spurs_of(mission) if spur.name == name]
+        tones = [(float(spur.free), spur.left) for spur in spurs_of(mission) if spur.name == name]
     return [
-        (frequency, free * share)
+        (float(frequency), free * float(share))
         for free, residual in tones
         for frequency, share in zip(residual.frequencies, residual.shares, strict=True)
         if frequency * T < SLOWEST_ECHO_CYCLES and share
@@ -587,7 +587,7 @@ class _Tones:
         self.count = self.slow.size
         for piece in narrow:
             width = (piece.high - piece.low) / _TONES_PER_NARROW_PIECE
-            frequencies = piece.low + width * (np.arange(_TONES_PER_NARROW_PIECE) + 0.5)
+            frequencies = piece.low + width * (np.arange(_TONES_PER_NARROW_PIECE, dtype=float) + 0.5)
             self.slow = np.append(self.slow, frequencies)
             self.slow_size = np.append(self.slow_size, np.sqrt(piece.at(frequencies) * width))
         pieces = _above(pieces, float(slow[-1]))

@@ -292,7 +292,7 @@ def _evidence(study: Study, file: str, subject: Subject, verdict: Verdict) -> Im
     evidence = ImageEvidence(
         file=file,
         verdict=verdict,
-        look_azimuth_rad=study.geometry.look_azimuth,
+        look_azimuth_rad=float(study.geometry.look_azimuth),
         at_limit=_shown(study.at_limit(subject, verdict.boundary_error)),
     )
     if verdict.boundary_autofocus is None or verdict.measured_residual_qpe_rad is None:

@@ -55,7 +55,7 @@ def slow_vibration(study: Study, vibration: Subject) -> Verdict:
     lines = sinusoids_of(mission, name, entry)
     use = float(tone.declared.judged(1.0)[0]) / budget
     if not use or (len(lines) == 1 and lines[0].axis is None):
-        lines, use = [PathSinusoid(size, line.frequency)], 1.0
+        lines, use = [PathSinusoid(size, float(line.frequency))], 1.0
     try:
         worst = [_worst_phase(study, name, sine._replace(amplitude=sine.amplitude / use)) for sine in lines]
         images = [study.images(errors) for errors in worst]
@@ -179,7 +179,7 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
     walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # λN/2 over c/B
     blank = study.blank("mission.autofocus_pull_in", phase, "rad", budget_rad=budget)
     clock = next(s for s in study.sources if s.id == "timing.quadratic")
-    fields = refocused(study, [(clock, phase / abs(clock.effect.qpe))], budget, holds_hidden=False)
+    fields = refocused(study, [(clock, phase / abs(float(clock.effect.qpe)))], budget, holds_hidden=False)
     reason = reasons.range_walk(walk, range_walk_cap(study.mission))
     return blank._replace(boundary_autofocus=phase, **fields, verdict=fields["verdict_autofocus"], reason=reason)
 
@@ -292,7 +292,7 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
         measured_beyond_rad=beyond,
         displacement_published_m=published_displacement(study, sizes, scale),
         displacement_full_m=images.effect.displacement,
-        smear_azimuth_published_rad=(study.geometry.look_azimuth + math.pi / 2) % math.pi,
+        smear_azimuth_published_rad=(float(study.geometry.look_azimuth + math.pi / 2) % math.pi),
         verdict=verdict,
         reason=remark.then(unusual) if remark else unusual or None,
     )

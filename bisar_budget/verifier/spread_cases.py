@@ -136,7 +136,7 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
             if cycles < SLOWEST_ECHO_CYCLES or not tone:
                 continue  # a phase, verified by `phase_cases`; or no requirement limits it
             vibration, alone = subject(name, "vibration", "sinusoidal", entry=index), {name: tone[name]}
-            unseen = blank(vibration, alone, pslr, per_metre)
+            unseen = blank(vibration, alone, pslr, float(per_metre))
             if pslr is not None:
                 yield vibration, partial(_sinusoidal, study, unseen, alone, frequency)
             else:
@@ -177,7 +177,9 @@ def _near(study: Study, blank: Verdict, name: str, limit: float, lines: Sequence
         return blank._replace(reason=reasons.lines_without_amplitude())
     scale = limit / worst.amplitude
     sinusoids = tuple(
-        PathSinusoid(scale * line.amplitude, line.frequency, 0.0 if np.sinc(worst.cycles - n) >= 0 else math.pi)
+        PathSinusoid(
+            float(scale * line.amplitude), line.frequency, 0.0 if np.sinc(worst.cycles - n) >= 0 else math.pi
+        )
         for line, n in zip(lines, cycles, strict=True)
     )
     return echo(study, blank, {name: sinusoids}, "one platform's lines in their worst phases")
@@ -314,7 +316,7 @@ def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
         is_fast = tone.frequency * study.collection.aperture_time >= SLOWEST_ECHO_CYCLES
         if tone.name in sizes and is_fast and tone.per_unit:
             sensitivity = 2 * math.pi / wavelength * sizes[tone.name] / tone.per_unit
-            yield case(tone.subject, sensitivity, "s^2/m", tone.frequency)
+            yield case(tone.subject, sensitivity, "s^2/m", float(tone.frequency))
 
 
 def _spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cycles: float) -> Verdict:
@@ -493,7 +495,7 @@ def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator)
     if correlation_time is None:
         return zenith_delays(study.mission, error, aperture_nodes(T), _SIGMA_DRAWS, rng)
     times = _moments(study, _SERIES_SAMPLES)
-    smooth = _smooth_at_nodes(T, times).T * math.sqrt(_power_of_samples(times, correlation_time))
+    smooth = _smooth_at_nodes(T, times).T * math.sqrt(_power_of_samples(times, float(correlation_time)))
     drawn = [
         zenith_delays(study.mission, error, times, _DELAY_BLOCK_DRAWS, rng) @ smooth
         for _ in range(_SIGMA_DRAWS // _DELAY_BLOCK_DRAWS)

@@ -141,7 +141,7 @@ class Study:
     def errors(self, source: ErrorSource, size: float) -> Errors:
         """Return the errors of an image with one error of a size."""
         if source.clock is not None:
-            return Errors(clock=tuple(size * term for term in source.clock))
+            return Errors(clock=tuple(size * float(term) for term in source.clock))
         errors = Errors()
         for platform_index in source.platforms:
             if source.is_time_tag:

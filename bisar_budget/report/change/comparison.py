@@ -106,15 +106,15 @@ def moved_geometry(before: MissionFindings, after: MissionFindings) -> Iterator[
 def _numbers(findings: MissionFindings) -> Iterator[tuple[str, str, float | None]]:
     geometry = findings.geometry
     for name, state in (("transmitter", geometry.transmitter), ("receiver", geometry.receiver)):
-        yield f"{name} slant range", "m", state.slant_range
+        yield f"{name} slant range", "m", float(state.slant_range)
         yield f"{name} azimuth", "deg", math.degrees(state.azimuth)
         yield f"{name} elevation", "deg", math.degrees(state.elevation)
         yield f"{name} squint", "deg", None if state.squint is None else math.degrees(state.squint)
     yield "bistatic angle", "deg", math.degrees(geometry.bistatic_angle)
     yield "look azimuth", "deg", math.degrees(geometry.look_azimuth)
     yield "angle between range and Doppler gradients", "deg", math.degrees(geometry.gradient_angle)
-    yield "range resolution", "m", findings.resolution.range
-    yield "cross-range resolution", "m", findings.resolution.cross_range
+    yield "range resolution", "m", float(findings.resolution.range)
+    yield "cross-range resolution", "m", float(findings.resolution.cross_range)
 
 
 # ---------------------------------------------------------------------- loosened rules

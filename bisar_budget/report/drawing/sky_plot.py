@@ -116,7 +116,7 @@ def _sky(canvas: svg.Canvas, middle: svg.Point, passes: Passes) -> None:
         if overpass.state is None:
             marks.append(track[len(track) // 2])
             continue
-        marks.append(_at(middle, overpass.state.azimuth, overpass.state.elevation))
+        marks.append(_at(middle, float(overpass.state.azimuth), float(overpass.state.elevation)))
         canvas.circle(marks[-1], 4, f"dot is-{overpass.status}")
     _numbers(
         canvas,

@@ -7,13 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.arrays import NumbersOrWords
+from bisar_budget.arrays import Floats, NumbersOrWords
 from bisar_budget.design.cases import Cases, Values
 from bisar_budget.design.table import Part
 from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.mission.quantities import Number, QuestionError, Varied
 from bisar_budget.mission.readers import DIRECTION
-from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.report.drawing.svg import Point
 from bisar_budget.report.tables import Described
 

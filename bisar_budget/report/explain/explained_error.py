@@ -13,7 +13,7 @@ from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS, ErrorSource, subject
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.row import Row
-from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState
+from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState, plain_vector
 from bisar_budget.image_plane import LEGENDRE_LEADING
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import ExactRanges
@@ -94,7 +94,7 @@ def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterat
     size = 1.0 if source.declared is None else abs(source.declared)
     each = " of one unit" if source.declared is None else ""
     signed = math.copysign(size, source.declared or 1.0)
-    qpe = abs(source.effect.qpe) * size
+    qpe = abs(float(source.effect.qpe)) * size
     platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     gates_by_full = model == "full"
     if gates_by_full and source.is_motion and (source.owner != "mission" or source.is_time_tag):
@@ -136,7 +136,7 @@ def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
     """Coefficient β̃ of one unit. β̃₂ and β̃₃ follow from their phases at the aperture edge, (2π/λ)·β·(T/2)ⁿ."""
     if order < 2:
         return float(source.effect[order])
-    phase: float = source.effect.qpe if order == 2 else source.effect.cubic
+    phase = float(source.effect.qpe if order == 2 else source.effect.cubic)
     return phase * mission.radar.wavelength / (2 * math.pi * (mission.collection.aperture_time / 2) ** order)
 
 
@@ -146,9 +146,9 @@ def _motion_values(analysis: Analysis, platform: str, kind: str, axis: str, size
     return {
         "T": analysis.mission.collection.aperture_time,
         "λ": analysis.mission.radar.wavelength,
-        f"R_{s}": state.slant_range,
-        f"{axis}_{s}": state.position[index],
-        f"v_{axis}{s}": state.velocity[index],
+        f"R_{s}": float(state.slant_range),
+        f"{axis}_{s}": float(state.position[index]),
+        f"v_{axis}{s}": float(state.velocity[index]),
         notation.motion_symbol(kind, axis, platform): size,
     }
 
@@ -173,7 +173,7 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
         order = tuple(CLOCK_UNITS).index(source.subject.axis)
         terms = {order: size}
     else:
-        terms = {order: size * term for order, term in enumerate(source.clock or ()) if term}
+        terms = {order: size * float(term) for order, term in enumerate(source.clock or ()) if term}
         title = "Terms of the clock error t̃ at mid-aperture"
         lines: list[str | WorkedEquation] = []
         if kind == "frequency" and mission.has_direct_path:
@@ -194,7 +194,7 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
         formula = notation.clock_coefficient(order)
         yield step(f"Table I row 1{each}", WorkedEquation(f"β̃_{order}", formula, known_values, result, RATES[order]))
         if order == 2:
-            qpe = abs(source.effect.qpe * size)
+            qpe = abs(float(source.effect.qpe) * size)
             title = "Table I row 1, step of Table II"
             yield step(f"{title}{each}", WorkedEquation("QPE", notation.CLOCK_PHASE, known_values, qpe, "rad"))
 
@@ -214,7 +214,7 @@ def _common_effect(analysis: Analysis, source: ErrorSource, size: float, each: s
     values = {}
     for platform in PLATFORMS:
         leg, phase = _source_of(analysis, platform, kind, axis), f"φ_{platform[0]}"
-        values[phase] = leg.effect.qpe * size
+        values[phase] = float(leg.effect.qpe) * size
         leg_values = _motion_values(analysis, platform, kind, axis, size)
         for order, formula in notation.motion_coefficients(kind, axis, platform).items():
             leg_values[f"β̃_{order}"] = result = size * _coefficient(analysis.mission, leg, order)
@@ -226,7 +226,7 @@ def _common_effect(analysis: Analysis, source: ErrorSource, size: float, each: s
     if kind == "position":
         yield step(f"Table I: a position error moves the image, no quadratic term{each}")
         return
-    qpe = abs(source.effect.qpe * size)
+    qpe = abs(float(source.effect.qpe) * size)
     yield step(f"{source.equation}{each}, signed", WorkedEquation("QPE", "|φ_t + φ_r|", values, qpe, "rad"))
 
 
@@ -236,7 +236,10 @@ def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each:
         state: PlatformState = getattr(analysis.geometry, name)
         values = {"δt": size}
         lines: list[str | WorkedEquation | Sum] = []
-        for symbol, vector, unit in (("v", state.velocity, "m/s"), ("a", state.acceleration, "m/s^2")):
+        for symbol, vector, unit in (
+            ("v", plain_vector(state.velocity), "m/s"),
+            ("a", plain_vector(state.acceleration), "m/s^2"),
+        ):
             components = ", ".join(with_unit(component + 0.0, unit) for component in vector)
             lines.append(f"{symbol} = [{components}] of the {name}")
             speed = math.sqrt(math.fsum(component * component for component in vector))
@@ -249,15 +252,15 @@ def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each:
     unit = f"rad per {source.unit}"
     yield step(
         f"{source.equation}: Table II times v, a and the jerk, added",
-        f"QPE/unit = {with_unit(source.effect.qpe, unit)}",
+        f"QPE/unit = {with_unit(float(source.effect.qpe), unit)}",
     )
     yield _times_declared(source, size, each)
 
 
 def _times_declared(source: ErrorSource, size: float, each: str) -> Step:
     """Step from the effect of one unit to that of the declared size."""
-    values = {"QPE/unit": abs(source.effect.qpe), "declared": size}
-    qpe = abs(source.effect.qpe) * size
+    values = {"QPE/unit": abs(float(source.effect.qpe)), "declared": size}
+    qpe = abs(float(source.effect.qpe)) * size
     return step(f"Quadratic phase error{each}", WorkedEquation("QPE", "QPE/unit*declared", values, qpe, "rad"))
 
 
@@ -265,8 +268,8 @@ def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[
     """Effects along the axes of the scene, projected on the axis of the error: text and value of the sum."""
     _, _, kind, axis, frame, _ = source.subject
     state: PlatformState = getattr(analysis.geometry, platform)
-    direction = state.frame(frame)[FRAME_AXES[frame].index(axis)]
-    effects = [_source_of(analysis, platform, kind, letter).effect.qpe for letter in notation.AXIS_LETTERS]
+    direction = plain_vector(state.frame(frame)[FRAME_AXES[frame].index(axis)])
+    effects = [float(_source_of(analysis, platform, kind, letter).effect.qpe) for letter in notation.AXIS_LETTERS]
     pairs = list(zip(effects, direction, strict=True))
     return " + ".join(f"{number(q)}*{number(d)}" for q, d in pairs), math.fsum(q * d for q, d in pairs)
 
@@ -285,7 +288,7 @@ def _common_projected_effect(analysis: Analysis, source: ErrorSource, size: floa
             Sum(f"{symbol} = {terms} = {with_unit(leg, unit)}"),
         )
     values["declared"] = size
-    qpe = abs(source.effect.qpe) * size
+    qpe = abs(float(source.effect.qpe)) * size
     worked = WorkedEquation("QPE", "|φ_t/unit + φ_r/unit|*declared", values, qpe, "rad")
     yield step(f"{source.equation}{each}, signed", worked)
 
@@ -296,7 +299,7 @@ def _projected_effect(analysis: Analysis, source: ErrorSource, size: float, each
     unit = f"rad per {source.unit}"
     yield step(
         f"{source.equation}, {unit.replace('^2', '²')} along x, y, z times the {source.subject.axis} axis",
-        Sum(f"QPE/unit = |{terms}| = {with_unit(abs(source.effect.qpe), unit)}"),
+        Sum(f"QPE/unit = |{terms}| = {with_unit(abs(float(source.effect.qpe)), unit)}"),
     )
     yield _times_declared(source, size, each)
 

@@ -225,7 +225,7 @@ def _cells(overpass: SatellitePass) -> tuple[str, ...]:
         str(overpass.number),
         _seconds(overpass.center) if overpass.center is not None else f"{_seconds(overpass.culmination)}*",
         f"{minutes:.1f}" if minutes < 1000 else f"{minutes:.0f}",
-        f"{_degrees(None if state is None else state.elevation)}/{_degrees(overpass.max_elevation)}",
+        f"{_degrees(None if state is None else float(state.elevation))}/{_degrees(overpass.max_elevation)}",
         _degrees(overpass.bearing),
         overpass.side or "-",
         "-" if state is None else "asc" if overpass.is_ascending else "desc",
@@ -375,8 +375,8 @@ def _description(overpass: SatellitePass, passes: Passes) -> Iterator[str]:
     if overpass.center is not None and state is not None:
         yield f"Mid-time {overpass.center.as_text()}"
         yield (
-            f"Elevation {_degrees(state.elevation, 1)} deg from {_degrees(overpass.bearing)} deg "
-            f"(north, clockwise), {format_quantity(state.slant_range, 'm')} away"
+            f"Elevation {_degrees(float(state.elevation), 1)} deg from {_degrees(overpass.bearing)} deg "
+            f"(north, clockwise), {format_quantity(float(state.slant_range), 'm')} away"
         )
         yield f"{sentence(direction(overpass))}, looks {overpass.side}"
     yield f"Highest {_degrees(overpass.max_elevation, 1)} deg at {overpass.culmination.as_text()}"

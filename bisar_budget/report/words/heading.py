@@ -104,7 +104,7 @@ def document_words(document: Document) -> str:
 
 def narrow_gradients(geometry: BistaticGeometry) -> str:
     """Warning that displacements grow with a narrow angle between the gradients; empty from 30 degrees on."""
-    angle = geometry.gradient_angle
+    angle = float(geometry.gradient_angle)
     if math.degrees(angle) >= _NARROW_ANGLE_DEG:
         return ""
     return (
@@ -132,16 +132,17 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
         yield "Path", f"{name}: {path_words(path)}"
     yield (
         "Geometry",
-        f"bistatic angle {_degrees(geometry.bistatic_angle)}, look azimuth {_degrees(geometry.look_azimuth)}, "
-        f"range and Doppler gradients {_degrees(geometry.gradient_angle)} apart, "
+        f"bistatic angle {_degrees(float(geometry.bistatic_angle))}, "
+        f"look azimuth {_degrees(float(geometry.look_azimuth))}, "
+        f"range and Doppler gradients {_degrees(float(geometry.gradient_angle))} apart, "
         f"wavelength {format_quantity(mission.wavelength, 'm', 4)}",
     )
     yield (
         "Resolution",
-        f"{format_quantity(mission.resolution.range, 'm')} range, "
-        f"{format_quantity(mission.resolution.cross_range, 'm')} cross range (peak to null, on ground); "
-        f"{format_quantity(mission.resolution.range_half_power, 'm')} and "
-        f"{format_quantity(mission.resolution.cross_range_half_power, 'm')} wide at half power",
+        f"{format_quantity(float(mission.resolution.range), 'm')} range, "
+        f"{format_quantity(float(mission.resolution.cross_range), 'm')} cross range (peak to null, on ground); "
+        f"{format_quantity(float(mission.resolution.range_half_power), 'm')} and "
+        f"{format_quantity(float(mission.resolution.cross_range_half_power), 'm')} wide at half power",
     )
     if mission.peak_loss_db is not None:
         before = "" if allocation.n_pull is None else ", before autofocus"
@@ -203,8 +204,8 @@ def _platform(state: PlatformState, explains_squint: bool) -> str:
     if state.squint is not None:
         squint = f"squint {_degrees(state.squint)}" + (" off broadside" if explains_squint else "")
     return (
-        f"{format_quantity(state.slant_range, 'm', 4)} away, azimuth {_degrees(state.azimuth)}, "
-        f"elevation {_degrees(state.elevation)}, {squint}"
+        f"{format_quantity(float(state.slant_range), 'm', 4)} away, azimuth {_degrees(float(state.azimuth))}, "
+        f"elevation {_degrees(float(state.elevation))}, {squint}"
     )
 
 
