@@ -233,11 +233,13 @@ class ErrorBlock:
 
     def left_per_unit(self, indices: Sequence[int]) -> Floats:
         """Range error at the nodes that a small unit of some errors leaves, (errors, nodes, cases). [m]"""
-        table, full, sources = self.table, self.effects["full"], [self.sources[index] for index in indices]
+        full = self.effects["full"]
         if self.cases == 1:
-            range_error = self.exact.range_error(table.lanes(*sources)).T[..., None]
+            lanes = self.paths.lanes.of(self._lane[indices, 0])
+            range_error = self.exact.range_error(lanes).T[..., None]
         else:
-            range_error = np.stack([self.exact.range_error(table.lanes(source)) for source in sources])
+            sources = [self.sources[index] for index in indices]
+            range_error = np.stack([self.exact.range_error(self.table.lanes(source)) for source in sources])
         return self.exact.left_of_small(range_error, (full.east[indices], full.north[indices]))
 
     def adds(self, size: Floats) -> Floats:
