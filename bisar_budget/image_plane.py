@@ -210,24 +210,32 @@ class GroundMatrix:
 
     @cached_property
     def orientation(self) -> Floats:
-        """Area between mean gradient and mean Doppler gradient, signed; 0 where the aperture resolves more."""
-        (x, y), (by_x, by_y) = self.range_gradient, self.fit[1] @ self.slopes
-        area = x * by_y - y * by_x
-        determinant_of_both = self.band * (1 + self.band) / 3 * area * area
-        return np.where(determinant_of_both >= MIN_OWN_AREA_FRACTION * self.determinant, area, 0.0)
-
-    def projected(self, values: Floats) -> Floats:
-        """Weights at the nodes, (nodes, cases), whose sum with a history is its product of V with `values`."""
-        average = self.fit[0] @ values
-        return np.asarray(self.fit[0][:, None] * ((1 + self.band) * (values - average) + self.band * average))
+        """Area between mean gradient and mean Doppler gradient, as in `orientation`."""
+        return orientation(self.slopes, self.fit, self.band, self.determinant)
 
     def turned_from(self, centre: "GroundMatrix", case: Indices) -> Floats:
-        """Area that gradients span, over their area at the centre of some cases; below 0 if turned around."""
-        determinant, orientation = centre.determinant, centre.orientation
-        if determinant.size > 1:
-            determinant, orientation = determinant[case], orientation[case]
-        area = np.sqrt(np.maximum(self.determinant, 0.0) / determinant)
-        return np.where(orientation * self.orientation < 0, -area, area)
+        """Area that gradients span, over their area at the centre of some cases, as in `turn`."""
+        return turn(self.determinant, self.orientation, centre, case)
+
+
+def orientation(slopes: Floats, fit: Floats, band: Floats, determinant: Floats) -> Floats:
+    """Area between mean gradient and mean Doppler gradient, signed; 0 where the aperture resolves more.
+
+    The parameters are fields of `GroundMatrix`, and the determinant of H.
+    """
+    (x, y), (by_x, by_y) = fit[0] @ slopes, fit[1] @ slopes
+    area = x * by_y - y * by_x
+    determinant_of_both = band * (1 + band) / 3 * area * area
+    return np.where(determinant_of_both >= MIN_OWN_AREA_FRACTION * determinant, area, 0.0)
+
+
+def turn(determinant: Floats, orientation: Floats, centre: GroundMatrix, case: Indices) -> Floats:
+    """Area that gradients span, over their area at the centre of some cases; below 0 if turned around."""
+    at_centre, orientation_at_centre = centre.determinant, centre.orientation
+    if at_centre.size > 1:
+        at_centre, orientation_at_centre = at_centre[case], orientation_at_centre[case]
+    area = np.sqrt(np.maximum(determinant, 0.0) / at_centre)
+    return np.where(orientation_at_centre * orientation < 0, -area, area)
 
 
 def spans_ground(

@@ -238,11 +238,13 @@ class ErrorBlock:
 
     def left_per_unit(self, indices: Sequence[int]) -> Floats:
         """Range error at the nodes that a small unit of some errors leaves, (errors, nodes, cases). [m]"""
-        table, full, sources = self.table, self.effects["full"], [self.sources[index] for index in indices]
+        full = self.effects["full"]
         if self.cases == 1:
-            range_error = self.exact.range_error(table.lanes(*sources)).T[..., None]
+            lanes = self.paths.lanes.of(self._lane[indices, 0])
+            range_error = self.exact.range_error(lanes).T[..., None]
         else:
-            range_error = np.stack([self.exact.range_error(table.lanes(source)) for source in sources])
+            sources = [self.sources[index] for index in indices]
+            range_error = np.stack([self.exact.range_error(self.table.lanes(source)) for source in sources])
         return self.exact.left_of_small(range_error, (full.east[indices], full.north[indices]))
 
     def adds(self, size: Floats) -> Floats:
@@ -587,9 +589,8 @@ class DeclaredErrors:
         orders = [self._order(error) for error in errors]
         courses = np.array([self._course(error, order) for error, order in zip(errors, orders, strict=True)])
         at_nodes = np.moveaxis(courses[:, None] * np.array(signs)[:, None, None], 2, 0)
-        moves = np.array([[[platform in error.platforms] for error in errors] for platform in (0, 1)], dtype=float)
         order, moves, directions = (
-            self._of_lanes(values, len(signs)) for values in (np.array(orders)[:, None], moves, _directions(errors))
+            self._of_lanes(values, len(signs)) for values in (np.array(orders)[:, None], *_motions(errors))
         )
         case, tags = np.tile(self.each, len(errors) * len(signs)), None
         if any(error.is_time_tag for error in errors):
@@ -682,17 +683,25 @@ class DeclaredErrors:
         return phrases.no_displacement_across(plain(np.hypot(*self.geometries.range_gradient), case))
 
 
-def _directions(errors: Sequence[ErrorSource]) -> Floats:
-    """Directions in which units of errors move both platforms, as in `Lanes`, (2, 3, nodes, errors, cases)."""
-    moving = [(index, platform) for index, error in enumerate(errors) for platform in error.platforms]
-    ways = [errors[index].way_of(platform) for index, platform in moving]
-    shapes = [(1, *np.shape(component))[-2:] for way in ways for component in way if np.ndim(component)]
+def _motions(errors: Sequence[ErrorSource]) -> tuple[Floats, Floats]:
+    """Whether units of errors move each platform, (2, errors, 1), and directions, as in `Lanes`.
+
+    Directions are (2, 3, nodes, errors, cases).
+    """
+    ways = [
+        (platform, index, error.way_of(platform))
+        for index, error in enumerate(errors)
+        for platform in error.platforms
+    ]
+    arrays = [component for _, _, way in ways for component in way if isinstance(component, np.ndarray)]
+    shapes = [(1, *array.shape)[-2:] for array in arrays if array.ndim]
     count, cases = (max(lengths) for lengths in zip((1, 1), *shapes, strict=True))
-    directions = np.zeros((2, 3, count, len(errors), cases))
-    for (index, platform), way in zip(moving, ways, strict=True):
+    moves, directions = np.zeros((2, len(errors), 1)), np.zeros((2, 3, count, len(errors), cases))
+    for platform, index, way in ways:
+        moves[platform, index] = 1.0
         for axis, component in enumerate(way):
             directions[platform, axis, :, index] = component
-    return directions
+    return moves, directions
 
 
 class Model:

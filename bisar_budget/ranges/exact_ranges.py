@@ -35,6 +35,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from bisar_budget import image_plane
 from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.geometry import GroundVector, PlatformState, VectorArrays, Vectors, dot, norm
@@ -740,6 +741,7 @@ class _PointSearch:
         self.is_settled = np.zeros(of.size, dtype=bool)
         self.last_view = np.empty((3, exact.fit.shape[1], of.size))
         self.last_point, self.last_step = np.empty((2, 2, of.size))
+        self.last_determinant = np.empty(of.size)
         self._set_cases()
 
     def run(self) -> None:
@@ -749,7 +751,7 @@ class _PointSearch:
             view = self._view()
             step = view.step(view.slope)
             self.point = self.point + step
-            square = np.einsum("ac,ac->c", step, step)
+            square = step[0] ** 2 + step[1] ** 2
             is_apart = view.nearest >= self.least_range
             is_done = is_apart & (square < self._last_step(view) * view.nearest)
             self._keep(np.flatnonzero(is_done), view, step)
@@ -780,7 +782,7 @@ class _PointSearch:
             more = np.maximum(damping, -2 * flattest)
             step = _solved((xx + more, xy, yy + more), slope)
             last_step = POINT_SETTINGS.last_step_near_fold_fraction * POINT_SETTINGS.last_step_rad / self.k
-            is_done = falls & (np.einsum("ac,ac->c", step, step) < last_step * view.nearest)
+            is_done = falls & (step[0] ** 2 + step[1] ** 2 < last_step * view.nearest)
             is_done &= view.nearest >= self.least_range
             self._keep(np.flatnonzero(is_going & is_done), view, step)
             is_going &= ~is_done
@@ -799,7 +801,13 @@ class _PointSearch:
             return
         view, step = self.last_view.take(lanes, axis=-1), self.last_step[:, lanes]
         k, band, rounding = _take_cases([exact.k, exact.band, exact.rounding], self.case[lanes])
-        turn = GroundMatrix.of(view[1:], exact.fit, band).turned_from(exact.matrix, self.case[lanes])
+        determinant = self.last_determinant[lanes]
+        turn = image_plane.turn(
+            determinant,
+            image_plane.orientation(view[1:], exact.fit, band, determinant),
+            exact.matrix,
+            self.case[lanes],
+        )
         remaining = view[0] + view[1] * step[0] + view[2] * step[1]
         orders = exact.fit @ remaining
         is_turned = exact.is_turned if exact.is_turned.size == 1 else exact.is_turned[self.case[lanes]]
@@ -852,6 +860,7 @@ class _PointSearch:
             self.is_settled[lanes] = True
             self.last_view[..., lanes] = view.seen.take(done, axis=-1)
             self.last_point[:, lanes], self.last_step[:, lanes] = self.point[:, done], step[:, done]
+            self.last_determinant[lanes] = view.determinant[done]
 
 
 class _GroundView:

@@ -232,10 +232,11 @@ class PointPaths:
         self._missed_last[lane] = self._missed_ever[lane] = True
 
     def _insert(self, lane: Indices, point: Floats) -> None:
-        """Insert known points, in the order of their sizes."""
+        """Insert known points, ordered by lane and size."""
         if not lane.size:
             return
-        changed, first, count = np.unique(lane, return_index=True, return_counts=True)
+        first = np.flatnonzero(np.diff(lane, prepend=-1))
+        changed, count = lane[first], np.diff(first, append=lane.size)
         filled = np.isfinite(self.known_points[SIZE, changed]).sum(axis=1)
         width, needed = self.known_points.shape[2], int((filled + count).max())
         if needed > width:  # the first step adds few points, most other steps one

@@ -29,7 +29,7 @@ _BAND_NODE_COUNT, _APERTURE_NODE_COUNT = 16, 64  # for phases of ±20 rad, reach
 # minimum beyond 6.
 _STEP_RATIO, _MAX_STEP_COUNT = 0.25, 64
 _NEWTON_ROUNDS = 5  # rounds: the last changes a width by less than 1e-6
-_MAX_CASE_COUNT = 128  # cases in one block of samples
+_MAX_CASE_COUNT = 64  # cases in one block of samples
 
 
 class Resolution(NamedTuple):
@@ -63,10 +63,9 @@ def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aper
     for first in range(0, long.size, _MAX_CASE_COUNT):
         some = long[first : first + _MAX_CASE_COUNT]
         slopes = _slopes(geometry, exact.half, some, max(_APERTURE_NODE_COUNT, exact.sampling.places.size))
-        for axis, direction in enumerate((conjugate, across)):
-            widths[axis::2, some] = _widths(
-                exact.k[some], relative_band[some], np.einsum("anc,ac->nc", slopes, direction[:, some])
-            )
+        along = np.einsum("anc,dac->ndc", slopes, np.array((conjugate, across))[:, :, some])
+        of_both = _widths(np.tile(exact.k[some], 2), np.tile(relative_band[some], 2), along.reshape(len(along), -1))
+        widths[:, some] = np.reshape(of_both, (4, -1))
     return Resolution(*widths)
 
 
@@ -101,17 +100,17 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
     """Peak to first null, and full width at half power, by slopes (nodes, cases) of the range per metre. [m]"""
     band = nodes(_BAND_NODE_COUNT)
     wavenumbers = k * (1 + np.multiply.outer(band.places, relative_band / 2))
-    mean = np.multiply.outer(band.fit[0], nodes(len(slopes)).fit[0])[..., None]
-    rates = wavenumbers[:, None] * slopes  # change of phase by a metre [rad/m]
-    rates -= (mean * rates).sum(axis=(0, 1))
-    unit = math.sqrt(_HALF_POWER) / np.sqrt((mean * rates**2).sum(axis=(0, 1)))
+    mean = np.multiply.outer(band.fit[0], nodes(len(slopes)).fit[0]).ravel()
+    rates = (wavenumbers[:, None] * slopes).reshape(mean.size, -1)  # change of phase by a metre [rad/m]
+    rates -= mean @ rates
+    unit = math.sqrt(_HALF_POWER) / np.sqrt(mean @ rates**2)
     rates *= unit
+    moments = mean[:, None] * rates ** np.arange(3)[:, None, None]
 
     def power(step: Floats) -> tuple[Floats, Floats, Floats]:
         """Power of the response at a step, and its first two derivatives."""
-        turned = mean * np.exp(1j * rates * step)
-        value = turned.sum(axis=(0, 1))
-        slope, bend = 1j * (rates * turned).sum(axis=(0, 1)), -(rates * rates * turned).sum(axis=(0, 1))
+        value, slope, bend = np.einsum("knc,nc->kc", moments, np.exp(1j * rates * step))
+        slope, bend = 1j * slope, -bend
         first = 2 * (value.conj() * slope).real
         return np.abs(value) ** 2, first, 2 * (np.abs(slope) ** 2 + (value.conj() * bend).real)
 
@@ -119,12 +118,12 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
         level, slope, _ = power(step)
         return level - _HALF_POWER, slope
 
-    turn, turned = np.exp(1j * rates * _STEP_RATIO), mean.astype(complex)
+    turn, turned = np.exp(1j * rates * _STEP_RATIO), np.ones(rates.shape, dtype=complex)
     last = float(_MAX_STEP_COUNT)
     level, half, null = np.ones(unit.size), np.full(unit.size, last), np.full(unit.size, last)
     for step in range(1, _MAX_STEP_COUNT):
         turned = turned * turn
-        before, level = level, np.abs(turned.sum(axis=(0, 1))) ** 2
+        before, level = level, np.abs(mean @ turned) ** 2
         half = np.where((half == last) & (level < _HALF_POWER), step - 0.5, half)
         null = np.where((null == last) & (half < last) & (level > before), step - 1.0, null)
         if (null < last).all():
