@@ -18,7 +18,7 @@ from collections.abc import Callable
 import numpy as np
 from numba import get_num_threads, njit, prange
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.simulator.image_formation import backprojection, ground_grid, matched_filter
 from bisar_budget.simulator.phase_history import PhaseHistory, cell_centres, path, phase_history
@@ -135,9 +135,9 @@ def horner(samples, first, step, transmitter, receiver, points, image):
                     x, y, z = points[block * LANES + j, 0], points[block * LANES + j, 1], points[block * LANES + j, 2]
                     far += math.sqrt((x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2)
                     far -= math.sqrt(p[0] ** 2 + p[1] ** 2 + p[2] ** 2)
-                carrier[j] = 2 * math.pi * first * far / SPEED_OF_LIGHT
-                turn_re[j] = math.cos(2 * math.pi * step * far / SPEED_OF_LIGHT)
-                turn_im[j] = math.sin(2 * math.pi * step * far / SPEED_OF_LIGHT)
+                carrier[j] = 2 * math.pi * first * far / SPEED_OF_LIGHT_MPS
+                turn_re[j] = math.cos(2 * math.pi * step * far / SPEED_OF_LIGHT_MPS)
+                turn_im[j] = math.sin(2 * math.pi * step * far / SPEED_OF_LIGHT_MPS)
             real[:] = 0
             imag[:] = 0
             for k in range(samples.shape[1] - 1, -1, -1):

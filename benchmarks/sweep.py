@@ -20,10 +20,9 @@ from pathlib import Path
 import numpy as np
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.design.cases import Cases
 from bisar_budget.design.sweep import Asked
-from bisar_budget.evaluators import LEGENDRE_FITS
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
@@ -37,7 +36,7 @@ ACCELERATION, TOTAL, CARRIER, BANDWIDTH = 0.005, math.pi / 4, 10e9, 300e6
 
 def by_hand(azimuth: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Utilization, phase by exact ranges [rad] and status of Section V for azimuths of the receiver and apertures."""
-    wavelength = SPEED_OF_LIGHT / CARRIER
+    wavelength = SPEED_OF_LIGHT_MPS / CARRIER
     k, elevation, R = 2 * np.pi / wavelength, math.radians(13.609), 8500.0
     p, v = (30414.0, 0.0, 6000.0), (0.0, 150.0, 0.0)
     q = (
@@ -57,16 +56,29 @@ def by_hand(azimuth: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     skew = np.arctan2(
         np.abs(gradient[0] * rate[1] - gradient[1] * rate[0]), np.abs(gradient[0] * rate[0] + gradient[1] * rate[1])
     )
-    resolution = SPEED_OF_LIGHT / (BANDWIDTH * np.hypot(*gradient)), wavelength / (T * np.hypot(*rate) * np.sin(skew))
+    resolution = (
+        SPEED_OF_LIGHT_MPS / (BANDWIDTH * np.hypot(*gradient)),
+        wavelength / (T * np.hypot(*rate) * np.sin(skew)),
+    )
     angle = np.arccos(sum(x * y for x, y in zip(t_look, r_look, strict=True)))
-    nodes, *fits = LEGENDRE_FITS[6]
-    fit, t = np.array(fits), np.array(nodes)[:, None] * T / 2
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    mean, quadratic = weights / 2, 3.75 * weights * np.polynomial.legendre.legval(nodes, (0.0, 0.0, 1.0))
+    band, t = 1 + (BANDWIDTH / CARRIER) ** 2 / 12, nodes[:, None] * T / 2
     X, Y = [p[i] + t * v[i] for i in range(3)], [q[i] + t * w[i] for i in range(3)]
     RX, RY = (np.sqrt(Z[0] ** 2 + Z[1] ** 2 + Z[2] ** 2) for Z in (X, Y))
-    g, h = fit @ (X[0] / RX + Y[0] / RY), fit @ (X[1] / RX + Y[1] / RY)
-    turn = g[0] * h[1] - h[0] * g[1]
-    e = ACCELERATION * (fit @ (-X[0] / RX * t**2 / 2))
-    east, north = (h[0] * e[1] - h[1] * e[0]) / turn, (g[1] * e[0] - g[0] * e[1]) / turn
+    g, h = X[0] / RX + Y[0] / RY, X[1] / RX + Y[1] / RY
+
+    def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return band * (mean @ (a * b)) - (mean @ a) * (mean @ b)
+
+    gg, gh, hh = product(g, g), product(g, h), product(h, h)
+
+    def ground_point(ranges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        along_g, along_h = product(g, ranges), product(h, ranges)
+        turn = gg * hh - gh**2
+        return (hh * along_g - gh * along_h) / turn, (gg * along_h - gh * along_g) / turn
+
+    east, north = ground_point(X[0] / RX * ACCELERATION * t**2 / 2)
     worst = np.zeros_like(T)
     for sign in (1.0, -1.0):
         x, y = sign * east, sign * north
@@ -74,10 +86,10 @@ def by_hand(azimuth: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray,
             left = RX + RY
             left = left - np.sqrt((X[0] + sign * ACCELERATION * t**2 / 2 - x) ** 2 + (X[1] - y) ** 2 + X[2] ** 2)
             left = left - np.sqrt((Y[0] - x) ** 2 + (Y[1] - y) ** 2 + Y[2] ** 2)
-            rest = fit @ left
-            step = (h[0] * rest[1] - h[1] * rest[0]) / turn, (g[1] * rest[0] - g[0] * rest[1]) / turn
+            step = ground_point(-left)
             x, y = x + step[0], y + step[1]
-        worst = np.maximum(worst, k * np.abs(rest[2] + g[2] * step[0] + h[2] * step[1]))
+        left = left + g * step[0] + h * step[1]
+        worst = np.maximum(worst, k * np.abs(quadratic @ left))
     status = np.where(use > 1 + 1e-9, 3, np.where(worst > TOTAL / 2, 2, np.where(use > 0.8, 2, 1)))
     assert angle.shape == resolution[0].shape == status.shape
     return use, worst, status

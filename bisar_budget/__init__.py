@@ -8,7 +8,7 @@ Numbers are SI and radians. What is named here is read when it is asked for: the
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
 
@@ -59,7 +59,7 @@ _FROM = {name: module for module, names in _LIVES.items() for name in names}
 __all__ = ["__version__", *sorted(_FROM)]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """A name of `__all__`, from where it lives."""
     if name not in _FROM:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

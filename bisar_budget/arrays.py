@@ -1,5 +1,7 @@
 """Types of arrays, and of numbers that may stand for one case or for many."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,3 +14,12 @@ PerCase = float | Floats
 """A number of one case, or an array with one number per case, (cases,)."""
 PerCaseFlag = bool | Booleans
 """A condition of one case, or an array with one condition per case, (cases,)."""
+NumbersOrWords = NDArray[Any]
+"""A column of a table: numbers in SI, or words."""
+Records = NDArray[np.void]
+"""Records of a file, with named fields."""
+
+
+def absolute(value: PerCase) -> PerCase:
+    """Absolute value of a number, or of each number of an array."""
+    return np.abs(value) if isinstance(value, np.ndarray) else abs(value)

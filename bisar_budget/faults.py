@@ -4,6 +4,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 KeyPath = tuple[str | int, ...]
+ParserEvent = Any
+"""An event of the YAML parser, or `Changed`: which attributes it has follows from its type."""
 
 
 def upwards(path: KeyPath) -> Iterator[KeyPath]:
@@ -34,12 +36,12 @@ class Place(int):
     text: str
 
     @classmethod
-    def of(cls, event: Any) -> "Place":
+    def of(cls, event: ParserEvent) -> "Place":
         """Place of an event of the YAML parser; each event has a single place, since many rows point at the same key.
 
         The place keeps four numbers and the text. It frees the parser's marks: they are half the memory of a mission.
         """
-        fields: dict[str, Any] = vars(event)
+        fields: dict[str, ParserEvent] = event.__dict__
         position: Place | None = fields.get("place")
         if position is None:
             start, end = fields["start_mark"], fields["end_mark"]

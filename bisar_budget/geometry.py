@@ -10,24 +10,26 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import zip_longest
-from typing import Any, Protocol
+from typing import Any, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.arrays import Floats, Indices, PerCase, PerCaseFlag, absolute
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 
 Vector = tuple[float, float, float]
-Vectors = tuple[Any, Any, Any]  # three components, each an array or a float
+Vectors = tuple[PerCase, PerCase, PerCase]
+VectorArrays = tuple[Floats, Floats, Floats]
 GroundVector = tuple[float, float]
 
-_DIRECTED = 1e-300  # m/s; a smaller velocity has too few digits for a direction
+_MIN_DIRECTED_SPEED_MPS = 1e-300  # a smaller velocity has too few digits for a direction
 STRAIGHT: Vector = (0.0, 0.0, 0.0)  # acceleration of a platform with a straight path
 Axes = tuple[Vectors, Vectors, Vectors]
 
-STILL = 1e-6  # m/s; a slower platform does not move
+STILL_SPEED_MPS = 1e-6  # a slower platform does not move
 _LOOKS_PER_PIECE = 8  # samples of a path in pieces, for its length and its lowest point
-_FEWEST_LOOKS = 32  # samples on each side of the midpoint
+_MIN_LOOK_COUNT = 32  # samples on each side of the midpoint
 FRAME_AXES = {
     "scene": ("x", "y", "z"),
     "track": ("along", "cross", "up"),
@@ -46,10 +48,10 @@ class UndefinedFrameError(ValueError):
 _ARRAY = np.ndarray
 
 
-def _either(of_numbers: Callable[..., Any], of_arrays: Callable[..., Any]) -> Callable[..., Any]:
+def _either(of_numbers: Callable[..., PerCase], of_arrays: Callable[..., PerCase]) -> Callable[..., PerCase]:
     """A function of numbers or arrays, from one function of numbers and one function of arrays."""
 
-    def function(*values: Any) -> Any:
+    def function(*values: PerCase) -> PerCase:
         return of_arrays(*values) if _ARRAY in map(type, values) else of_numbers(*values)
 
     return function
@@ -65,34 +67,66 @@ _above = _either(
 )
 
 
-def dot(a: Vectors, b: Vectors) -> Any:
+@overload
+def dot(a: Vector, b: Vector) -> float: ...
+@overload
+def dot(a: VectorArrays, b: Vectors) -> Floats: ...
+@overload
+def dot(a: Vectors, b: VectorArrays) -> Floats: ...
+@overload
+def dot(a: Vectors, b: Vectors) -> PerCase: ...
+def dot(a: Vectors, b: Vectors) -> PerCase:
     """Scalar product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+@overload
+def cross(a: Vector, b: Vector) -> Vector: ...
+@overload
+def cross(a: Vectors, b: Vectors) -> Vectors: ...
 def cross(a: Vectors, b: Vectors) -> Vectors:
     """Vector product of two vectors."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-def norm(a: Vectors) -> Any:
+@overload
+def norm(a: Vector) -> float: ...
+@overload
+def norm(a: VectorArrays) -> Floats: ...
+@overload
+def norm(a: Vectors) -> PerCase: ...
+def norm(a: Vectors) -> PerCase:
     """Length of a vector."""
     return math.hypot(*a) if _ARRAY not in map(type, a) else np.sqrt(dot(a, a))
 
 
+@overload
+def unit(a: Vector) -> Vector: ...
+@overload
+def unit(a: Vectors) -> Vectors: ...
 def unit(a: Vectors) -> Vectors:
     """Direction of a vector that is not zero."""
     length = norm(a)
     return (a[0] / length, a[1] / length, a[2] / length)
 
 
+@overload
+def without_rounding(a: Vector) -> Vector: ...
+@overload
+def without_rounding(a: Vectors) -> Vectors: ...
 def without_rounding(a: Vectors) -> Vectors:
     """Set components to zero that are only rounding errors relative to the vector's length: cos 90° is 6e-17."""
-    floor = ROUNDING * norm(a)
+    floor = VECTOR_ROUNDING_FRACTION * norm(a)
     return (_above(floor, a[0]), _above(floor, a[1]), _above(floor, a[2]))
 
 
-def _of_cases(values: NDArray[np.float64], asked: Any) -> Any:
+def plain_vector(a: Vectors) -> Vector:
+    """The vector of one case in plain numbers."""
+    x, y, z = a
+    return (float(x), float(y), float(z))
+
+
+def _of_cases(values: Floats, asked: PerCase) -> PerCase:
     """Values of cases (cases,); a float if there is one case and `asked` is a number."""
     return values if np.ndim(asked) or values.size > 1 else values.item()
 
@@ -101,12 +135,12 @@ def _minus(a: Vectors, b: Vectors) -> Vectors:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-def _number_of_cases(number: Any, cases: Any) -> Any:
+def _number_of_cases(number: PerCase, cases: Indices) -> PerCase:
     """The numbers of some cases; a number that all cases share is unchanged."""
     return number[cases] if isinstance(number, np.ndarray) and number.size > 1 else number
 
 
-def _vector_of_cases(vector: Vectors, cases: Any) -> Vectors:
+def _vector_of_cases(vector: Vectors, cases: Indices) -> Vectors:
     x, y, z = (_number_of_cases(component, cases) for component in vector)
     return (x, y, z)
 
@@ -118,11 +152,35 @@ class CurvedPath(Protocol):
     def count(self) -> int:
         """Number of pieces."""
 
-    def at(self, tau: Any) -> tuple[Vectors, Vectors]:
+    def at(self, tau: PerCase) -> tuple[Vectors, Vectors]:
         """Position and velocity at slow times from the midpoint. [m], [m/s]"""
 
-    def of(self, cases: Any) -> "CurvedPath":
+    def of(self, cases: Indices) -> "CurvedPath":
         """The paths of some cases, by their indices."""
+
+
+class Fall(Protocol):
+    """The dynamics of errors of a platform in free fall: `paths.free_fall.FreeFall`."""
+
+    def motions(self, path: "PlatformState", half: NDArray[np.float64], places: NDArray[np.float64]) -> Any:
+        """Motion by unit errors of the state at mid-aperture, (3, 3, 3, nodes, cases). [m]"""
+
+    def rate_against_stars(self, position: Vectors) -> Vectors:
+        """Rate in the axes of the scene of a position error that is at rest against the stars."""
+
+    def orbit_rate(self, path: "PlatformState") -> Vectors:
+        """Angular rate of the orbit. [rad/s]"""
+
+    @property
+    def centre(self) -> Vectors:
+        """The Earth's centre. [m]"""
+
+    @property
+    def rotation(self) -> Vectors:
+        """Rate at which the axes of the scene turn against the stars. [rad/s]"""
+
+    def of(self, cases: Any) -> "Fall":
+        """The dynamics in some of the cases, by their indices."""
 
 
 @dataclass(frozen=True)
@@ -142,8 +200,8 @@ class Pieces:
         Coefficients of time to the power 0, 1, … of each piece. [m], [m/s], …
     """
 
-    starts: tuple[Any, ...]
-    middles: tuple[Any, ...]
+    starts: tuple[PerCase, ...]
+    middles: tuple[PerCase, ...]
     powers: tuple[tuple[Vectors, ...], ...]
 
     @property
@@ -152,7 +210,7 @@ class Pieces:
         return len(self.middles)
 
     @cached_property
-    def _arrays(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _arrays(self) -> tuple[Floats, Floats, Floats]:
         """Starts (pieces - 1, …), middles (pieces, …), powers (pieces, …, order + 1, 3), with … () or (cases,)."""
         numbers = [x for powers in self.powers for vector in powers for x in vector]
         every = np.array(np.broadcast_arrays(*self.starts, *self.middles, *numbers), dtype=float)
@@ -160,12 +218,12 @@ class Pieces:
         powers = powers.reshape(self.count, -1, 3, *every.shape[1:])
         return starts, middles, powers if every.ndim == 1 else np.moveaxis(powers, -1, 1)
 
-    def at(self, tau: Any) -> tuple[Vectors, Vectors]:
+    def at(self, tau: PerCase) -> tuple[Vectors, Vectors]:
         """Position and velocity at slow times from the midpoint. [m], [m/s]"""
         starts, middles, powers = self._arrays
         times = np.asarray(tau, dtype=float)
         if middles.ndim == 1:
-            piece: Any = np.searchsorted(starts, times, "right")
+            piece: Indices | tuple[Indices, Indices] = np.searchsorted(starts, times, "right")
         else:
             times = np.broadcast_to(times, np.broadcast_shapes(times.shape, middles.shape[1:]))
             begun = times >= starts.reshape(len(starts), *(1,) * (times.ndim - 1), middles.shape[1])
@@ -180,7 +238,7 @@ class Pieces:
             return (x, y, z), (u, v, w)
         return (float(x), float(y), float(z)), (float(u), float(v), float(w))
 
-    def of(self, cases: Any) -> "Pieces":
+    def of(self, cases: Indices) -> "Pieces":
         """The paths of some cases, by their indices; numbers that all cases share are unchanged."""
         starts, middles = (
             tuple(_number_of_cases(number, cases) for number in numbers) for numbers in (self.starts, self.middles)
@@ -203,11 +261,11 @@ class _Apart:
     def count(self) -> int:
         return sum(path.curve.count for path in (self.path, self.other) if path.curve is not None)
 
-    def at(self, tau: Any) -> tuple[Vectors, Vectors]:
+    def at(self, tau: PerCase) -> tuple[Vectors, Vectors]:
         (position, rate), (from_place, from_rate) = self.path.at(tau), self.other.at(tau)
         return _minus(position, from_place), _minus(rate, from_rate)
 
-    def of(self, cases: Any) -> "_Apart":
+    def of(self, cases: Indices) -> "_Apart":
         return _Apart(self.path.of(cases), self.other.of(cases))
 
 
@@ -218,6 +276,7 @@ class PlatformState:
     Position [m] and velocity [m/s] at the midpoint, acceleration [m/s²], and in `bends` the coefficients of τ³, τ⁴, …
     [m/s³], [m/s⁴], … form a polynomial. Without a `curve` the polynomial is the full path; with a `curve` it is the
     path near the midpoint. `radial` are the axes of the platform's `ric` frame, if the Earth's centre is known.
+    `fall` are the dynamics of errors of a platform in free fall; None for any other platform.
     """
 
     position: Vectors
@@ -226,11 +285,12 @@ class PlatformState:
     bends: tuple[Vectors, ...] = ()
     radial: Axes | None = None
     curve: CurvedPath | None = None
+    fall: Fall | None = None
 
     @property
-    def is_still(self) -> Any:
+    def is_still(self) -> PerCaseFlag:
         """Whether the platform does not move; a path in pieces always moves."""
-        return self.curve is None and self.travelled(1.0) < STILL
+        return self.curve is None and self.travelled(1.0) < STILL_SPEED_MPS
 
     @property
     def is_straight(self) -> bool:
@@ -248,7 +308,11 @@ class PlatformState:
         faster = ((bend, math.factorial(power)) for power, bend in enumerate(self.bends, 3))
         return (self.velocity, self.acceleration, *((b[0] * n, b[1] * n, b[2] * n) for b, n in faster))
 
-    def place(self, tau: Any) -> Vectors:
+    @overload
+    def place(self, tau: Floats) -> VectorArrays: ...
+    @overload
+    def place(self, tau: PerCase) -> Vectors: ...
+    def place(self, tau: PerCase) -> Vectors:
         """Position at slow times from the midpoint. [m]"""
         if self.curve is not None:
             return self.curve.at(tau)[0]
@@ -260,7 +324,11 @@ class PlatformState:
             x, y, z = x + bend[0] * moved, y + bend[1] * moved, z + bend[2] * moved
         return (x, y, z)
 
-    def at(self, tau: Any) -> tuple[Vectors, Vectors]:
+    @overload
+    def at(self, tau: Floats) -> tuple[VectorArrays, VectorArrays]: ...
+    @overload
+    def at(self, tau: PerCase) -> tuple[Vectors, Vectors]: ...
+    def at(self, tau: PerCase) -> tuple[Vectors, Vectors]:
         """Position and velocity at slow times from the midpoint. [m], [m/s]"""
         if self.curve is not None:
             return self.curve.at(tau)
@@ -271,11 +339,11 @@ class PlatformState:
             x, y, z = x + bend[0] * faster, y + bend[1] * faster, z + bend[2] * faster
         return self.place(tau), (x, y, z)
 
-    def later(self, tau: Any, delay_s: Any) -> Vectors:
+    def later(self, tau: PerCase, delay_s: PerCase) -> Vectors:
         """Displacement of the platform from slow times `tau` to `tau + delay_s`. [m]"""
         return _minus(self.place(tau + delay_s), self.place(tau))
 
-    def of(self, cases: Any) -> "PlatformState":
+    def of(self, cases: Indices) -> "PlatformState":
         """The paths of some cases, by their indices; numbers that all cases share are unchanged."""
         return PlatformState(
             position=_vector_of_cases(self.position, cases),
@@ -283,10 +351,11 @@ class PlatformState:
             acceleration=_vector_of_cases(self.acceleration, cases),
             bends=tuple(_vector_of_cases(bend, cases) for bend in self.bends),
             curve=self.curve and self.curve.of(cases),
+            fall=self.fall and self.fall.of(cases),
         )
 
     @cached_property
-    def slant_range(self) -> Any:
+    def slant_range(self) -> PerCase:
         """Distance to the scene centre. [m]"""
         return norm(self.position)
 
@@ -307,25 +376,26 @@ class PlatformState:
             (v[2] - u[2] * radial) / R,
         )
 
-    def travelled(self, duration_s: Any) -> Any:
+    def travelled(self, duration_s: PerCase) -> PerCase:
         """Upper bound on the length of the path from the midpoint within a time. [m]"""
         if self.curve is not None:
-            steps = norm(tuple(np.diff(component, axis=0) for component in self._looks(duration_s)))
+            x, y, z = (np.diff(component, axis=0) for component in self._looks(duration_s))
+            steps = norm((x, y, z))
             before, after = np.split(steps, 2)
             return _of_cases(np.maximum(before.sum(axis=0), after.sum(axis=0)), duration_s)
         way = norm(self.velocity) * duration_s + norm(self.acceleration) * duration_s**2 / 2
-        return way + sum(norm(bend) * duration_s**power for power, bend in enumerate(self.bends, 3))
+        return way + sum((norm(bend) * duration_s**power for power, bend in enumerate(self.bends, 3)), 0.0)
 
-    def sinks(self, duration_s: Any) -> Any:
+    def sinks(self, duration_s: PerCase) -> PerCase:
         """Upper bound on the descent of the platform below its midpoint height within a time. [m]"""
         if self.curve is not None:
             return _of_cases(self.position[2] - self._looks(duration_s)[2].min(axis=0), duration_s)
-        way = abs(self.velocity[2]) * duration_s + abs(self.acceleration[2]) * duration_s**2 / 2
-        return way + sum(abs(bend[2]) * duration_s**power for power, bend in enumerate(self.bends, 3))
+        way = absolute(self.velocity[2]) * duration_s + absolute(self.acceleration[2]) * duration_s**2 / 2
+        return way + sum((absolute(bend[2]) * duration_s**power for power, bend in enumerate(self.bends, 3)), 0.0)
 
-    def _looks(self, duration_s: Any) -> Vectors:
+    def _looks(self, duration_s: PerCase) -> VectorArrays:
         """Positions within a time of the midpoint, equally many on each side, (samples, cases). [m]"""
-        count = _FEWEST_LOOKS if self.curve is None else max(_FEWEST_LOOKS, _LOOKS_PER_PIECE * self.curve.count)
+        count = _MIN_LOOK_COUNT if self.curve is None else max(_MIN_LOOK_COUNT, _LOOKS_PER_PIECE * self.curve.count)
         return self.place(np.linspace(-1.0, 1.0, 2 * count + 1)[:, None] * duration_s)
 
     def less(self, other: "PlatformState") -> "PlatformState":
@@ -339,31 +409,33 @@ class PlatformState:
         )
 
     @property
-    def azimuth(self) -> Any:
+    def azimuth(self) -> PerCase:
         """Azimuth from east, counter-clockwise, φ of (6). [rad]"""
         return _arctan2(self.position[1], self.position[0])
 
     @property
-    def elevation(self) -> Any:
+    def elevation(self) -> PerCase:
         """Elevation above the ground plane as seen from the scene centre, θ of (6). [rad]"""
         return _arctan2(self.position[2], _hypot(self.position[0], self.position[1]))
 
     @property
     def squint(self) -> float | None:
         """Angle of the line of sight from broadside, positive forward; None for a still platform. One case. [rad]"""
-        speed = norm(self.velocity)
+        speed = float(norm(self.velocity))
         if speed == 0:
             return None
-        sine = -dot(self.look, self.velocity) / speed
-        return math.asin(max(-1.0, min(1.0, sine))) if abs(sine) > ROUNDING else 0.0
+        sine = -float(dot(self.look, self.velocity)) / speed
+        return math.asin(max(-1.0, min(1.0, sine))) if abs(sine) > VECTOR_ROUNDING_FRACTION else 0.0
 
-    def has_frame(self, name: str, margin: float = 1.0) -> Any:
+    def has_frame(self, name: str, margin: float = 1.0) -> PerCaseFlag:
         """Whether the platform has a frame, with a margin for rounding."""
         if name in ("scene", "ric"):
             return name == "scene" or self.radial is not None
         first = self._first_axis(name)
         length = norm(first)
-        return (length >= _DIRECTED) & (_hypot(first[0], first[1]) >= margin * ROUNDING * length)
+        return (length >= _MIN_DIRECTED_SPEED_MPS) & (
+            _hypot(first[0], first[1]) >= margin * VECTOR_ROUNDING_FRACTION * length
+        )
 
     def _first_axis(self, name: str) -> Vectors:
         return self.velocity if name == "track" else self.position
@@ -398,19 +470,19 @@ class PlatformState:
     def _why_no_frame(self, name: str) -> str:
         if name == "ric":
             return "the ric frame needs the scene's latitude, longitude and height"
-        if norm(self._first_axis(name)) < _DIRECTED:
+        if norm(self._first_axis(name)) < _MIN_DIRECTED_SPEED_MPS:
             return "a still platform has no track frame"
         return f"the first axis of its {name} frame is vertical, so cross has no direction"
 
 
 def state_from_angles(
     *,
-    slant_range: Any,
-    azimuth: Any,
-    elevation: Any,
-    speed: Any,
-    motion_azimuth: Any,
-    climb: Any,
+    slant_range: PerCase,
+    azimuth: PerCase,
+    elevation: PerCase,
+    speed: PerCase,
+    motion_azimuth: PerCase,
+    climb: PerCase,
     acceleration: Vectors = STRAIGHT,
     bends: tuple[Vectors, ...] = (),
 ) -> PlatformState:
@@ -447,12 +519,12 @@ class BistaticGeometry:
         return self.transmitter.less(self.receiver)
 
     @property
-    def echo_delay(self) -> Any:
+    def echo_delay(self) -> PerCase:
         """Delay of the scene centre's echo after the direct path, at mid-aperture. [s]"""
         t, r = self.both
-        return (t.slant_range + r.slant_range - self.apart.slant_range) / SPEED_OF_LIGHT
+        return (t.slant_range + r.slant_range - self.apart.slant_range) / SPEED_OF_LIGHT_MPS
 
-    def at(self, tau: Any) -> "BistaticGeometry":
+    def at(self, tau: PerCase) -> "BistaticGeometry":
         """The geometry at slow times [s], with straight paths through the positions at these times."""
         transmitter, receiver = (
             PlatformState(position=p, velocity=v) for p, v in (path.at(tau) for path in self.both)
@@ -471,43 +543,43 @@ class BistaticGeometry:
         return _minus(t, b), _minus(r, (-b[0], -b[1], -b[2]))
 
     @cached_property
-    def range_gradient(self) -> tuple[Any, Any]:
+    def range_gradient(self) -> tuple[PerCase, PerCase]:
         """Sum s of the look vectors on the ground: range changes by −s·x. [-]"""
         t, r = self.transmitter.look, self.receiver.look
         return (t[0] + r[0], t[1] + r[1])
 
     @cached_property
-    def doppler_gradient(self) -> tuple[Any, Any]:
+    def doppler_gradient(self) -> tuple[PerCase, PerCase]:
         """Rate of s on the ground. [1/s]"""
         t, r = self.transmitter.look_rate, self.receiver.look_rate
         return (t[0] + r[0], t[1] + r[1])
 
     @property
-    def look_azimuth(self) -> Any:
+    def look_azimuth(self) -> PerCase:
         """Bistatic look direction φ_b of (11), by atan2. [rad]"""
         return _arctan2(self.range_gradient[1], self.range_gradient[0])
 
     @property
-    def bistatic_angle(self) -> Any:
+    def bistatic_angle(self) -> PerCase:
         """Angle between the look vectors. [rad]"""
         t, r = self.transmitter.look, self.receiver.look
         return _arctan2(norm(cross(t, r)), dot(t, r))
 
     @cached_property
-    def gradient_angle(self) -> Any:
+    def gradient_angle(self) -> PerCase:
         """Angle between the lines of range and Doppler gradient on the ground, 0 to π/2. [rad]"""
         return angle_between_lines(self.range_gradient, self.doppler_gradient)
 
-    def range_resolution(self, bandwidth_hz: Any, speed_of_light: float) -> Any:
+    def range_resolution(self, bandwidth_hz: PerCase, speed_of_light: float) -> PerCase:
         """Resolution along φ_b on the ground, peak to first null: c/(B|s|). [m]"""
         return speed_of_light / (bandwidth_hz * _hypot(*self.range_gradient))
 
-    def cross_range_resolution(self, wavelength_m: Any, aperture_time_s: Any) -> Any:
+    def cross_range_resolution(self, wavelength_m: PerCase, aperture_time_s: PerCase) -> PerCase:
         """Resolution across φ_b on the ground, peak to first null on a line of constant range: λ/(T|ṡ⊥|). [m]"""
         across = _hypot(*self.doppler_gradient) * _sin(self.gradient_angle)
         return wavelength_m / (aperture_time_s * across)
 
 
-def angle_between_lines(a: tuple[Any, Any], b: tuple[Any, Any]) -> Any:
+def angle_between_lines(a: tuple[PerCase, PerCase], b: tuple[PerCase, PerCase]) -> PerCase:
     """Angle between two lines in the plane, regardless of sign, 0 to π/2; 0 if a direction is zero. [rad]"""
-    return _arctan2(abs(a[0] * b[1] - a[1] * b[0]), abs(a[0] * b[0] + a[1] * b[1]))
+    return _arctan2(absolute(a[0] * b[1] - a[1] * b[0]), absolute(a[0] * b[0] + a[1] * b[1]))

@@ -13,40 +13,39 @@ with H.
 import math
 from dataclasses import dataclass
 from functools import cache, cached_property, reduce
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
 from bisar_budget.geometry import BistaticGeometry
 
-Floats = NDArray[np.float64]
-
 # Path of a platform in half an aperture over its slant range, and the number of nodes that serves up to this path:
 # it changes phases by less than 1e-6 of themselves up to a path of 0.5, and by less than 1e-4 beyond.
-NODES = ((0.1, 6), (0.5, 10), (1.0, 16), (2.0, 32), (math.inf, 64))
-FEWEST_NODES = NODES[0][1]
-OF_ENDS = 16  # polynomials that follow a line of sight around a full circle to 1e-6
+NODES_BY_PATH = ((0.1, 6), (0.5, 10), (1.0, 16), (2.0, 32), (math.inf, 64))
+FEWEST_PATH_NODES = NODES_BY_PATH[0][1]
+FINEST_NODES = 128  # nodes that resolve phases up to some 100 rad
+SIGHT_POLYNOMIAL_COUNT = 16  # that follow a line of sight around a full circle to 1e-6
 # Paths in pieces turn faster than their length suggests. With 1.5 nodes per piece, phases change by less than 1e-4 of
 # themselves.
 _NODES_PER_PIECE, _PIECE_NODES = 1.5, np.array((16, 32, 64, 128, 256))
-OWN_AREA = (
-    0.5  # of the determinant of H; if mean gradient and mean Doppler gradient span less, they do not tell sides apart
-)
+# Area that mean gradient and mean Doppler gradient span, over the determinant of H; with less they do not tell sides
+# apart.
+MIN_OWN_AREA_FRACTION = 0.5
 MIN_SINE = math.sin(math.radians(MIN_GRADIENT_ANGLE_DEG))
-STANDS = 1e-9  # of the turns of both lines of sight; a sum of lines of sight that turns by less does not turn
+MIN_TURN_FRACTION = 1e-9  # of the turns of both lines of sight, below which their sum does not turn
 
 
 class Band(Protocol):
     """A radar, by its band. [Hz]"""
 
     @property
-    def center_frequency(self) -> Any:
+    def center_frequency(self) -> PerCase:
         """Centre of the band."""
 
     @property
-    def bandwidth(self) -> Any:
+    def bandwidth(self) -> PerCase:
         """Width of the band, evenly filled."""
 
 
@@ -67,18 +66,28 @@ class Sampling:
     fit: Floats
 
     @cached_property
+    def centred(self) -> Floats:
+        """Takes a history to its distances from its mean, and to its mean, (samples + 1, samples)."""
+        return np.concatenate((np.eye(self.places.size) - self.fit[0], self.fit[:1]))
+
+    @cached_property
     def to_ends(self) -> Floats:
         """Weights (2, samples) that carry a smooth history from the samples to both ends of the aperture."""
-        return self.weights_at(np.array((-1.0, 1.0)))
+        return self._weights_at(np.array((-1.0, 1.0)))
 
-    def weights_at(self, slow_times: Floats) -> Floats:
+    @cached_property
+    def to_finest(self) -> Floats:
+        """Weights (FINEST_NODES, samples) that carry a smooth history from the samples to the finest nodes."""
+        return self._weights_at(nodes(FINEST_NODES).places)
+
+    def _weights_at(self, slow_times: Floats) -> Floats:
         """Weights (times, samples) that carry a smooth history from the samples to other slow times over −1 … 1."""
-        degree = min(self.places.size, OF_ENDS) - 1
+        degree = min(self.places.size, SIGHT_POLYNOMIAL_COUNT) - 1
         polynomials = np.polynomial.legendre.legvander(self.places, degree)
         return np.asarray(np.polynomial.legendre.legvander(slow_times, degree) @ np.linalg.pinv(polynomials))
 
 
-LEADING = np.array((1.0, 1.0, 1.5, 2.5))  # coefficient of xⁿ in the Legendre polynomial Pₙ
+LEGENDRE_LEADING = np.array((1.0, 1.0, 1.5, 2.5))  # coefficient of xⁿ in the Legendre polynomial Pₙ
 
 
 @cache
@@ -86,15 +95,17 @@ def nodes(count: int) -> Sampling:
     """Sampling at the nodes of Gauss-Legendre quadrature, which projects each order n: (2n + 1)/2 ∫ρPₙ."""
     slow_times, weights = np.polynomial.legendre.leggauss(count)
     orders = np.polynomial.legendre.legvander(slow_times, 3)
-    return Sampling(slow_times, ((np.arange(4) + 0.5) * LEADING)[:, None] * orders.T * weights)
+    return Sampling(slow_times, ((np.arange(4) + 0.5) * LEGENDRE_LEADING)[:, None] * orders.T * weights)
 
 
-def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_path: bool = False) -> Any:
+def nodes_for(
+    geometry: BistaticGeometry, aperture_time_s: PerCase, *, has_direct_path: bool = False
+) -> int | Indices:
     """Number of nodes that cases need, for the lines of sight, and for the direct path if it counts."""
     half = aperture_time_s / 2
     turning = (*geometry.both, *((geometry.apart,) if has_direct_path else ()))
     way = reduce(np.maximum, [path.travelled(half) / path.slant_range for path in turning])
-    limits, counts = zip(*NODES, strict=True)
+    limits, counts = zip(*NODES_BY_PATH, strict=True)
     count = np.array(counts)[np.searchsorted(limits, way)]
     pieces = max((path.curve.count for path in turning if path.curve is not None), default=0)
     if pieces:
@@ -103,7 +114,7 @@ def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_pa
     return count if np.ndim(way) else int(count)
 
 
-def band_variance(radar: Band) -> Any:
+def band_variance(radar: Band) -> PerCase:
     """b² of an evenly filled band: the variance of its frequencies over the square of its centre."""
     return (radar.bandwidth / radar.center_frequency) ** 2 / 12
 
@@ -199,34 +210,44 @@ class GroundMatrix:
 
     @cached_property
     def orientation(self) -> Floats:
-        """Area between mean gradient and mean Doppler gradient, signed; 0 where the aperture resolves more."""
-        (x, y), (by_x, by_y) = self.range_gradient, self.fit[1] @ self.slopes
-        area = x * by_y - y * by_x
-        determinant_of_both = self.band * (1 + self.band) / 3 * area * area
-        return np.where(determinant_of_both >= OWN_AREA * self.determinant, area, 0.0)
+        """Area between mean gradient and mean Doppler gradient, as in `orientation`."""
+        return orientation(self.slopes, self.fit, self.band, self.determinant)
 
-    def projected(self, values: Floats) -> Floats:
-        """Weights at the nodes, (nodes, cases), whose sum with a history is its product of V with `values`."""
-        average = self.fit[0] @ values
-        return np.asarray(self.fit[0][:, None] * ((1 + self.band) * (values - average) + self.band * average))
-
-    def turned_from(self, centre: "GroundMatrix", case: NDArray[np.intp]) -> Floats:
-        """Area that gradients span, over their area at the centre of some cases; below 0 if turned around."""
-        determinant, orientation = centre.determinant, centre.orientation
-        if determinant.size > 1:
-            determinant, orientation = determinant[case], orientation[case]
-        area = np.sqrt(np.maximum(self.determinant, 0.0) / determinant)
-        return np.where(orientation * self.orientation < 0, -area, area)
+    def turned_from(self, centre: "GroundMatrix", case: Indices) -> Floats:
+        """Area that gradients span, over their area at the centre of some cases, as in `turn`."""
+        return turn(self.determinant, self.orientation, centre, case)
 
 
-def spans_ground(geometry: BistaticGeometry, radar: Band, aperture_time_s: Any, cases: int = 1) -> tuple[Any, Any]:
+def orientation(slopes: Floats, fit: Floats, band: Floats, determinant: Floats) -> Floats:
+    """Area between mean gradient and mean Doppler gradient, signed; 0 where the aperture resolves more.
+
+    The parameters are fields of `GroundMatrix`, and the determinant of H.
+    """
+    (x, y), (by_x, by_y) = fit[0] @ slopes, fit[1] @ slopes
+    area = x * by_y - y * by_x
+    determinant_of_both = band * (1 + band) / 3 * area * area
+    return np.where(determinant_of_both >= MIN_OWN_AREA_FRACTION * determinant, area, 0.0)
+
+
+def turn(determinant: Floats, orientation: Floats, centre: GroundMatrix, case: Indices) -> Floats:
+    """Area that gradients span, over their area at the centre of some cases; below 0 if turned around."""
+    at_centre, orientation_at_centre = centre.determinant, centre.orientation
+    if at_centre.size > 1:
+        at_centre, orientation_at_centre = at_centre[case], orientation_at_centre[case]
+    area = np.sqrt(np.maximum(determinant, 0.0) / at_centre)
+    return np.where(orientation_at_centre * orientation < 0, -area, area)
+
+
+def spans_ground(
+    geometry: BistaticGeometry, radar: Band, aperture_time_s: PerCase, cases: int = 1
+) -> tuple[Booleans, Floats]:
     """Whether lines of sight turn within the aperture, and the sine of `GroundMatrix.sine`, (cases,).
 
     Full circles, and apertures that pass through a moment at which range and Doppler gradient are parallel, have an
     image plane. A collection without an image plane is within a degree of parallel over the whole aperture.
     """
     half = np.array(np.broadcast_to(np.asarray(aperture_time_s, dtype=float) / 2, (cases,)))
-    sampling = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_NODES)))
+    sampling = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_PATH_NODES)))
     slow_times, fit = sampling.places, sampling.fit
     slopes, turning = np.zeros((2, slow_times.size, cases)), np.zeros(cases)
     for path in geometry.both:
@@ -237,7 +258,7 @@ def spans_ground(geometry: BistaticGeometry, radar: Band, aperture_time_s: Any, 
         turning = turning + path.travelled(half) / path.slant_range
     matrix = GroundMatrix.of(slopes, fit, band_variance(radar) * np.ones(cases))
     spread = np.ptp(slopes, axis=1).sum(axis=0)
-    return spread > STANDS * turning, matrix.sine
+    return spread > MIN_TURN_FRACTION * turning, matrix.sine
 
 
 def degeneracy(geometry: BistaticGeometry, radar: Band, aperture_time_s: float) -> str:

@@ -10,12 +10,12 @@ import os
 from collections.abc import Iterator
 
 # Address space, bytes. With less, libraries were seen to end the process, or to report that they are not installed.
-LEAST = 192 << 20  # NumPy with one thread of OpenBLAS takes 134 MB, a check a little more
-OF_TABLES = 400 << 20
-OF_CLUSTER = 3 << 29
-_SPACIOUS = 2 << 30  # bytes; LLVM hangs in 400 MB, and Numba takes more memory with each core
-_NEAR = 32 << 20  # bytes; size of a single request of a library
-_WORDS = ("failed to map segment", "annot allocate memory", "bad_alloc", "out of memory")
+MIN_MEMORY_BYTES = 192 << 20  # NumPy with one thread of OpenBLAS takes 134 MB, a check a little more
+TABLES_MEMORY_BYTES = 400 << 20
+CLUSTER_MEMORY_BYTES = 3 << 29
+_COMPILER_MEMORY_BYTES = 2 << 30  # LLVM hangs in 400 MB, and Numba takes more memory with each core
+_REQUEST_BYTES = 32 << 20  # size of a single request of a library
+_MEMORY_ERRORS = ("failed to map segment", "annot allocate memory", "bad_alloc", "out of memory")
 
 
 def limit() -> int | None:
@@ -56,7 +56,7 @@ def hold_room(needed: int, purpose: str) -> None:
 def is_spacious() -> bool:
     """Whether the limit leaves enough memory for LLVM."""
     allowed = limit()
-    return allowed is None or allowed >= _SPACIOUS
+    return allowed is None or allowed >= _COMPILER_MEMORY_BYTES
 
 
 def ran_out(error: BaseException) -> bool:
@@ -67,7 +67,7 @@ def ran_out(error: BaseException) -> bool:
 def _says_memory(error: BaseException) -> bool:
     if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
         return True
-    words = (*_WORDS, "can't start new thread") if limit() is not None else _WORDS
+    words = (*_MEMORY_ERRORS, "can't start new thread") if limit() is not None else _MEMORY_ERRORS
     return any(cause in str(error) for cause in words)
 
 
@@ -89,4 +89,4 @@ def _is_near_limit() -> bool:
             peak = next(int(line.split()[1]) << 10 for line in file if line.startswith("VmPeak"))
     except (OSError, StopIteration):  # not Linux
         return False
-    return peak > allowed - _NEAR
+    return peak > allowed - _REQUEST_BYTES

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from html import escape
 
-_STYLE = """<style>
+_NOTEBOOK_STYLE = """<style>
 .bisar-budget { overflow-x: auto; font-size: 0.92em; line-height: 1.35 }
 .bisar-budget table { border-collapse: collapse; margin: 0.4em 0 }
 .bisar-budget th, .bisar-budget td { padding: 0.15em 0.7em; text-align: left; background: transparent }
@@ -30,7 +30,7 @@ _COLOURS = {
 
 def page(*elements: str) -> str:
     """HTML of an answer, from its parts."""
-    return f'{_STYLE}<div class="bisar-budget">{"".join(elements)}</div>'
+    return f'{_NOTEBOOK_STYLE}<div class="bisar-budget">{"".join(elements)}</div>'
 
 
 def heading(status: str, title: str, remark: str = "") -> str:

@@ -9,12 +9,12 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from bisar_budget.constants import STANDARD_GRAVITY
+from bisar_budget.constants import STANDARD_GRAVITY_MPS2
 from bisar_budget.units import DIMENSIONS, Dimension, format_quantity, normal_unit
 
 _SAME_FACTOR = 1e-9  # relative difference of two spellings of one unit
-_SHORTEST_TYPO = 3  # characters; a shorter unit is one slip away from too many units
-_SHORTEST_PLURAL = 4  # characters: mils, days
+_MIN_TYPO_CHARACTERS = 3  # a shorter unit is one slip away from too many units
+_MIN_PLURAL_CHARACTERS = 4  # mils, days
 
 
 class UnitValue(NamedTuple):
@@ -30,61 +30,71 @@ class UnitValue(NamedTuple):
         return UnitValue(self.factor * other.factor**exponent, powers)
 
 
-_LENGTH, _TIME, _ANGLE, _PLAIN = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
-_SPEED, _ACCELERATION, _FREQUENCY, _TURN_RATE = (1.0, -1.0, 0.0), (1.0, -2.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.0, 1.0)
-_DEGREE = math.pi / 180
+_LENGTH_EXPONENTS, _TIME_EXPONENTS, _ANGLE_EXPONENTS, _NUMBER_EXPONENTS = (
+    (1.0, 0.0, 0.0),
+    (0.0, 1.0, 0.0),
+    (0.0, 0.0, 1.0),
+    (0.0, 0.0, 0.0),
+)
+_SPEED_EXPONENTS, _ACCELERATION_EXPONENTS, _FREQUENCY_EXPONENTS, _TURN_RATE_EXPONENTS = (
+    (1.0, -1.0, 0.0),
+    (1.0, -2.0, 0.0),
+    (0.0, -1.0, 0.0),
+    (0.0, -1.0, 1.0),
+)
+_DEGREE_RAD = math.pi / 180
 _SI_PREFIXES = {"T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "h": 1e2, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6}
 _SI_PREFIXES |= {"n": 1e-9, "p": 1e-12, "f": 1e-15}
 # Each unit with its prefixes in use. International inch, foot, yard and mile of 1959; the remaining units are from
 # the SI brochure, 9th edition, tables 8 and 3, and from ISO 80000-3.
 _ATOMS: Mapping[str, tuple[float, tuple[float, float, float], str]] = {
-    "1": (1.0, _PLAIN, ""),
-    "%": (1e-2, _PLAIN, ""),
-    "ppm": (1e-6, _PLAIN, ""),
-    "ppb": (1e-9, _PLAIN, ""),
-    "m": (1.0, _LENGTH, "khdcmunpf"),
-    "in": (0.0254, _LENGTH, ""),
-    "mil": (2.54e-5, _LENGTH, ""),
-    "ft": (0.3048, _LENGTH, "k"),
-    "yd": (0.9144, _LENGTH, ""),
-    "mi": (1609.344, _LENGTH, ""),
-    "nmi": (1852.0, _LENGTH, ""),
-    "NM": (1852.0, _LENGTH, ""),
-    "micron": (1e-6, _LENGTH, ""),
-    "s": (1.0, _TIME, "cdmunpf"),
-    "min": (60.0, _TIME, ""),
-    "h": (3600.0, _TIME, ""),
-    "hr": (3600.0, _TIME, ""),
-    "day": (86400.0, _TIME, ""),
-    "week": (604800.0, _TIME, ""),
-    "month": (30 * 86400.0, _TIME, ""),
-    "year": (365.25 * 86400.0, _TIME, ""),
-    "Hz": (1.0, _FREQUENCY, "TGMkhdcmun"),
-    "rad": (1.0, _ANGLE, "cmunpf"),
-    "deg": (_DEGREE, _ANGLE, "mun"),
-    "\N{DEGREE SIGN}": (_DEGREE, _ANGLE, "mun"),
-    "arcmin": (_DEGREE / 60, _ANGLE, ""),
-    "arcsec": (_DEGREE / 3600, _ANGLE, "mu"),
-    "mas": (_DEGREE / 3600e3, _ANGLE, ""),
-    "gon": (math.pi / 200, _ANGLE, "m"),
-    "rev": (2 * math.pi, _ANGLE, ""),
-    "turn": (2 * math.pi, _ANGLE, ""),
-    "rpm": (2 * math.pi / 60, _TURN_RATE, ""),
-    "dps": (_DEGREE, _TURN_RATE, "mu"),
-    "dph": (_DEGREE / 3600, _TURN_RATE, "m"),
-    "mph": (0.44704, _SPEED, ""),
-    "kph": (1 / 3.6, _SPEED, ""),
-    "kmh": (1 / 3.6, _SPEED, ""),
-    "mps": (1.0, _SPEED, "kcm"),
-    "fps": (0.3048, _SPEED, ""),
-    "kn": (1852 / 3600, _SPEED, ""),
-    "kt": (1852 / 3600, _SPEED, ""),
-    "g": (STANDARD_GRAVITY, _ACCELERATION, "mun"),
-    "Gal": (1e-2, _ACCELERATION, "mu"),
+    "1": (1.0, _NUMBER_EXPONENTS, ""),
+    "%": (1e-2, _NUMBER_EXPONENTS, ""),
+    "ppm": (1e-6, _NUMBER_EXPONENTS, ""),
+    "ppb": (1e-9, _NUMBER_EXPONENTS, ""),
+    "m": (1.0, _LENGTH_EXPONENTS, "khdcmunpf"),
+    "in": (0.0254, _LENGTH_EXPONENTS, ""),
+    "mil": (2.54e-5, _LENGTH_EXPONENTS, ""),
+    "ft": (0.3048, _LENGTH_EXPONENTS, "k"),
+    "yd": (0.9144, _LENGTH_EXPONENTS, ""),
+    "mi": (1609.344, _LENGTH_EXPONENTS, ""),
+    "nmi": (1852.0, _LENGTH_EXPONENTS, ""),
+    "NM": (1852.0, _LENGTH_EXPONENTS, ""),
+    "micron": (1e-6, _LENGTH_EXPONENTS, ""),
+    "s": (1.0, _TIME_EXPONENTS, "cdmunpf"),
+    "min": (60.0, _TIME_EXPONENTS, ""),
+    "h": (3600.0, _TIME_EXPONENTS, ""),
+    "hr": (3600.0, _TIME_EXPONENTS, ""),
+    "day": (86400.0, _TIME_EXPONENTS, ""),
+    "week": (604800.0, _TIME_EXPONENTS, ""),
+    "month": (30 * 86400.0, _TIME_EXPONENTS, ""),
+    "year": (365.25 * 86400.0, _TIME_EXPONENTS, ""),
+    "Hz": (1.0, _FREQUENCY_EXPONENTS, "TGMkhdcmun"),
+    "rad": (1.0, _ANGLE_EXPONENTS, "cmunpf"),
+    "deg": (_DEGREE_RAD, _ANGLE_EXPONENTS, "mun"),
+    "\N{DEGREE SIGN}": (_DEGREE_RAD, _ANGLE_EXPONENTS, "mun"),
+    "arcmin": (_DEGREE_RAD / 60, _ANGLE_EXPONENTS, ""),
+    "arcsec": (_DEGREE_RAD / 3600, _ANGLE_EXPONENTS, "mu"),
+    "mas": (_DEGREE_RAD / 3600e3, _ANGLE_EXPONENTS, ""),
+    "gon": (math.pi / 200, _ANGLE_EXPONENTS, "m"),
+    "rev": (2 * math.pi, _ANGLE_EXPONENTS, ""),
+    "turn": (2 * math.pi, _ANGLE_EXPONENTS, ""),
+    "rpm": (2 * math.pi / 60, _TURN_RATE_EXPONENTS, ""),
+    "dps": (_DEGREE_RAD, _TURN_RATE_EXPONENTS, "mu"),
+    "dph": (_DEGREE_RAD / 3600, _TURN_RATE_EXPONENTS, "m"),
+    "mph": (0.44704, _SPEED_EXPONENTS, ""),
+    "kph": (1 / 3.6, _SPEED_EXPONENTS, ""),
+    "kmh": (1 / 3.6, _SPEED_EXPONENTS, ""),
+    "mps": (1.0, _SPEED_EXPONENTS, "kcm"),
+    "fps": (0.3048, _SPEED_EXPONENTS, ""),
+    "kn": (1852 / 3600, _SPEED_EXPONENTS, ""),
+    "kt": (1852 / 3600, _SPEED_EXPONENTS, ""),
+    "g": (STANDARD_GRAVITY_MPS2, _ACCELERATION_EXPONENTS, "mun"),
+    "Gal": (1e-2, _ACCELERATION_EXPONENTS, "mu"),
     "TECU": (1e16, (-2.0, 0.0, 0.0), ""),
 }
 # Words in small letters and in the singular; a word may have a prefix.
-_WORDS = {
+_UNIT_WORDS = {
     "arcminute": "arcmin",
     "arcsecond": "arcsec",
     "asec": "arcsec",
@@ -113,7 +123,7 @@ _WORDS = {
 }
 _WORD_PREFIXES = {"tera": 1e12, "giga": 1e9, "mega": 1e6, "kilo": 1e3, "centi": 1e-2, "milli": 1e-3, "micro": 1e-6}
 _WORD_PREFIXES |= {"nano": 1e-9, "pico": 1e-12}
-_TOKEN = re.compile(r"\s*(sqrt\(|[()/*\u00b7]|\^-?\d(?:\.\d)?|[A-Za-z\u00b0%-]+|1)", re.ASCII)
+_UNIT_TOKEN = re.compile(r"\s*(sqrt\(|[()/*\u00b7]|\^-?\d(?:\.\d)?|[A-Za-z\u00b0%-]+|1)", re.ASCII)
 # Levels against a reference other than a carrier, by their units in small letters.
 _OTHER_LEVELS = {
     "dbm": "a power",
@@ -160,11 +170,11 @@ def about_unit(digits: str, written: str, dimension: Dimension) -> tuple[str, st
         if meant := _of_same_size(value, dimension):
             return problem, f"Did you mean {meant!r}?"
         return problem, _converted(digits, written, value.factor, dimension)
-    other = next((one for one in DIMENSIONS if _powers_of(one) == value.powers), None)
-    if other is None or "Hz" in unit:  # a density that is not of the field's dimension
+    other_dimension = next((candidate for candidate in DIMENSIONS if _powers_of(candidate) == value.powers), None)
+    if other_dimension is None or "Hz" in unit:  # a density that is not of the field's dimension
         return problem, ""
-    conversion = _converted(digits, written, value.factor, other)
-    return problem, f"{conversion}, {other.name}" if conversion else ""
+    conversion = _converted(digits, written, value.factor, other_dimension)
+    return problem, f"{conversion}, {other_dimension.name}" if conversion else ""
 
 
 def is_of(written: str, dimension: Dimension) -> bool:
@@ -178,7 +188,7 @@ def value_of_unit(unit: str) -> UnitValue | None:
     tokens: list[str] = []
     end = 0
     while end < len(unit):
-        match = _TOKEN.match(unit, end)
+        match = _UNIT_TOKEN.match(unit, end)
         if match is None:
             return None
         tokens.append(match[1])
@@ -231,11 +241,11 @@ def _atom(name: str) -> UnitValue | None:
             return UnitValue(factor * of_name[0], of_name[1])
     word = name.lower()
     for prefix, factor in {"": 1.0, **_WORD_PREFIXES}.items():
-        rest = word.removeprefix(prefix).lstrip("-") if word.startswith(prefix) else ""
-        known = _WORDS.get(rest) or _WORDS.get(rest.removesuffix("s"))
-        if known is not None:
-            return UnitValue(factor * _ATOMS[known][0], _ATOMS[known][1])
-    is_plural = len(name) >= _SHORTEST_PLURAL and name.endswith("s") and name[:-1] in _ATOMS
+        bare_word = word.removeprefix(prefix).lstrip("-") if word.startswith(prefix) else ""
+        unit_name = _UNIT_WORDS.get(bare_word) or _UNIT_WORDS.get(bare_word.removesuffix("s"))
+        if unit_name is not None:
+            return UnitValue(factor * _ATOMS[unit_name][0], _ATOMS[unit_name][1])
+    is_plural = len(name) >= _MIN_PLURAL_CHARACTERS and name.endswith("s") and name[:-1] in _ATOMS
     return UnitValue(*_ATOMS[name[:-1]][:2]) if is_plural else None
 
 
@@ -247,10 +257,10 @@ def _powers_of(dimension: Dimension) -> tuple[float, float, float] | None:
 
 def _of_same_size(value: UnitValue, dimension: Dimension) -> str:
     """Unit of a dimension with the same size as `value`; empty without such a unit."""
-    return next((unit for unit, factor in dimension.units.items() if unit and _is_same(factor, value.factor)), "")
+    return next((unit for unit, factor in dimension.units.items() if unit and _is_equal(factor, value.factor)), "")
 
 
-def _is_same(a: float, b: float) -> bool:
+def _is_equal(a: float, b: float) -> bool:
     return math.isclose(a, b, rel_tol=_SAME_FACTOR)
 
 
@@ -267,21 +277,21 @@ def _respelt(unit: str, dimension: Dimension) -> str:
     """
     candidates = dict(_conceivable(dimension))
     spellings = {unit.lower(), normal_unit(unit.lower().replace("hz", "Hz")).lower()}
-    folded = [one for one in candidates if one.lower() in spellings and len(one) > 1]
-    if not _is_one_size([candidates[one] for one in folded]):
-        folded = [one for one in folded if one in dimension.units]
+    folded = [spelling for spelling in candidates if spelling.lower() in spellings and len(spelling) > 1]
+    if not _is_one_size([candidates[spelling] for spelling in folded]):
+        folded = [spelling for spelling in folded if spelling in dimension.units]
         is_unsure = len(folded) > 1 or folded[0][0] != unit[0]  # Mhz is not millihertz, and Nm is ambiguous
         folded = [] if is_unsure else folded
     is_level = _powers_of(dimension) is None  # without a letter of dBc, the unit is a power ratio
-    slips = [one for one in candidates if _is_one_slip(unit, one)]
-    if not _is_one_size([candidates[one] for one in (*folded, *slips)]):
+    slips = [spelling for spelling in candidates if _is_one_slip(unit, spelling)]
+    if not _is_one_size([candidates[spelling] for spelling in (*folded, *slips)]):
         return ""
-    offered = [*folded, *(slips if len(unit) >= _SHORTEST_TYPO and not is_level else ())]
-    return next((one for one in offered if one in dimension.units), "")
+    offered = [*folded, *(slips if len(unit) >= _MIN_TYPO_CHARACTERS and not is_level else ())]
+    return next((spelling for spelling in offered if spelling in dimension.units), "")
 
 
 def _is_one_size(factors: list[float]) -> bool:
-    return all(_is_same(factor, factors[0]) for factor in factors)
+    return all(_is_equal(factor, factors[0]) for factor in factors)
 
 
 def _conceivable(dimension: Dimension) -> Iterator[tuple[str, float]]:
@@ -305,6 +315,6 @@ def _is_one_slip(a: str, b: str) -> bool:
     if a == b or abs(len(a) - len(b)) > 1:
         return a == b
     start = next((n for n, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
-    rest_a, rest_b = a[start:], b[start:]
-    is_exchanged = rest_a[:2] == rest_b[1::-1] and rest_a[2:] == rest_b[2:] and len(rest_a) > 1
-    return rest_a[1:] == rest_b or rest_a == rest_b[1:] or rest_a[1:] == rest_b[1:] or is_exchanged
+    tail_a, tail_b = a[start:], b[start:]
+    is_exchanged = tail_a[:2] == tail_b[1::-1] and tail_a[2:] == tail_b[2:] and len(tail_a) > 1
+    return tail_a[1:] == tail_b or tail_a == tail_b[1:] or tail_a[1:] == tail_b[1:] or is_exchanged

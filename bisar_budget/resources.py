@@ -5,20 +5,20 @@ import stat
 import sys
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
+from typing import TYPE_CHECKING, BinaryIO, Protocol
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
 @cache
-def resource(*parts: str) -> "Path":
+def resource(*names: str) -> "Path":
     """Path of a bundled file: inside an installed package, or at the top level of a checkout."""
     from pathlib import Path  # a check does not need it
 
     package = Path(__file__).resolve().parent
-    installed = package.joinpath(*parts)
-    return installed if installed.exists() else package.parent.joinpath(*parts)
+    installed = package.joinpath(*names)
+    return installed if installed.exists() else package.parent.joinpath(*names)
 
 
 # Device and inode of the files that were read since a command began: no result may replace such a file.
@@ -34,16 +34,16 @@ class FilesHeld:
     def __init__(self) -> None:
         self.known: dict[tuple[str, int], bytes | UnreadableError] = {}
         self.hashes: dict[tuple[str, int], bytes] = {}
-        self.room = _MOST_HELD
+        self.room = _MAX_HELD_BYTES
 
     def content(self, file: str, most: int, read: Callable[[], bytes]) -> bytes:
         """Content of a file as first read, at most `most` + 1 bytes; `read` gives the content of an unread file."""
         key = (file if file == "-" else os.path.normpath(file), most)
-        known = self.known.get(key)
-        if isinstance(known, bytes):
-            return known
-        if known is not None:
-            raise known
+        held_content = self.known.get(key)
+        if isinstance(held_content, bytes):
+            return held_content
+        if held_content is not None:
+            raise held_content
         try:
             data = read()
         except UnreadableError as error:
@@ -61,7 +61,7 @@ class FilesHeld:
         return data
 
 
-_MOST_HELD = 64 << 20  # bytes
+_MAX_HELD_BYTES = 64 << 20
 _held: FilesHeld | None = None  # None outside of a command: a caller of functions reads the current files
 
 
@@ -123,11 +123,11 @@ class UnreadableError(Exception):
 
 def _read(file: str, most: int, called: str) -> bytes:
     try:
-        found = os.stat(file)
-        if not stat.S_ISREG(found.st_mode):
+        status = os.stat(file)
+        if not stat.S_ISREG(status.st_mode):
             raise UnreadableError(f"{called} is no regular file")
         with open(file, "rb") as stream:
-            FILES_READ.add((found.st_dev, found.st_ino))
+            FILES_READ.add((status.st_dev, status.st_ino))
             return stream.read(most + 1)
     except OSError as error:
         is_missing = isinstance(error, FileNotFoundError | NotADirectoryError)
@@ -215,10 +215,12 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def docstring(documented: Any) -> str:
+def docstring(documented: Callable[..., object] | None) -> str:
     """Docstring of a class or function at the top of its module; from the source if Python dropped it (-OO)."""
     if sys.flags.optimize < 2:
         return documented.__doc__ or ""
+    if documented is None:
+        return ""
     import ast
     from inspect import getsourcefile
 

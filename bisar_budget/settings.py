@@ -11,7 +11,7 @@ from bisar_budget.faults import fault_words, shown
 from bisar_budget.resources import DISK, Files, UnreadableError
 
 TABLE = "tool.bisar-budget"
-KEYS = {
+SETTING_TYPES = {
     "format": str,
     "report": list,
     "strict": bool,
@@ -22,11 +22,15 @@ KEYS = {
     "color": str,
     "sensors": list,
 }
-_KINDS = {str: "text", bool: "true or false", int: "a whole number", list: "a list of file names"}
+_TYPE_WORDS = {str: "text", bool: "true or false", int: "a whole number", list: "a list of file names"}
 # Only a file that mentions the tool is parsed: tomllib costs a fifth of a check's start. Escapes may hide the name.
 _CANDIDATE = re.compile(rb"bisar-budget|\\[uUx]")
-_LARGEST = 1 << 20  # bytes
-_MOST_DOTS = 1000  # on a line: tomllib's time grows with the square of the parts of a key
+_MAX_SETTINGS_BYTES = 1 << 20
+_MAX_LINE_DOT_COUNT = 1000  # on a line: tomllib's time grows with the square of the parts of a key
+
+
+SettingValues = Mapping[str, Any]
+"""Values of the table by key, each of the type that `KEYS` states."""
 
 
 class SettingsError(Exception):
@@ -38,7 +42,7 @@ class Settings:
     """The keys and values of the table; `file` is the file of the table, for messages."""
 
     file: str
-    values: Mapping[str, Any]
+    values: SettingValues
 
 
 def project_settings(folder: str, files: Files = DISK) -> Settings | None:
@@ -71,8 +75,8 @@ def _parsed(file: str, data: bytes) -> Settings | None:
         raise SettingsError(f"{file}: is not UTF-8: {error.reason} at byte {error.start}") from None
     if not _CANDIDATE.search(data) and "\0" not in text:  # UTF-16 has zeros
         return None
-    if max(line.count(".") for line in text.splitlines()) > _MOST_DOTS:
-        raise SettingsError(f"{file}: has a line with more than {_MOST_DOTS} dots")
+    if max(line.count(".") for line in text.splitlines()) > _MAX_LINE_DOT_COUNT:
+        raise SettingsError(f"{file}: has a line with more than {_MAX_LINE_DOT_COUNT} dots")
     import tomllib
 
     try:
@@ -99,30 +103,30 @@ def _parsed(file: str, data: bytes) -> Settings | None:
 def _bytes_of(file: str, files: Files) -> bytes | None:
     """Content of a file, None if the file does not exist."""
     try:
-        data = files.content(file, _LARGEST, f"{file}:")
+        data = files.content(file, _MAX_SETTINGS_BYTES, f"{file}:")
     except UnreadableError as error:
         if error.is_missing:
             return None
         raise SettingsError(str(error)) from None
-    if len(data) > _LARGEST:
-        raise SettingsError(f"{file}: is larger than {_LARGEST >> 20} MiB")
+    if len(data) > _MAX_SETTINGS_BYTES:
+        raise SettingsError(f"{file}: is larger than {_MAX_SETTINGS_BYTES >> 20} MiB")
     return data
 
 
 def _hold_to_type(file: str, key: str, value: object) -> None:
-    kind = KEYS.get(key)
+    kind = SETTING_TYPES.get(key)
     if kind is None:
         from difflib import get_close_matches
 
-        near = get_close_matches(key[:100], KEYS, 1)
+        near = get_close_matches(key[:100], SETTING_TYPES, 1)
         hint = f"Did you mean {near[0]!r}?" if near else ""
-        problem = fault_words("is not a known key", "", f"accepted: {', '.join(KEYS)}", hint)
+        problem = fault_words("is not a known key", "", f"accepted: {', '.join(SETTING_TYPES)}", hint)
         raise SettingsError(f"{file}: {TABLE}.{shown(key)}: {problem}")
     is_right = type(value) is kind and (kind is not list or all(type(name) is str for name in value))  # type: ignore[attr-defined]
     if type(value) is int:
         is_right = is_right and abs(value) < 1 << 64  # a message cannot print a larger integer
     if not is_right:
-        raise SettingsError(f"{file}: {TABLE}.{key}: must be {_KINDS[kind]} (got {_said(value)})")
+        raise SettingsError(f"{file}: {TABLE}.{key}: must be {_TYPE_WORDS[kind]} (got {_said(value)})")
 
 
 def _said(value: object) -> str:

@@ -7,7 +7,7 @@ import math
 import re
 from functools import cache, lru_cache
 
-from bisar_budget.constants import STANDARD_GRAVITY
+from bisar_budget.constants import STANDARD_GRAVITY_MPS2
 from bisar_budget.faults import InvalidValueError
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
@@ -15,7 +15,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _plain_quantity = re.compile(
     r"([+-]?(?:0|[1-9]\d{0,20})(?:\.\d{0,20})?(?:[eE][+-]?\d{1,3})?) ?([^\s\d]\S{0,20})?", re.ASCII
 ).fullmatch
-_MAX_TEXT = 64  # characters; longer text is not a quantity
+_MAX_QUANTITY_CHARACTERS = 64  # longer text is not a quantity
 
 
 class Dimension:
@@ -74,8 +74,8 @@ def _scaled(base: str, prefixes: str, power: int = 1) -> dict[str, float]:
 
 
 _LENGTHS = _scaled("m", "kcmun") | {"ft": 0.3048, "nmi": 1852.0}
-_G = STANDARD_GRAVITY
-_DEGREE = math.pi / 180
+_G = STANDARD_GRAVITY_MPS2
+_DEGREE_RAD = math.pi / 180
 
 FREQUENCY = Dimension("a frequency", "Hz", _scaled("Hz", "kMGT"))
 TIME = Dimension("a time", "s", _scaled("s", "munp") | {"min": 60.0, "h": 3600.0})
@@ -99,16 +99,17 @@ SNAP = Dimension("a snap", "m/s^4", {f"{unit}/s^4": factor for unit, factor in _
 ANGLE = Dimension(
     "an angle",
     "rad",
-    _scaled("rad", "mun") | {"deg": _DEGREE, "°": _DEGREE, "arcmin": _DEGREE / 60, "arcsec": _DEGREE / 3600},
+    _scaled("rad", "mun")
+    | {"deg": _DEGREE_RAD, "°": _DEGREE_RAD, "arcmin": _DEGREE_RAD / 60, "arcsec": _DEGREE_RAD / 3600},
     usual=("deg", "rad"),
 )
 RATIO = Dimension("a number", "", {"": 1.0, "%": 1e-2, "ppm": 1e-6, "ppb": 1e-9, "s/s": 1.0})
-_DAY = 86400.0
-_AGES = {"/day": 1 / _DAY, "1/day": 1 / _DAY, "/month": 1 / (30 * _DAY), "/year": 1 / (365.25 * _DAY)}
-_AGES |= {"ppm/day": 1e-6 / _DAY, "ppb/day": 1e-9 / _DAY}
-RATE = Dimension("a rate", "1/s", {"1/s": 1.0, "/s": 1.0, "s^-1": 1.0, "Hz": 1.0, "s/s^2": 1.0} | _AGES)
+_DAY_S = 86400.0
+_AGING_UNITS = {"/day": 1 / _DAY_S, "1/day": 1 / _DAY_S, "/month": 1 / (30 * _DAY_S), "/year": 1 / (365.25 * _DAY_S)}
+_AGING_UNITS |= {"ppm/day": 1e-6 / _DAY_S, "ppb/day": 1e-9 / _DAY_S}
+RATE = Dimension("a rate", "1/s", {"1/s": 1.0, "/s": 1.0, "s^-1": 1.0, "Hz": 1.0, "s/s^2": 1.0} | _AGING_UNITS)
 # A bare 1e-10 per second would be the aging of a whole day in one second.
-AGING = Dimension("an aging rate", "1/s", _AGES | {"/s": 1.0, "1/s": 1.0}, usual=("/day",))
+AGING = Dimension("an aging rate", "1/s", _AGING_UNITS | {"/s": 1.0, "1/s": 1.0}, usual=("/day",))
 RATE_SQUARED = Dimension("a rate per second", "1/s^2", {"1/s^2": 1.0, "/s^2": 1.0, "s^-2": 1.0, "s/s^3": 1.0})
 POWER_RATIO = Dimension("a power ratio in decibel", "dB", {"dB": 1.0})
 POSITION_VARIANCE = Dimension("a position variance", "m^2", _scaled("m^2", "kcmu", 2))
@@ -118,18 +119,18 @@ ANGULAR_RATE = Dimension(
     "an angular rate",
     "rad/s",
     {f"{unit}/s": factor for unit, factor in _scaled("rad", "mun").items()}
-    | {"deg/s": _DEGREE, "mdeg/s": 1e-3 * _DEGREE, "deg/min": _DEGREE / 60, "deg/h": _DEGREE / 3600},
+    | {"deg/s": _DEGREE_RAD, "mdeg/s": 1e-3 * _DEGREE_RAD, "deg/min": _DEGREE_RAD / 60, "deg/h": _DEGREE_RAD / 3600},
     usual=("deg/h", "deg/s"),
 )
-_ROOT_HOUR = 1 / 60  # 1/√h in 1/√s
+_PER_ROOT_HOUR = 1 / 60  # 1/√h in 1/√s
 VELOCITY_RANDOM_WALK = Dimension(
     "a velocity random walk",
     "m/s/sqrt(s)",
     {
         "m/s/sqrt(s)": 1.0,
-        "m/s/sqrt(h)": _ROOT_HOUR,
+        "m/s/sqrt(h)": _PER_ROOT_HOUR,
         "mm/s/sqrt(s)": 1e-3,
-        "ft/s/sqrt(h)": 0.3048 * _ROOT_HOUR,
+        "ft/s/sqrt(h)": 0.3048 * _PER_ROOT_HOUR,
         "m/s^2/sqrt(Hz)": 1.0,
         "ug/sqrt(Hz)": 1e-6 * _G,
         "mg/sqrt(Hz)": 1e-3 * _G,
@@ -141,12 +142,12 @@ ANGLE_RANDOM_WALK = Dimension(
     "rad/sqrt(s)",
     {
         "rad/sqrt(s)": 1.0,
-        "deg/sqrt(h)": _DEGREE * _ROOT_HOUR,
-        "deg/sqrt(s)": _DEGREE,
+        "deg/sqrt(h)": _DEGREE_RAD * _PER_ROOT_HOUR,
+        "deg/sqrt(s)": _DEGREE_RAD,
         "rad/s/sqrt(Hz)": 1.0,
-        "deg/s/sqrt(Hz)": _DEGREE,
-        "mdeg/s/sqrt(Hz)": 1e-3 * _DEGREE,
-        "deg/h/sqrt(Hz)": _DEGREE / 3600,
+        "deg/s/sqrt(Hz)": _DEGREE_RAD,
+        "mdeg/s/sqrt(Hz)": 1e-3 * _DEGREE_RAD,
+        "deg/h/sqrt(Hz)": _DEGREE_RAD / 3600,
     },
     usual=("deg/sqrt(h)", "rad/sqrt(s)"),
 )
@@ -267,7 +268,7 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
     if not isinstance(value, str):
         return _bare(_finite(float(value), dimension), str(value), dimension)
     text = value.strip()
-    match = _NUMBER.match(text) if len(text) <= _MAX_TEXT else None
+    match = _NUMBER.match(text) if len(text) <= _MAX_QUANTITY_CHARACTERS else None
     if match is None:
         is_nan_or_inf = text.lower().lstrip("+-.") in ("nan", "inf", "infinity")
         raise _invalid("must be a finite number" if is_nan_or_inf else f"must be {dimension.name}", dimension)
@@ -320,35 +321,35 @@ def given_unit(text: str, unit: str) -> str:
 
     Empty if the text has no unit or is not a quantity of the dimension of `unit`, which is an SI unit.
     """
-    match = _NUMBER.match(text.strip()) if len(text) <= _MAX_TEXT else None
+    match = _NUMBER.match(text.strip()) if len(text) <= _MAX_QUANTITY_CHARACTERS else None
     dimension = _OF_SI.get(unit)
     if match is None or dimension is None:
         return ""
-    given = text.strip()[match.end() :].lstrip()
-    given = given if given in dimension.scales else normal_unit(given)
-    return given if given in dimension.scales else ""
+    stated_unit = text.strip()[match.end() :].lstrip()
+    stated_unit = stated_unit if stated_unit in dimension.scales else normal_unit(stated_unit)
+    return stated_unit if stated_unit in dimension.scales else ""
 
 
-def format_in(value: float, unit: str, given: str, digits: int = 3, rounding: str = "nearest") -> str:
+def format_in(value: float, unit: str, written_unit: str, digits: int = 3, rounding: str = "nearest") -> str:
     """Write an SI value in a unit of the same dimension: 349 µrad is `0.02 deg` if the file uses degrees.
 
     Without a unit the text is the same as by `format_quantity`. A number with more than six digits or zeros has a
     power of ten.
     """
-    if not given or unit == "dB" or not math.isfinite(value):
+    if not written_unit or unit == "dB" or not math.isfinite(value):
         return format_quantity(value, unit, digits, rounding)
-    factor, divisor = _OF_SI[unit].scales[given]
+    factor, divisor = _OF_SI[unit].scales[written_unit]
     number = value * divisor / factor
     text = _rounded(number, digits, rounding) if number else "0"
     mantissa, _, power = text.partition("e")
     text = f"{mantissa}e{int(power)}" if power else text
-    return text + _pretty(given)
+    return text + _pretty(written_unit)
 
 
 @cache
-def _pretty(given: str) -> str:
+def _pretty(written_unit: str) -> str:
     """Write a unit of the tables for print: `um` is µm, `m/s^2` m/s², `deg/sqrt(h)` deg/√h, `1/s` /s."""
-    text = given.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("°", "deg")
+    text = written_unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("°", "deg")
     text = re.sub(r"sqrt\((\w+)\)", r"√\1", text)
     text = re.sub(r"^u(?=m|g|s|rad|Gal)", "µ", text)
     return text.removeprefix("1") if text.startswith(("1/", "/")) else f" {text}"
@@ -361,7 +362,7 @@ def format_limit(limit: float, unit: str) -> str:
 
 _SMALL = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 # Kilometres per second squared and megametres are not in use.
-_STEPS = {
+_PREFIX_SCALES = {
     "Hz": ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, "")),
     "m": ((1e3, "k"), *_SMALL),
     "s": _SMALL,
@@ -371,9 +372,9 @@ _STEPS = {
 }
 # Units of data sheets: factor to SI, and the text after the number.
 _SHEETS = {
-    "rad/s": (_DEGREE / 3600, " deg/h"),
-    "m/s/sqrt(s)": (_ROOT_HOUR, " m/s/√h"),
-    "rad/sqrt(s)": (_DEGREE * _ROOT_HOUR, " deg/√h"),
+    "rad/s": (_DEGREE_RAD / 3600, " deg/h"),
+    "m/s/sqrt(s)": (_PER_ROOT_HOUR, " m/s/√h"),
+    "rad/sqrt(s)": (_DEGREE_RAD * _PER_ROOT_HOUR, " deg/√h"),
     "s^2/m": (1 / _G, " /g"),
     "(m/s^2)^2/Hz": (_G**2, " g²/Hz"),
     "1": (1e-6, " ppm"),
@@ -388,7 +389,10 @@ def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
         scale, suffix = _SHEETS[unit]
         return ((scale, 0.0, math.inf, suffix),)
     suffix = _pretty(unit).rstrip()
-    steps = ((scale, scale * 0.9995, scale * 1e6, f" {prefix}{suffix[1:]}") for scale, prefix in _STEPS.get(unit, ()))
+    steps = (
+        (scale, scale * 0.9995, scale * 1e6, f" {prefix}{suffix[1:]}")
+        for scale, prefix in _PREFIX_SCALES.get(unit, ())
+    )
     return (*steps, (1.0, 0.0, math.inf, suffix))
 
 
@@ -441,10 +445,10 @@ def _wrong_unit(digits: str, written: str, dimension: Dimension) -> InvalidValue
     unit = normal_unit(written)
     if unit.startswith(","):
         return _invalid("has a decimal comma", dimension, "Write a point")
-    others = [other for other in DIMENSIONS if unit in other.units]
-    if others:
+    matches = [match for match in DIMENSIONS if unit in match.units]
+    if matches:
         meant = dimension.si if unit in _DECIBELS and dimension.si.startswith("dB") else ""
-        problem = f"must be {dimension.name}, but {written!r} makes it {others[0].name}"
+        problem = f"must be {dimension.name}, but {written!r} makes it {matches[0].name}"
         return _invalid(problem, dimension, f"Did you mean {meant!r}?" if meant else "")
     from bisar_budget.other_units import about_unit
 

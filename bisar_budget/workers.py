@@ -6,22 +6,40 @@ import threading
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 from multiprocessing.connection import wait
-from typing import Any
+from typing import Protocol, TypeVar
 
 from bisar_budget.faults import WorkerLostError
 
 Progress = Callable[[int, int], None]  # receives the finished amount and the total amount
 
-# Lets workers call a function with the common data and each block; gives each block with its result, in any order.
-# The last argument is a function that describes a block in messages.
-MapBlocks = Callable[[Callable[[Any, Any], Any], Any, Iterable[Any], Callable[[Any], str]], Iterator[tuple[Any, Any]]]
+Common = TypeVar("Common")
+Block = TypeVar("Block")
+Result = TypeVar("Result")
 
-_PATIENCE = 10.0  # s to wait for the pool's own thread, which ends as soon as its workers end
+
+class MapBlocks(Protocol):
+    """Lets workers call a function with the common data and each block.
+
+    It gives each block with its result, in any order. `about` describes a block in messages.
+    """
+
+    def __call__(
+        self,
+        function: Callable[[Common, Block], Result],
+        common: Common,
+        blocks: Iterable[Block],
+        about: Callable[[Block], str],
+        /,
+    ) -> Iterator[tuple[Block, Result]]:
+        """Map the blocks."""
+
+
+_POOL_TIMEOUT_S = 10.0  # to wait for the pool's own thread, which ends as soon as its workers end
 
 
 def unseen(done: int, total: int) -> None:
@@ -46,7 +64,7 @@ def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExe
             worker.terminate()
         for thread in set(threading.enumerate()) - worker_count:
             if not thread.daemon:  # the pool's own: at its exit Python might write to the pipe that it is closing
-                thread.join(_PATIENCE)
+                thread.join(_POOL_TIMEOUT_S)
         if isinstance(error, BrokenProcessPool):
             raise WorkerLostError("a worker process was ended from outside, as when memory runs out") from None
         raise
@@ -57,10 +75,13 @@ def in_processes(count: int) -> MapBlocks:
     """Map blocks in `count` processes; results come in the order of the blocks, computed only a little in advance."""
 
     def mapped(
-        function: Callable[[Any, Any], Any], common: Any, blocks: Iterable[Any], about: Callable[[Any], str]
-    ) -> Iterator[tuple[Any, Any]]:
+        function: Callable[[Common, Block], Result],
+        common: Common,
+        blocks: Iterable[Block],
+        about: Callable[[Block], str],
+    ) -> Iterator[tuple[Block, Result]]:
         with worker_pool(count, "spawn") as pool:
-            waiting: deque[tuple[Any, Any]] = deque()
+            waiting: deque[tuple[Block, Future[Result]]] = deque()
             for block in blocks:
                 waiting.append((block, pool.submit(function, common, block)))
                 if len(waiting) > 3 * count:

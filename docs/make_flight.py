@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterator
 from random import Random
 
-from bisar_budget.paths.earth import EQUATORIAL_RADIUS_M, FLATTENING
+from bisar_budget.paths.earth import EQUATORIAL_RADIUS_M, FLATTENING_RATIO
 from bisar_budget.paths.instant import parse_instant
 
 SEED = 20260710
@@ -54,7 +54,7 @@ def lines() -> Iterator[str]:
     middle = parse_instant(MIDDLE)
     assert middle is not None
     gusts = [turbulence(random, sigma) for sigma in GUSTS]
-    eccentricity_squared = FLATTENING * (2 - FLATTENING)
+    eccentricity_squared = FLATTENING_RATIO * (2 - FLATTENING_RATIO)
     across = EQUATORIAL_RADIUS_M / math.sqrt(1 - eccentricity_squared * math.sin(LATITUDE) ** 2)
     along = across**3 * (1 - eccentricity_squared) / EQUATORIAL_RADIUS_M**2
     yield from COMMENT.splitlines()

@@ -1,10 +1,11 @@
 """Shared test helpers: missions built from a base by replacement, rows found by id."""
 
 import copy
+import gc
 import math
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import date
 from functools import lru_cache
 from inspect import signature
@@ -29,38 +30,112 @@ from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import load_mission, parse_mission
 from tests.yaml_text import yaml_text
 
-# Shared machines: how long an example takes says nothing.
-settings.register_profile("shared", deadline=None)
-settings.load_profile("shared")
+# Shared machines: how long an example takes says nothing. `-m thorough` loads the second profile (see `examples`).
+_DEFAULT_EXAMPLES, _THOROUGH_EXAMPLES = 20, 100
+settings.register_profile("default", deadline=None, max_examples=_DEFAULT_EXAMPLES)
+settings.register_profile("thorough", deadline=None, max_examples=_THOROUGH_EXAMPLES)
+settings.load_profile("default")
+
+
+def examples(count: int, default: int | None = None, **options: Any) -> settings:
+    """Settings of a Hypothesis test with a number of examples of its own.
+
+    Parameters
+    ----------
+    count : int
+        Examples of `-m thorough`.
+    default : int, optional
+        Examples of every other run; without it a fifth of `count`, at least 10.
+    **options
+        Other settings.
+    """
+    fewer = min(count, max(10, count // 5) if default is None else default)
+    is_thorough = settings().max_examples == _THOROUGH_EXAMPLES
+    return settings(max_examples=count if is_thorough else fewer, deadline=None, **options)
+
+
+def seeds(count: int, default: int, *found: int) -> list[Any]:
+    """Seeds 0 to `count` − 1 as parameters: the first ones, and those that once found a defect, in every run.
+
+    The others are marked `thorough`.
+    """
+    always = {*range(default), *found}
+    return [seed if seed in always else pytest.param(seed, marks=pytest.mark.thorough) for seed in range(count)]
+
+
+def by_turns(items: Sequence[Any], ways: Sequence[Any], *always: Any) -> list[Any]:
+    """Pairs of parameters: each item in one of the ways by turns, or in all of them if it is one of `always`.
+
+    The other pairs are marked `thorough`.
+    """
+    return [
+        pytest.param(item, way, marks=() if item in always or number % len(ways) == turn else pytest.mark.thorough)
+        for number, item in enumerate(items)
+        for turn, way in enumerate(ways)
+    ]
+
+
+def name_of(value: Any) -> str | None:
+    """Id of a parameter: the name of a file without its ending, or pytest's own."""
+    return value.stem if isinstance(value, Path) else None
+
 
 # Files that take longest; begun last, one core would wait for them. The first waits more than it computes.
 _FIRST = (
-    *("test_scheduler.py", "test_compliance_page.py", "test_hostile.py", "test_gate.py"),
-    *("test_report_explanation.py", "test_sweep.py", "test_allocate.py", "test_random_errors.py"),
-    *("test_cphd.py", "test_point.py", "test_navigation_sweep.py", "test_report_compliance.py", "test_symmetries.py"),
+    *("test_scheduler.py", "test_compliance_page.py", "test_hostile.py", "test_gate.py", "test_cphd.py"),
+    *("test_sweep.py", "test_scene_edge.py", "test_processors.py", "test_allocate.py", "test_point.py"),
+    *("test_front_door.py", "test_navigation_sweep.py", "test_any_size.py", "test_symmetries.py"),
+    *("test_report_explanation.py", "test_fallen_effects.py", "test_random_errors.py", "test_report_compliance.py"),
 )
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files that take longest; all else stays in its order."""
+def pytest_configure(config: pytest.Config) -> None:
+    """Give Hypothesis as many examples as are asked for, before test modules are imported."""
+    if _is_thorough(config):
+        settings.load_profile("thorough")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out tests that are marked `thorough` unless they are asked for, and begin with what takes longest.
+
+    Tests by Hypothesis have more examples in a thorough run, so they belong to it too.
+    """
+    for item in items:
+        if _is_thorough(config) and getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
+            item.add_marker("thorough")
+    left_out = [item for item in items if item.get_closest_marker("thorough") and not _is_thorough(config)]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if not item.get_closest_marker("thorough")]
     place = {name: number for number, name in enumerate(_FIRST)}
     items.sort(key=lambda item: place.get(item.path.name, len(place)))
 
 
+def _is_thorough(config: pytest.Config) -> bool:
+    """Whether `-m` names the marker."""
+    return "thorough" in (config.getoption("markexpr") or "")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int | None:
+    """One process more than cores: some tests wait for a browser, a scheduler or a command."""
+    return None if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ else (os.cpu_count() or 1) + 1
+
+
+def pytest_collection_finish() -> None:
+    """Leave what was imported and collected out of every later collection of garbage."""
+    gc.collect()
+    gc.freeze()
+
+
+_is_patched = False  # whether the test of now may put something into the package
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """A test that puts something into the package finds it in its findings."""
-    _forget(item)
-
-
-def pytest_runtest_teardown(item: pytest.Item) -> None:
-    """And no other test does."""
-    _forget(item)
-
-
-def _forget(item: pytest.Item) -> None:
-    if "monkeypatch" in getattr(item, "fixturenames", ()):
-        _findings_of.cache_clear()
-        _found_in.cache_clear()
+    """A test that puts something into the package finds it in its findings, and no other test does."""
+    global _is_patched
+    _is_patched = "monkeypatch" in getattr(item, "fixturenames", ())
 
 
 _approx = pytest.approx
@@ -143,22 +218,24 @@ def mission_text(**changes: Any) -> str:
 
 def findings(**changes: Any) -> MissionFindings:
     """Check the base mission with changes."""
-    return _findings_of(mission_text(**changes))
+    check = _findings_of.__wrapped__ if _is_patched else _findings_of
+    return check(mission_text(**changes))
 
 
 def found_in(path: Path, model: str | None = None) -> MissionFindings:
     """Check a mission file of the repository."""
     assert path.is_relative_to(ROOT)  # what is there stays as it is
-    return _found_in(path, model)
+    check = _found_in.__wrapped__ if _is_patched else _found_in
+    return check(path, model)
 
 
-# Findings cannot be changed, and many tests ask for the same ones.
+# Findings cannot be changed, and many tests ask for the same ones: all examples by each of three models.
 @lru_cache(maxsize=64)
 def _findings_of(text: str) -> MissionFindings:
     return check_mission(parse_mission(text, "mission.yaml"), TODAY)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=160)
 def _found_in(path: Path, model: str | None) -> MissionFindings:
     return check_mission(load_mission(str(path), model), TODAY)
 

@@ -378,7 +378,7 @@ MUTANTS = (
     Mutant(
         "units: ft/s/sqrt(h) without the root of an hour",
         "bisar_budget/units.py",
-        '"ft/s/sqrt(h)": 0.3048 * _ROOT_HOUR',
+        '"ft/s/sqrt(h)": 0.3048 * _PER_ROOT_HOUR',
         '"ft/s/sqrt(h)": 0.3048',
         ("tests/house/test_units.py::test_every_unit_has_the_factor_of_its_parts",),
     ),

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import FRAME_AXES, PlatformState
 from bisar_budget.mission.model import Mission
 
@@ -98,7 +98,7 @@ def errors_of(mission: Mission) -> Iterator[Error]:
     near, still = FAR * min(ranges), np.zeros((2, 3, 3))
     for order, term in enumerate(CLOCK):
         value = getattr(mission.timing_error, term)
-        cap = 2 * min(ranges) / SPEED_OF_LIGHT / (T / 2) ** order
+        cap = 2 * min(ranges) / SPEED_OF_LIGHT_MPS / (T / 2) ** order
         size = None if value is None else factor * value
         clock = np.zeros(4) if _is_heard(mission) else np.eye(4)[order]
         yield Error(f"timing.{term}", "clock", still, clock, size, cap)
@@ -195,7 +195,7 @@ class Lanes:
         self.is_heard = _is_heard(mission)
         self.apart, self.parted = self.true[:, 0] - self.true[:, 1], self.error[:, 0] - self.error[:, 1]
         clock = np.array([e.clock for e in errors])
-        self.clock = SPEED_OF_LIGHT * clock @ np.array([tau**order for order in range(4)])  # (L, n)
+        self.clock = SPEED_OF_LIGHT_MPS * clock @ np.array([tau**order for order in range(4)])  # (L, n)
         self.band = (mission.radar.bandwidth / mission.radar.center_frequency) ** 2 / 12
         looks = self.true / self.recorded[..., None]
         cosines = np.einsum("lknf,lkmf->lknm", looks, looks).min(axis=(1, 2, 3))
@@ -205,8 +205,9 @@ class Lanes:
 
     def _product(self, one: Array, other: Array) -> Array:
         """(1 + b²)⟨ac⟩ − ⟨a⟩⟨c⟩ of (L, n, f) and (L, n, g), (L, f, g)."""
-        means = np.einsum("n,lnf->lf", _MEAN, one)[:, :, None] * np.einsum("n,lng->lg", _MEAN, other)[:, None]
-        return (1 + self.band) * np.einsum("n,lnf,lng->lfg", _MEAN, one, other) - means
+        means = (_MEAN @ one)[:, :, None] * (_MEAN @ other)[:, None]
+        weighted: Array = (_MEAN[:, None] * one).swapaxes(1, 2)
+        return (1 + self.band) * (weighted @ other) - means
 
     def _seen(self, size: Array, place: Array, lanes: Any) -> tuple[Array, Array, Array]:
         """ρ (L, n), unit vectors from the point to the measured platforms (L, 2, n, 3), and distances (L, 2, n)."""
@@ -350,9 +351,15 @@ class Lanes:
             return None
         size = at.size + np.sign(end) * min(abs(end - at.size[0]), 1e-4 * abs(at.size[0]))
 
+        measured = self.true[lane if len(self.true) > 1 else 0] + size * self.error[lane]  # (2, n, 3)
+        rest = self._seen(size, np.zeros((1, 2)), [lane])[0][0]
+        distance = np.sqrt((measured**2).sum(axis=-1))
+
         def variance(place: Array) -> float:
-            left, _, _ = self._seen(size, place[None], [lane])
-            return float(self.wavenumber**2 * self._product(left[..., None], left[..., None])[0, 0, 0])
+            """V at a point of the ground: ρ is that at the origin, and what the point takes from both distances."""
+            nearer = 2 * measured[..., 0] * place[0] + 2 * measured[..., 1] * place[1] - place @ place
+            left = rest + (nearer / (distance + np.sqrt(distance**2 - nearer))).sum(axis=0)
+            return float(self.wavenumber**2 * ((1 + self.band) * (_MEAN @ left**2) - (_MEAN @ left) ** 2))
 
         way = np.linalg.norm(at.place[0])
         corners = at.place[0] + 0.01 * way * np.array(((0, 0), (1, 0), (0, 1)))

@@ -8,10 +8,10 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.analysis.together import Together
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.effects.effect import plain
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import format_quantity
 
 BALANCED_RANGE = (0.05, 0.95)  # each platform keeps a budget
@@ -62,14 +62,14 @@ class Allocation(NamedTuple):
         return needed_sentence(qpe / math.sqrt(room) / (self.qpe.of(owner) * math.pi), caps(mission))
 
 
-def _gain(n_pull: Any, qpe_total: Any) -> Any:
+def _gain(n_pull: float | None, qpe_total: float) -> PerCase:
     if n_pull is None:
         return 1.0
     gain = evaluators.autofocus_gain(n_pull, qpe_total)
     return gain * (gain > 1) + 1.0 * (gain <= 1)  # the larger number, also of arrays
 
 
-def autofocus_gain_of(mission: Mission) -> Any:
+def autofocus_gain_of(mission: Mission) -> PerCase:
     """Return the factor on QPE limits by a mission's autofocus. It does not depend on the division of the budget."""
     return _gain(effective_n_pull(mission), mission.requirements.quadratic_phase_error)
 
@@ -164,7 +164,7 @@ def caps(mission: Mission) -> Caps:
     walk = range_walk_cap(mission)
     if mission.scene.radius is None:
         return Caps(walk)
-    cell = mission.geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time)
+    cell = float(mission.geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time))
     return Caps(walk, 2 * mission.scene.radius / (4 * cell * ROOM[mission.autofocus.algorithm]))
 
 

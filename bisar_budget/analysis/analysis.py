@@ -6,7 +6,6 @@ Cases of one shape are analysed together. `Case` gives plain numbers of a single
 import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from bisar_budget.analysis.peak_loss import peak_loss_db
 from bisar_budget.analysis.spread import Tone, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.tone_displacement import ToneDisplacement, tone_displacements
+from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
 from bisar_budget.effects.combined import Correlated, correlated_errors
 from bisar_budget.effects.declared import Declared, DeclaredErrors, Model
 from bisar_budget.effects.effect import ErrorSource, Subject, plain
@@ -29,7 +29,7 @@ from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission, has_random_errors
 from bisar_budget.mission.stacked import picked
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.ranges.resolution import Resolution, resolution
 
 __all__ = ["Analysis", "Case", "Model", "by_nodes"]
@@ -208,7 +208,7 @@ class Case:
     def __init__(self, analysis: Analysis, mission: Mission | None = None, place: int = 0) -> None:
         self.analysis, self.mission, self.place = analysis, mission or analysis.mission, place
 
-    def number(self, column: Any) -> float:
+    def number(self, column: PerCase | PerCaseFlag) -> float:
         """The number of this case in a column (cases,). A single number counts for every case."""
         return plain(column, self.place)
 

@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bisar_budget.analysis.spread import CUBIC_POWER, noise, rests
+from bisar_budget.arrays import Floats
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.image_plane import OF_ENDS, nodes
-from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges, Floats
+from bisar_budget.image_plane import FINEST_NODES, SIGHT_POLYNOMIAL_COUNT, nodes
+from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges
 
 if TYPE_CHECKING:
     from bisar_budget.analysis.analysis import Analysis
 
-_SUMMED_NODES = 128  # for phases up to some 100 rad
 _DB_OF_VARIANCE = 10 / math.log(10)
 
 
@@ -88,8 +88,10 @@ def _range_errors_left(errors: DeclaredErrors, motion: Sequence[ErrorSource]) ->
 def peak_losses(exact: ExactRanges, remaining: Floats) -> Floats:
     """Losses of the peak by range errors left at the nodes, (..., nodes, cases) [m]; (..., cases). [dB]"""
     sampling = exact.sampling
-    if sampling.places.size <= OF_ENDS:  # a few nodes resolve a smooth range error, but not the turns of its phase
-        remaining, sampling = sampling.weights_at(nodes(_SUMMED_NODES).places) @ remaining, nodes(_SUMMED_NODES)
+    if (
+        sampling.places.size <= SIGHT_POLYNOMIAL_COUNT
+    ):  # a few nodes resolve a smooth range error, but not the turns of its phase
+        remaining, sampling = sampling.to_finest @ remaining, nodes(FINEST_NODES)
     phase, relative_band = exact.k * remaining, np.sqrt(12 * exact.band)
     of_band = np.sinc(phase * relative_band / (2 * math.pi))  # the mean over the band, in closed form
     amplitude = np.abs(np.einsum("n,...nc->...c", sampling.fit[0], np.exp(1j * phase) * of_band))

@@ -17,13 +17,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.scene_random import RandomPhases
-from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
+from bisar_budget.constants import UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.combined import combined, combined_phase, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.random_effect import RandomError
@@ -31,29 +32,77 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.image_plane import MIN_SINE, degeneracy
 from bisar_budget.mission.model import Mission, Shares
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Indices, Lanes, SmallErrors, Truths
+from bisar_budget.ranges.exact_ranges import ExactRanges, Lanes, SmallErrors
 from bisar_budget.ranges.point_paths import ROWS, PointPaths
 from bisar_budget.units import format_quantity
 
-RIM_POINTS = 16
-WIDE = 0.1  # of the nearest slant range; beyond, twice as many
-LIKE_A_COSINE = 1e-4  # as near to the crest of a cosine; its azimuth is then right to a degree
-ROUGH = 0.1  # by so much, of itself, a crest through points of the rim may be off
-CLIMBS = 5  # until then, each in a quarter of the arc before
-NARROW = 10.0  # of a place's clearances; below, it is looked at whatever its difference
-NEAREST_M = 1.0  # of a platform to a place; nearer, no image
-FARTHEST = 0.5  # of the nearest slant range: the search for a radius ends there
-PRECISION = 1e-3  # of the radius
-ALIKE = 5e-3  # of the total: so near to it, large errors need no search of their own
-TURNS = 2  # of the azimuth along which it is searched; then it is the whole circle's
-PROBES = 3
-FLOOR_RAD, SHARE = 1e-4, 3e-4  # of the largest difference: what one error may differ by and be taken as small
-FINEST = 1e-3  # rad, of the azimuth of a largest difference: a cosine loses half its square
-MAY_FOLD = 0.7  # of what gradients span without an error: with less left of it a point may have no image nearby
-AT_ONCE, TOGETHER = 512, 1024  # cases, and large errors at places: arrays of more do not stay in a cache
 
-_BOUND = 1 + UTILIZATION_TOLERANCE
-_ARC = math.pi / RIM_POINTS
+@dataclass(frozen=True)
+class SceneSettings:
+    """Tunings of the searches around the scene centre.
+
+    Attributes
+    ----------
+    rim_points : int
+        Number of even points of a circle.
+    wide_fraction : float
+        Radius, as a fraction of the nearest slant range, above which a circle has twice as many points.
+    nearest_m : float
+        Distance between a platform and a ground point below which there is no image. [m]
+    crest_fraction : float
+        Difference between a height and the predicted crest of a cosine that ends a climb, as a fraction of the crest.
+        The azimuth is then right to a degree.
+    crest_error_fraction : float
+        Error of a crest that is predicted from points of a rim, as a fraction of the crest.
+    max_climb_rounds : int
+        Largest number of rounds of a climb, each in a quarter of the arc before.
+    narrow_clearance_ratio : float
+        Clearance below which the points around it are searched, whatever their difference.
+    max_radius_fraction : float
+        Radius at which the search for a radius ends, as a fraction of the nearest slant range.
+    radius_fraction : float
+        Error of a radius, as a fraction of it.
+    similar_size_fraction : float
+        Difference between a size and the total below which large errors need no search, as a fraction of the total.
+    max_azimuth_rounds : int
+        Number of worst azimuths along which a radius is searched before the whole circle is.
+    probe_count : int
+        Number of azimuths at which a large error is compared with a small one.
+    small_phase_rad, small_phase_fraction : float
+        Difference of one error that is taken as small: up to this phase [rad], or this fraction of the largest
+        difference.
+    azimuth_rad : float
+        Error of the azimuth of a largest difference; a cosine loses half its square. [rad]
+    folding_fraction : float
+        Area that gradients span, as a fraction of their area without an error, below which a point may have no image.
+    cases_per_block, lanes_per_block : int
+        Number of cases, and of large errors at ground points, whose arrays stay in a cache.
+    """
+
+    rim_points: int = 16
+    wide_fraction: float = 0.1
+    nearest_m: float = 1.0
+    crest_fraction: float = 1e-4
+    crest_error_fraction: float = 0.1
+    max_climb_rounds: int = 5
+    narrow_clearance_ratio: float = 10.0
+    max_radius_fraction: float = 0.5
+    radius_fraction: float = 1e-3
+    similar_size_fraction: float = 5e-3
+    max_azimuth_rounds: int = 2
+    probe_count: int = 3
+    small_phase_rad: float = 1e-4
+    small_phase_fraction: float = 3e-4
+    azimuth_rad: float = 1e-3
+    folding_fraction: float = 0.7
+    cases_per_block: int = 512
+    lanes_per_block: int = 1024
+
+
+_SCENE = SceneSettings()
+
+_LIMIT_FACTOR = 1 + UTILIZATION_TOLERANCE_FRACTION
+_ARC = math.pi / _SCENE.rim_points
 _SIDES = np.array([[-1.0], [1.0]])
 HeightAt = Callable[[Floats, Indices], Floats]  # heights at azimuths, of some climbers
 SizeAt = Callable[[Floats, Indices], Floats]  # sizes at radii, of some cases
@@ -72,7 +121,7 @@ class ScenePlaces:
     clearance: Floats
 
     @property
-    def has_image(self) -> Truths:
+    def has_image(self) -> Booleans:
         """Whether an image can be formed there."""
         return np.asarray(self.clearance > 1)
 
@@ -94,9 +143,12 @@ class Rims:
     difference: Floats
     phases: Floats
 
-    def of(self, some: Indices) -> "Rims":
-        """Some of the circles."""
-        return Rims(self.azimuth[some], self.difference[some], self.phases[..., some])
+    def of(self, indices: Indices) -> "Rims":
+        """Circles of some indices."""
+        return Rims(self.azimuth[indices], self.difference[indices], self.phases[..., indices])
+
+
+Selection = int | Booleans | Indices | tuple[Indices, ...]  # of the cases
 
 
 class Heights(NamedTuple):
@@ -111,21 +163,21 @@ class Heights(NamedTuple):
         height = self.height.max(axis=0)
         return Heights(height, np.where(self.height == height, self.azimuth, -math.inf).max(axis=0))
 
-    def with_others(self, *others: "Heights") -> "Heights":
-        """The highest of these and others, one by one."""
-        return Heights(*map(np.array, zip(self, *others, strict=True))).highest
+    def with_others(self, *candidates: "Heights") -> "Heights":
+        """The highest of these and the candidates, element by element."""
+        return Heights(*map(np.array, zip(self, *candidates, strict=True))).highest
 
-    def of(self, some: Any) -> "Heights":
-        """Some of them."""
-        return Heights(self.height[some], self.azimuth[some])
+    def of(self, indices: Selection) -> "Heights":
+        """Heights of some indices."""
+        return Heights(self.height[indices], self.azimuth[indices])
 
-    def where(self, is_own: Truths, others: "Heights") -> "Heights":
-        """These in some places, in the rest others."""
-        return Heights(*(np.where(is_own, *both) for both in zip(self, others, strict=True)))
+    def where(self, is_kept: Booleans, replacements: "Heights") -> "Heights":
+        """These where they are kept, elsewhere the replacements."""
+        return Heights(*(np.where(is_kept, *both) for both in zip(self, replacements, strict=True)))
 
-    def put(self, some: Any, others: "Heights") -> None:
-        """Put others into some places."""
-        self.height[some], self.azimuth[some] = others
+    def put(self, indices: Selection, heights: "Heights") -> None:
+        """Put heights at indices."""
+        self.height[indices], self.azimuth[indices] = heights
 
 
 class ScenePhases:
@@ -140,7 +192,9 @@ class ScenePhases:
         self.members = [error for error in errors.stated if error.is_motion]
         self.random = RandomPhases(errors, random)
         subjects = [*(error.subject for error in self.members), *self.random.subjects]
-        self.ids, self.owners = ([getattr(what, part) for what in subjects] for part in ("id", "owner"))
+        self.ids, self.owners = (
+            [getattr(subject, attribute) for subject in subjects] for attribute in ("id", "owner")
+        )
         self.small = SmallErrors.of([errors.lanes(error) for error in self.members])
         shape = (len(self.members), errors.cases)
         self.sizes = np.array([errors.array(error.declared) for error in self.members]).reshape(shape)
@@ -149,7 +203,8 @@ class ScenePhases:
         self.is_large = np.zeros(self.centre.shape, dtype=bool)
         for index, error in enumerate(self.members):
             self.is_large[index] = errors.is_large(error)
-        self.nearest = errors.array(np.minimum(*(path.slant_range for path in errors.geometries.both)))
+        transmitter, receiver = errors.geometries.both
+        self.nearest = errors.array(np.minimum(transmitter.slant_range, receiver.slant_range))
 
     def ranges_at(self, radius: Floats, azimuth: Floats, of: Indices) -> ExactRanges:
         """Exact ranges of places."""
@@ -168,20 +223,20 @@ class ScenePhases:
             phases = np.concatenate((small, phases))
         way = np.copysign(1.0, there.matrix.turned_from(self.exact.matrix, of))
         clearance = way * there.sine / MIN_SINE
-        is_nowhere = (there.nearest < NEAREST_M) | ~np.isfinite(phases.sum(axis=0) + clearance)
+        is_nowhere = (there.nearest < _SCENE.nearest_m) | ~np.isfinite(phases.sum(axis=0) + clearance)
         if is_nowhere.any():
             phases, clearance = np.where(is_nowhere, centre, phases), np.where(is_nowhere, 0.0, clearance)
         return ScenePlaces(phases, self.together(phases - centre, of), clearance)
 
     def together(self, phases: Floats, of: Indices, indices: Sequence[int] | None = None) -> Floats:
         """Phases of the errors, or of some of them, combined; those of a covariance with their correlations. [rad]"""
-        found = self.of_errors(phases)
+        phases_of_errors = self.of_errors(phases)
         if indices is None and not self.groups:
-            return np.asarray(combined(list(found), self.combine))
+            return np.asarray(combined(list(phases_of_errors), self.combine))
         chosen = range(len(self.ids)) if indices is None else indices
         groups = [group.of(of) for group in self.groups]
-        one = combined_phase([(self.ids[i], found[i]) for i in chosen], self.combine, groups)
-        return np.asarray(np.broadcast_to(one, phases.shape[1:]))
+        total = combined_phase([(self.ids[i], phases_of_errors[i]) for i in chosen], self.combine, groups)
+        return np.asarray(np.broadcast_to(total, phases.shape[1:]))
 
     def of_errors(self, phases: Floats) -> Floats:
         """Phases of the errors, (errors, ...), of one at random the sigma, by those of their parts. [rad]"""
@@ -192,7 +247,7 @@ class ScenePhases:
         """Phase of each error there less that at the centre; by the worse sign of the large ones. [rad]"""
         return self.around(radius, azimuth, of, self.is_large.take(of, axis=1))[1]
 
-    def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Truths) -> tuple[Floats, Floats, Floats]:
+    def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Booleans) -> tuple[Floats, Floats, Floats]:
         """The same were all errors small; with some taken exactly, (errors, places); and how gradients turn.
 
         That is the least of what range and Doppler gradients span where each of these leads, over what they span
@@ -200,36 +255,36 @@ class ScenePhases:
         """
         there = self.ranges_at(radius, azimuth, of)
         small = self.there(there, of).phases - self.centre.take(of, axis=1)
-        found, turns = small.copy(), np.full(of.shape, math.inf)
-        error, place = np.nonzero(exact)
-        for start in range(0, error.size, TOGETHER):
-            some = slice(start, start + TOGETHER)
-            self._exactly(there, of, error[some], place[some], (found, turns))
-        return small, found, turns
+        differences, turns = small.copy(), np.full(of.shape, math.inf)
+        error, point = np.nonzero(exact)
+        for start in range(0, error.size, _SCENE.lanes_per_block):
+            block = slice(start, start + _SCENE.lanes_per_block)
+            self._exactly(there, of, error[block], point[block], (differences, turns))
+        return small, differences, turns
 
     def _exactly(
-        self, there: ExactRanges, of: Indices, error: Indices, place: Indices, kept: tuple[Floats, Floats]
+        self, there: ExactRanges, of: Indices, error: Indices, point: Indices, kept: tuple[Floats, Floats]
     ) -> None:
         """Put what exact ranges say into the differences and turns of some errors at places."""
-        (found, turns), case, count = kept, of[place], error.size
+        (differences, turns), case, count = kept, of[point], error.size
         lanes = self._lanes.of((self._rows[:, error] * self.errors.cases + case).reshape(-1))
-        lanes = replace(lanes, case=np.tile(place, 2))
+        lanes = replace(lanes, case=np.tile(point, 2))
         sizes, every = np.tile(np.abs(self.sizes[error, case]), 2), np.arange(2 * count)
         none = np.zeros(2 * count)
         way = np.array(there.way(lanes, none, (none, none)))
         paths = PointPaths(there, lanes, way, is_alike=self.errors.is_complete)
         paths.follow_to(every, sizes)
-        known = paths.known(every, sizes).reshape(len(ROWS), 2, count)
-        np.minimum.at(turns, place, np.nan_to_num(known[-1]).min(axis=0))
-        differs = np.abs(known[3] - self._by_sign[:, error, case])
+        reached = paths.known(every, sizes).reshape(len(ROWS), 2, count)
+        np.minimum.at(turns, point, np.nan_to_num(reached[-1]).min(axis=0))
+        differs = np.abs(reached[3] - self._by_sign[:, error, case])
         worst = np.where(np.isnan(differs), math.inf, differs).max(axis=0)
-        found[error, place] = np.copysign(worst, found[error, place])
+        differences[error, point] = np.copysign(worst, differences[error, point])
 
     @cached_property
     def _rows(self) -> Indices:
         """Places of the errors of each sign among `_lanes`, in lanes of all cases, (2, errors)."""
-        place = np.cumsum(self.is_large.any(axis=1)) - 1
-        return np.array((2 * place, 2 * place + 1))
+        lane = np.cumsum(self.is_large.any(axis=1)) - 1
+        return np.array((2 * lane, 2 * lane + 1))
 
     @cached_property
     def _lanes(self) -> Lanes:
@@ -240,10 +295,10 @@ class ScenePhases:
     @cached_property
     def _by_sign(self) -> Floats:
         """Quadratic phases of large errors at the centre, of each sign, (2, errors, cases). [rad]"""
-        found = np.full((2, *self.is_large.shape), math.nan)
+        phases = np.full((2, *self.is_large.shape), math.nan)
         for i in np.flatnonzero(self.is_large.any(axis=1)):
-            found[:, i] = self.errors.quadratic_by_sign(self.members[i])
-        return found
+            phases[:, i] = self.errors.quadratic_by_sign(self.members[i])
+        return phases
 
     @cached_property
     def more(self) -> Floats:
@@ -256,7 +311,7 @@ class ScenePhases:
     # ------------------------------------------------------------------ circles
     def points(self, radius: Floats, of: Indices) -> Indices:
         """Number of even points that circles need."""
-        return np.where(radius <= WIDE * self.nearest[of], RIM_POINTS, 2 * RIM_POINTS)
+        return np.where(radius <= _SCENE.wide_fraction * self.nearest[of], _SCENE.rim_points, 2 * _SCENE.rim_points)
 
     def rims(self, radius: Floats, of: Indices) -> Rims:
         """Evaluate circles that need the same number of points, evenly and around their worst point.
@@ -273,23 +328,27 @@ class ScenePhases:
         clear, tops = _tops(even.heights.reshape(2, count, of.size), lambda *where: look(*where).heights)
         nearest = clear.highest
         has_image = nearest.height < -1
-        some, circle = np.nonzero((clear.height > -math.inf) & has_image)
-        if some.size:  # beside the narrowest
-            arc, azimuth = math.pi / count / 8, clear.azimuth[some, circle]
+        point, circle = np.nonzero((clear.height > -math.inf) & has_image)
+        if point.size:  # beside the narrowest
+            arc, azimuth = math.pi / count / 8, clear.azimuth[point, circle]
             three = np.concatenate((azimuth - arc, azimuth, azimuth + arc))
             before, height, after = look(three, np.tile(circle, 3)).size.reshape(3, -1)
             top = _climbed(
-                lambda way, which: look(way, circle[which]).size, (before, after), Heights(height, azimuth), arc
+                lambda way, index: look(way, circle[index]).size, (before, after), Heights(height, azimuth), arc
             )
             clear.height[:] = -math.inf
-            clear.put((some, circle), top)
+            clear.put((point, circle), top)
             tops = Heights(*(np.concatenate(both) for both in zip(tops, clear, strict=True)))
         top = tops.highest.where(has_image, nearest)
         phases = even.phases.reshape(-1, count, of.size)
         return Rims(top.azimuth % (2 * math.pi), np.where(has_image, top.height, math.inf), phases)
 
 
-def at(radius: Any, azimuth: Any) -> tuple[Any, Any]:
+@overload
+def at(radius: float, azimuth: float) -> tuple[float, float]: ...
+@overload
+def at(radius: Floats, azimuth: Floats) -> tuple[Floats, Floats]: ...
+def at(radius: PerCase, azimuth: PerCase) -> tuple[PerCase, PerCase]:
     """Place on the ground, east and north. [m]"""
     return radius * np.cos(azimuth), radius * np.sin(azimuth)
 
@@ -300,57 +359,57 @@ def _tops(heights: Floats, look: Callable[[Floats, Indices], Floats]) -> tuple[H
 
     Heights are clearances, less than nothing, and sizes, as `look` has them at azimuths of circles. Arrived at are
     tops of the clearances and of the sizes, (points, circles) each; minus infinity where none climbed. Left out are
-    clearances that do not seem to come below `NARROW`, and sizes that seem to stay below the
+    clearances that do not seem to come below `narrow_clearance_ratio`, and sizes that seem to stay below the
     highest by more than a crest may be off; a valley that is milder at the points may be the deeper between them.
     """
     arc = 2 * math.pi / heights.shape[1]
     before, after = np.roll(heights, 1, axis=1), np.roll(heights, -1, axis=1)
     _, crests = _crest(before, after, heights, arc)
-    most = crests[1] + ROUGH * np.abs(crests[1])
+    most = crests[1] + _SCENE.crest_error_fraction * np.abs(crests[1])
     is_start = heights >= np.maximum(before, after)
-    is_start[0] &= crests[0] > -NARROW
+    is_start[0] &= crests[0] > -_SCENE.narrow_clearance_ratio
     is_start[1] &= (most >= heights[1].max(axis=0)) & (heights[0] < -1).all(axis=0)
     kind, point, circle = np.nonzero(is_start)
     top = _climbed(
-        lambda azimuth, some: look(azimuth, circle[some])[kind[some], np.arange(some.size)],
+        lambda azimuth, climbers: look(azimuth, circle[climbers])[kind[climbers], np.arange(climbers.size)],
         (before[is_start], after[is_start]),
         Heights(heights[is_start], arc * point),
         arc,
     )
-    found = Heights(np.full(heights.shape, -math.inf), np.zeros(heights.shape))
-    found.put(is_start, top)
+    tops = Heights(np.full(heights.shape, -math.inf), np.zeros(heights.shape))
+    tops.put(is_start, top)
     # As if they had been climbed one by one, from the highest crest on.
     order = np.argsort(np.where(is_start[1], -crests[1], math.inf), axis=0, kind="stable")
-    climbed, seemed = (np.take_along_axis(one, order, axis=0) for one in (found.height[1], most))
+    climbed, seemed = (np.take_along_axis(values, order, axis=0) for values in (tops.height[1], most))
     is_low = seemed[1:] < np.maximum.accumulate(climbed, axis=0)[:-1]
     climbed[1:][is_low] = -math.inf
-    np.put_along_axis(found.height[1], order, climbed, axis=0)
-    return found.of(0), found.of(1)
+    np.put_along_axis(tops.height[1], order, climbed, axis=0)
+    return tops.of(0), tops.of(1)
 
 
 def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, arc: float) -> Heights:
     """Climb to the highest near places of circles whose sides, an arc away, are no higher.
 
-    Linear in the radius, a height is a constant and a cosine of the azimuth. Where its crest does not tell what is
-    found there, that is looked for again in a quarter of the arc.
+    Linear in the radius, a height is a constant and a cosine of the azimuth. Where its crest does not tell the height
+    there, it is looked for again in a quarter of the arc.
     """
-    found, here, some = Heights(*map(np.array, start)), start, np.arange(start.height.size)
-    for _ in range(CLIMBS):
-        if not some.size:
+    best, here, climbers = Heights(*map(np.array, start)), start, np.arange(start.height.size)
+    for _ in range(_SCENE.max_climb_rounds):
+        if not climbers.size:
             break
         offset, crests = _crest(*sides, here.height, arc)
         azimuth = here.azimuth + offset
-        there = Heights(height_at(azimuth, some), azimuth)
-        found.put(some, found.of(some).with_others(there))
-        going = ~(np.abs(there.height - crests) <= LIKE_A_COSINE * np.abs(crests))
-        some, here = some[going], here.of(going).with_others(there.of(going))
-        if some.size:
+        there = Heights(height_at(azimuth, climbers), azimuth)
+        best.put(climbers, best.of(climbers).with_others(there))
+        going = ~(np.abs(there.height - crests) <= _SCENE.crest_fraction * np.abs(crests))
+        climbers, here = climbers[going], here.of(going).with_others(there.of(going))
+        if climbers.size:
             arc /= 4
             both = np.array((here.azimuth - arc, here.azimuth + arc))
-            around = Heights(height_at(both.reshape(-1), np.tile(some, 2)).reshape(2, -1), both)
-            found.put(some, found.of(some).with_others(around.highest))
+            around = Heights(height_at(both.reshape(-1), np.tile(climbers, 2)).reshape(2, -1), both)
+            best.put(climbers, best.of(climbers).with_others(around.highest))
             sides = (around.height[0], around.height[1])
-    return found
+    return best
 
 
 def _crest(before: Floats, after: Floats, middle: Floats, arc: float) -> tuple[Floats, Floats]:
@@ -375,50 +434,64 @@ class _Climb:
 
     def largest(self) -> Heights:
         """The largest differences [rad]; where there is no image somewhere they are infinite."""
-        azimuth, some = self.rims.azimuth.copy(), np.flatnonzero(self.bent.any(axis=0))
-        if some.size:
-            azimuth[some] = self._azimuths(some) % (2 * math.pi)
+        azimuth, bent_circles = self.rims.azimuth.copy(), np.flatnonzero(self.bent.any(axis=0))
+        if bent_circles.size:
+            azimuth[bent_circles] = self._azimuths(bent_circles) % (2 * math.pi)
         differences = self.phases.differences(self.radius, azimuth, self.of)
         return Heights(self.phases.together(differences, self.of), azimuth)
 
-    def _bent(self) -> Truths:
+    def _bent(self) -> Booleans:
         """Which of the large errors differ otherwise than small ones do: seen at three places, two harmonics show."""
-        thirds = self.rims.azimuth + 2 * math.pi * np.arange(PROBES)[:, None] / PROBES
-        radius, of, large = np.tile(self.radius, PROBES), np.tile(self.of, PROBES), np.tile(self.large, PROBES)
+        thirds = self.rims.azimuth + 2 * math.pi * np.arange(_SCENE.probe_count)[:, None] / _SCENE.probe_count
+        radius, of, large = (
+            np.tile(self.radius, _SCENE.probe_count),
+            np.tile(self.of, _SCENE.probe_count),
+            np.tile(self.large, _SCENE.probe_count),
+        )
         small, exact, _ = self.phases.around(radius, thirds.reshape(-1), of, large)
-        floor = np.tile(np.maximum(FLOOR_RAD, SHARE * self.rims.difference), PROBES)
+        floor = np.tile(
+            np.maximum(_SCENE.small_phase_rad, _SCENE.small_phase_fraction * self.rims.difference), _SCENE.probe_count
+        )
         is_bent = large & ~(np.abs(exact - small) <= floor)
-        return np.asarray(is_bent.reshape(len(large), PROBES, -1).any(axis=1))
+        return np.asarray(is_bent.reshape(len(large), _SCENE.probe_count, -1).any(axis=1))
 
-    def _look(self, some: Indices, azimuths: Floats) -> Heights:
-        """The largest of differences at azimuths (n, some); the least turns are kept in mind."""
+    def _look(self, circles: Indices, azimuths: Floats) -> Heights:
+        """The largest of differences at azimuths (n, circles); the least turns are kept in mind."""
         count = len(azimuths)
-        of, bent = np.tile(self.of[some], count), np.tile(self.bent[:, some], count)
-        _, found, turns = self.phases.around(np.tile(self.radius[some], count), azimuths.reshape(-1), of, bent)
+        of, bent = np.tile(self.of[circles], count), np.tile(self.bent[:, circles], count)
+        _, differences, turns = self.phases.around(
+            np.tile(self.radius[circles], count), azimuths.reshape(-1), of, bent
+        )
         seen = Heights(-turns.reshape(count, -1), -azimuths).highest
-        self.lowest.put(some, self.lowest.of(some).with_others(seen))
-        return Heights(self.phases.together(found, of).reshape(count, -1), azimuths).highest
+        self.lowest.put(circles, self.lowest.of(circles).with_others(seen))
+        return Heights(self.phases.together(differences, of).reshape(count, -1), azimuths).highest
 
-    def _azimuths(self, some: Indices) -> Floats:
+    def _azimuths(self, circles: Indices) -> Floats:
         """Azimuths of the largest differences, or of places without an image, the bent errors taken exactly. [rad]
 
         Where gradients become parallel the image ends, on an arc that may lie between the places that are looked at:
         it is also sought where they are nearest to parallel.
         """
-        even = np.broadcast_to(2 * _ARC * np.arange(RIM_POINTS)[:, None], (RIM_POINTS, some.size))
-        top = self._look(some, np.concatenate((self.rims.azimuth[some][None], even)))
-        arc = np.full(some.size, _ARC)
-        while (going := np.flatnonzero((arc > FINEST) & np.isfinite(top.height))).size:
+        even = np.broadcast_to(2 * _ARC * np.arange(_SCENE.rim_points)[:, None], (_SCENE.rim_points, circles.size))
+        top = self._look(circles, np.concatenate((self.rims.azimuth[circles][None], even)))
+        arc = np.full(circles.size, _ARC)
+        while (going := np.flatnonzero((arc > _SCENE.azimuth_rad) & np.isfinite(top.height))).size:
             before = top.of(going)
-            side = self._look(some[going], before.azimuth + arc[going] * _SIDES)
+            side = self._look(circles[going], before.azimuth + arc[going] * _SIDES)
             is_higher = side.height > before.height
             top.put(going, side.where(is_higher, before))
             arc[going] = np.where(is_higher, arc[going], arc[going] / 4)
-        arc, low = np.full(some.size, _ARC), self.lowest.of(some)
-        while (going := np.flatnonzero((arc > FINEST) & np.isfinite(top.height) & (low.height > -MAY_FOLD))).size:
+        arc, low = np.full(circles.size, _ARC), self.lowest.of(circles)
+        while (
+            going := np.flatnonzero(
+                (arc > _SCENE.azimuth_rad) & np.isfinite(top.height) & (low.height > -_SCENE.folding_fraction)
+            )
+        ).size:
             before = low.of(going)
-            top.put(going, top.of(going).with_others(self._look(some[going], arc[going] * _SIDES - before.azimuth)))
-            seen = self.lowest.of(some[going])
+            top.put(
+                going, top.of(going).with_others(self._look(circles[going], arc[going] * _SIDES - before.azimuth))
+            )
+            seen = self.lowest.of(circles[going])
             is_lower = seen.height > before.height
             low.put(going, seen.where(is_lower, before))
             arc[going] = np.where(is_lower, arc[going], arc[going] / 4)
@@ -434,8 +507,10 @@ def differences_at(
     Of one at random it is the sigma, coverage factor included.
     """
     phases = ScenePhases(errors, random)
-    found = phases.of_errors(phases.differences(np.array([radius]), np.array([azimuth]), np.zeros(1, dtype=int)))
-    return list(zip(phases.ids, found[:, 0].tolist(), strict=True))
+    differences = phases.of_errors(
+        phases.differences(np.array([radius]), np.array([azimuth]), np.zeros(1, dtype=int))
+    )
+    return list(zip(phases.ids, differences[:, 0].tolist(), strict=True))
 
 
 # ---------------------------------------------------------------------- edges
@@ -462,7 +537,7 @@ class SceneEdges:
         return self.largest.height
 
     @property
-    def has_doubt(self) -> Truths:
+    def has_doubt(self) -> Booleans:
         """Whether an error is over its limit at the edge alone."""
         return np.asarray((self.over > 0).any(axis=0))
 
@@ -488,65 +563,71 @@ def scene_edges(
         return None
     owners, radius = phases.owners, errors.array(errors.mission.scene.radius)
     if phases.combine == "each":
-        held = [(name, [i], limits[owner]) for i, (name, owner) in enumerate(zip(phases.ids, owners, strict=True))]
+        totals = [(name, [i], limits[owner]) for i, (name, owner) in enumerate(zip(phases.ids, owners, strict=True))]
     else:
-        held = [
+        totals = [
             (
                 f"{owner}.quadratic_phase_error",
-                [i for i, one in enumerate(owners) if owner == "mission" or split.includes(one, owner)],
+                [
+                    i
+                    for i, contributor in enumerate(owners)
+                    if owner == "mission" or split.includes(contributor, owner)
+                ],
                 limit,
             )
             for owner, limit in limits.items()
         ]
-    names, members, limit = zip(*held, strict=True)
+    names, members, limit = zip(*totals, strict=True)
     rim, largest = (Heights(np.full(errors.cases, math.inf), np.zeros(errors.cases)) for _ in range(2))
-    found = SceneEdges(phases, radius, rim, largest, names, np.array(limit), np.zeros((len(held), errors.cases)))
+    edges = SceneEdges(phases, radius, rim, largest, names, np.array(limit), np.zeros((len(totals), errors.cases)))
     counts = phases.points(radius, errors.each)
-    for count in (RIM_POINTS, 2 * RIM_POINTS):
+    for count in (_SCENE.rim_points, 2 * _SCENE.rim_points):
         cases = np.flatnonzero(counts == count)
-        for start in range(0, cases.size, AT_ONCE):
-            _evaluate(found, members, cases[start : start + AT_ONCE])
-    return found
+        for start in range(0, cases.size, _SCENE.cases_per_block):
+            _evaluate(edges, members, cases[start : start + _SCENE.cases_per_block])
+    return edges
 
 
 @np.errstate(all="ignore")  # a gradient vanishes, or both are parallel to the last digit
-def _evaluate(found: SceneEdges, members: Sequence[Sequence[int]], of: Indices) -> None:
-    phases = found.phases
-    rims = phases.rims(found.radius[of], of)
-    found.rim.put(of, Heights(rims.difference, rims.azimuth))
-    found.largest.put(of, _largest(phases, found.radius[of], of, rims))
-    some = np.flatnonzero(np.isfinite(found.difference[of]))
-    if some.size:
-        found.over[:, of[some]] = _over_at_the_edge(found, members, of[some], rims.of(some))
+def _evaluate(edges: SceneEdges, members: Sequence[Sequence[int]], of: Indices) -> None:
+    phases = edges.phases
+    rims = phases.rims(edges.radius[of], of)
+    edges.rim.put(of, Heights(rims.difference, rims.azimuth))
+    edges.largest.put(of, _largest(phases, edges.radius[of], of, rims))
+    imaged = np.flatnonzero(np.isfinite(edges.difference[of]))
+    if imaged.size:
+        edges.over[:, of[imaged]] = _over_at_the_edge(edges, members, of[imaged], rims.of(imaged))
 
 
 def _largest(phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> Heights:
     """Largest differences on circles, errors of any size counted. [rad]"""
-    found = Heights(rims.difference.copy(), rims.azimuth.copy())
-    some = np.flatnonzero(np.isfinite(rims.difference) & phases.is_large[:, of].any(axis=0))
-    if some.size:
-        found.put(some, _Climb(phases, radius[some], of[some], rims.of(some)).largest())
-    return found
+    largest = Heights(rims.difference.copy(), rims.azimuth.copy())
+    large_circles = np.flatnonzero(np.isfinite(rims.difference) & phases.is_large[:, of].any(axis=0))
+    if large_circles.size:
+        largest.put(
+            large_circles, _Climb(phases, radius[large_circles], of[large_circles], rims.of(large_circles)).largest()
+        )
+    return largest
 
 
-def _over_at_the_edge(found: SceneEdges, members: Sequence[Sequence[int]], of: Indices, rims: Rims) -> Floats:
+def _over_at_the_edge(edges: SceneEdges, members: Sequence[Sequence[int]], of: Indices, rims: Rims) -> Floats:
     """Phases at the edge of what is inside its limit at the centre and over it there, else 0, (names, of). [rad]"""
-    phases, limit = found.phases, found.limit[:, of] * _BOUND
+    phases, limit = edges.phases, edges.limit[:, of] * _LIMIT_FACTOR
     more = phases.more[:, of]
 
-    def held(at_places: Floats) -> Floats:
+    def combined_phases(at_points: Floats) -> Floats:
         """Phases as they are held to limits, (names, ..., of)."""
         if phases.combine == "each":
-            return np.abs(phases.of_errors(at_places))
-        return np.array([phases.together(at_places, of, indices) for indices in members])
+            return np.abs(phases.of_errors(at_points))
+        return np.array([phases.together(at_points, of, indices) for indices in members])
 
-    around = held(rims.phases + more[:, None])
+    around = combined_phases(rims.phases + more[:, None])
     top, count = around.argmax(axis=1)[:, None], around.shape[1]
     before, after, middle = (np.take_along_axis(around, (top + step) % count, axis=1)[:, 0] for step in (-1, 1, 0))
     _, crests = _crest(before, after, middle, 2 * math.pi / count)
-    worst = phases.places(found.radius[of], rims.azimuth, of).phases
-    size = np.maximum(crests, held(worst + more))
-    is_over = (held(phases.centre[:, of] + more) <= limit) & (size > limit)
+    worst = phases.places(edges.radius[of], rims.azimuth, of).phases
+    size = np.maximum(crests, combined_phases(worst + more))
+    is_over = (combined_phases(phases.centre[:, of] + more) <= limit) & (size > limit)
     return np.where(is_over, size, 0.0)
 
 
@@ -560,9 +641,9 @@ class Corrections:
         How far it is searched for. [m]
     """
 
-    def __init__(self, edges: SceneEdges, total: Any) -> None:
+    def __init__(self, edges: SceneEdges, total: PerCase) -> None:
         self.edges, self.phases, self.total = edges, edges.phases, edges.phases.errors.array(total)
-        self.farthest = np.maximum(FARTHEST * self.phases.nearest, edges.radius)
+        self.farthest = np.maximum(_SCENE.max_radius_fraction * self.phases.nearest, edges.radius)
 
     @cached_property
     def served(self) -> Floats:
@@ -570,96 +651,96 @@ class Corrections:
 
         Not a number where an edge has no image. [m]
         """
-        found = np.full(self.total.shape, math.nan)
+        radii = np.full(self.total.shape, math.nan)
         cases = np.flatnonzero(np.isfinite(self.edges.rim.height) & np.isfinite(self.edges.difference))
         with np.errstate(all="ignore"):
-            for start in range(0, cases.size, AT_ONCE):
-                of = cases[start : start + AT_ONCE]
-                found[of] = self._served(of)
-        return found
+            for start in range(0, cases.size, _SCENE.cases_per_block):
+                of = cases[start : start + _SCENE.cases_per_block]
+                radii[of] = self._served(of)
+        return radii
 
     def _served(self, of: Indices) -> Floats:
-        found, total = self._served_of_small(of), self.total[of]
-        high = np.where(np.isinf(found), self.farthest[of], found)
+        radii, total = self._served_of_small(of), self.total[of]
+        high = np.where(np.isinf(radii), self.farthest[of], radii)
         low, below, size = np.zeros(of.size), np.zeros(of.size), np.zeros(of.size)
-        some = np.flatnonzero(self.phases.is_large[:, of].any(axis=0))
-        if not some.size:
-            return found
+        searched = np.flatnonzero(self.phases.is_large[:, of].any(axis=0))
+        if not searched.size:
+            return radii
 
-        def largest(radius: Floats, places: Indices) -> Floats:
-            return self._crests(radius, of[places], of_small=False).height
+        def largest(radius: Floats, indices: Indices) -> Floats:
+            return self._crests(radius, of[indices], of_small=False).height
 
-        size[some] = largest(high[some], some)
-        some = some[np.abs(size[some] - total[some]) > ALIKE * total[some]]
-        self._grow(largest, of, some, low, below, high, size)
-        over = some[size[some] > total[some]]
-        found[some] = math.inf
-        found[over] = where(largest, total, over, (low, below), (high, size))
-        return found
+        size[searched] = largest(high[searched], searched)
+        searched = searched[np.abs(size[searched] - total[searched]) > _SCENE.similar_size_fraction * total[searched]]
+        self._grow(largest, of, searched, low, below, high, size)
+        over = searched[size[searched] > total[searched]]
+        radii[searched] = math.inf
+        radii[over] = where(largest, total, over, (low, below), (high, size))
+        return radii
 
     def _served_of_small(self, of: Indices) -> Floats:
         """The same, were effects of all errors proportional to them.
 
         Along the worst azimuth, and again where the rim at the radius found has a worse one.
         """
-        total, high, found = self.total[of], self.edges.radius[of], np.full(of.size, math.inf)
+        total, high, radii = self.total[of], self.edges.radius[of], np.full(of.size, math.inf)
         size, azimuth = self.edges.rim.of(of)
-        some = np.flatnonzero(size)
+        searched = np.flatnonzero(size)
 
-        def along(radius: Floats, places: Indices) -> Floats:
-            there = self.phases.places(radius, azimuth[places], of[places])
+        def along(radius: Floats, indices: Indices) -> Floats:
+            there = self.phases.places(radius, azimuth[indices], of[indices])
             return np.where(there.has_image, there.size, math.inf)
 
-        for _ in range(TURNS):
-            if not some.size:
-                return found
+        for _ in range(_SCENE.max_azimuth_rounds):
+            if not searched.size:
+                return radii
             low, inside = np.zeros(of.size), np.zeros(of.size)
-            self._grow(along, of, some, low, inside, high, size)
-            over = some[size[some] > total[some]]
+            self._grow(along, of, searched, low, inside, high, size)
+            over = searched[size[searched] > total[searched]]
             high[over] = where(along, total, over, (low, inside), (high, size))
-            around = self._crests(high[some], of[some])
-            is_inside = around.height <= total[some] * (1 + PRECISION)
-            done = some[is_inside]
-            found[done] = np.where(size[done] <= total[done], math.inf, high[done])
-            size[some], azimuth[some] = around
-            some = some[~is_inside]
+            around = self._crests(high[searched], of[searched])
+            is_inside = around.height <= total[searched] * (1 + _SCENE.radius_fraction)
+            done = searched[is_inside]
+            radii[done] = np.where(size[done] <= total[done], math.inf, high[done])
+            size[searched], azimuth[searched] = around
+            searched = searched[~is_inside]
 
-        def rim(radius: Floats, places: Indices) -> Floats:
-            return self._crests(radius, of[places]).height
+        def rim(radius: Floats, indices: Indices) -> Floats:
+            return self._crests(radius, of[indices]).height
 
         none = np.zeros(of.size)
-        found[some] = where(rim, total, some, (none, none), (high, size))
-        return found
+        radii[searched] = where(rim, total, searched, (none, none), (high, size))
+        return radii
 
     def _grow(
-        self, size_at: SizeAt, of: Indices, some: Indices, low: Floats, below: Floats, high: Floats, size: Floats
+        self, size_at: SizeAt, of: Indices, searched: Indices, low: Floats, below: Floats, high: Floats, size: Floats
     ) -> None:
         """Look farther out until a size passes the total, or as far as it is searched for."""
         total, farthest = self.total[of], self.farthest[of]
         while True:
-            some = some[(size[some] <= total[some]) & (high[some] < farthest[some])]
-            if not some.size:
+            searched = searched[(size[searched] <= total[searched]) & (high[searched] < farthest[searched])]
+            if not searched.size:
                 return
-            low[some], below[some] = high[some], size[some]
-            by = np.clip(1.05 * total[some] / size[some], 1.05, 4.0)
-            high[some] = np.minimum(farthest[some], high[some] * by)
-            size[some] = size_at(high[some], some)
+            low[searched], below[searched] = high[searched], size[searched]
+            by = np.clip(1.05 * total[searched] / size[searched], 1.05, 4.0)
+            high[searched] = np.minimum(farthest[searched], high[searched] * by)
+            size[searched] = size_at(high[searched], searched)
 
     def _crests(self, radius: Floats, of: Indices, *, of_small: bool = True) -> Heights:
         """Largest differences on circles; of errors of any size, or were all of them small. [rad]"""
-        found, counts = Heights(np.empty(of.size), np.empty(of.size)), self.phases.points(radius, of)
+        largest, counts = Heights(np.empty(of.size), np.empty(of.size)), self.phases.points(radius, of)
         for count in np.unique(counts):
-            same = np.flatnonzero(counts == count)
-            rims = self.phases.rims(radius[same], of[same])
+            circles = np.flatnonzero(counts == count)
+            rims = self.phases.rims(radius[circles], of[circles])
             crests = Heights(rims.difference, rims.azimuth)
-            found.put(same, crests if of_small else _largest(self.phases, radius[same], of[same], rims))
-        return found
+            largest.put(circles, crests if of_small else _largest(self.phases, radius[circles], of[circles], rims))
+        return largest
 
 
 def where(
     size_at: SizeAt,
     total: Floats,
-    some: Indices,
+    searched: Indices,
     inside: tuple[Floats, Floats],
     outside: tuple[Floats, Floats],
 ) -> Floats:
@@ -668,27 +749,27 @@ def where(
     Parameters
     ----------
     size_at : callable
-        Sizes at radii (some,), of places (some,).
+        Sizes at radii (searched,), of cases (searched,).
     total : (n,)
         What the sizes are held to.
-    some : (some,)
-        Indices, of n, that are looked at.
+    searched : (searched,)
+        Indices, of n, that are searched.
     inside, outside : (radius, size) of (n,)
         Between these.
     """
-    (low, below), (high, above) = ([part[some].copy() for part in pair] for pair in (inside, outside))
-    slack = total[some] * PRECISION / 2
-    goal = total[some] - slack
+    (low, below), (high, above) = ([values[searched].copy() for values in pair] for pair in (inside, outside))
+    slack = total[searched] * _SCENE.radius_fraction / 2
+    goal = total[searched] - slack
     below, above = below - goal, above - goal
-    side = np.zeros(some.size)  # of the goal, on which the last one was
+    side = np.zeros(searched.size)  # of the goal, on which the last one was
     going = np.flatnonzero(below <= 0)  # others are as near as asked for
     while True:
-        going = going[high[going] - low[going] > PRECISION * high[going]]
+        going = going[high[going] - low[going] > _SCENE.radius_fraction * high[going]]
         if not going.size:
             return low
         share = np.where(np.isinf(above[going]), 0.5, below[going] / (below[going] - above[going]))
         middle = low[going] + share * (high[going] - low[going])
-        over = size_at(middle, some[going]) - goal[going]
+        over = size_at(middle, searched[going]) - goal[going]
         is_inside = over <= slack[going]
         is_near = is_inside & (over > -slack[going])
         ins, outs = going[is_inside], going[~is_inside]
@@ -723,13 +804,15 @@ class SceneEdge(NamedTuple):
     def of(cls, corrections: Corrections, mission: Mission, case: int = 0) -> "SceneEdge":
         """That of one case, with its mission."""
         edges = corrections.edges
-        (size, rim), (difference, azimuth) = (map(float, one.of(case)) for one in (edges.rim, edges.largest))
+        (size, rim), (difference, azimuth) = (map(float, heights.of(case)) for heights in (edges.rim, edges.largest))
         radius, nowhere = float(edges.radius[case]), (math.nan, 0.0, None)
         if math.isinf(size):
             reason = phrases.note(
                 "no-image-at-the-edge", azimuth_deg=math.degrees(rim), why=_degeneracy(mission, at(radius, rim))
             )
-            return cls(radius, *nowhere, FARTHEST * float(edges.phases.nearest[case]), reason, NOTHING)
+            return cls(
+                radius, *nowhere, _SCENE.max_radius_fraction * float(edges.phases.nearest[case]), reason, NOTHING
+            )
         searched = float(corrections.farthest[case])
         if math.isinf(difference):
             return cls(radius, *nowhere, searched, phrases.note("no-image"), NOTHING)
@@ -755,15 +838,15 @@ class SceneEdge(NamedTuple):
         return f"up to {format_quantity(self.autofocus_radius, 'm', 3, 'down')} from the centre"
 
 
-def _degeneracy(mission: Mission, place: GroundVector) -> str:
+def _degeneracy(mission: Mission, ground_point: GroundVector) -> str:
     """Why a place of the ground has no image."""
-    (east, north), geometry = place, mission.geometry
+    (east, north), geometry = ground_point, mission.geometry
     transmitter, receiver = (
         replace(state, position=(state.position[0] - east, state.position[1] - north, state.position[2]))
         for state in (geometry.transmitter, geometry.receiver)
     )
     there = BistaticGeometry(transmitter=transmitter, receiver=receiver)
-    if min(there.transmitter.slant_range, there.receiver.slant_range) < NEAREST_M:
-        return phrases.note("platform-at-the-edge", distance=NEAREST_M)
+    if min(there.transmitter.slant_range, there.receiver.slant_range) < _SCENE.nearest_m:
+        return phrases.note("platform-at-the-edge", distance=_SCENE.nearest_m)
     reason = degeneracy(there, mission.radar, mission.collection.aperture_time)
     return reason or phrases.note("gradients-become-parallel")

@@ -21,11 +21,12 @@ What is stated by its effect alone is that all over the scene. Against exact ran
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.constants import ROUNDING
+from bisar_budget.arrays import Floats, Indices
+from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.air_delays import (
     group_at_nodes,
     legs_of,
@@ -35,11 +36,18 @@ from bisar_budget.effects.air_delays import (
 )
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS, Subject
-from bisar_budget.effects.random_effect import FEWEST_NODES, MOST_NODES, Moves, RandomError, SensorCases, factor
+from bisar_budget.effects.random_effect import (
+    FEWEST_EFFECT_NODES,
+    MOST_EFFECT_NODES,
+    Moves,
+    RandomError,
+    SensorCases,
+    factor,
+)
 from bisar_budget.effects.vibration import slow_moves
-from bisar_budget.geometry import Vectors
+from bisar_budget.geometry import VectorArrays
 from bisar_budget.image_plane import nodes
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Indices
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 _CLOCKS = ("oscillator", "synchronization")  # kinds of errors that move nothing
 
@@ -56,24 +64,24 @@ class RandomPhases:
     """
 
     def __init__(self, errors: DeclaredErrors, random: Sequence[RandomError]) -> None:
-        found = [*_at_random(errors, random), *_vibrating(errors)]
-        self.subjects = [what for what, _ in found]
-        self._errors = [error for _, error in found]
+        pairs = [*_at_random(errors, random), *_vibrating(errors)]
+        self.subjects = [subject for subject, _ in pairs]
+        self._errors = [error for _, error in pairs]
         of_each = [error.there(errors.exact, errors.each) for error in self._errors]
         self.centre = np.concatenate([np.zeros((0, errors.cases)), *of_each])
         groups = [error.groups for error in self._errors]
-        sizes = np.repeat([len(parts) // count for parts, count in zip(of_each, groups, strict=True)], groups)
-        self._parts, self._groups = (np.cumsum([0, *counts])[:-1].astype(int) for counts in (sizes, groups))
+        sizes = np.repeat([len(phases) // count for phases, count in zip(of_each, groups, strict=True)], groups)
+        self._first_rows, self._groups = (np.cumsum([0, *counts])[:-1].astype(int) for counts in (sizes, groups))
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
         """Quadratic phases of the parts where exact ranges are taken, (parts, places). [rad]"""
         return np.concatenate([np.zeros((0, of.size)), *(error.there(there, of) for error in self._errors)])
 
-    def of_errors(self, parts: Floats) -> Floats:
+    def of_errors(self, phases: Floats) -> Floats:
         """Phases of the errors, (errors, ...), by those of their parts, (parts, ...). [rad]"""
         if not self._errors:
-            return parts
-        of_groups = np.sqrt(np.add.reduceat(np.square(parts), self._parts, axis=0))
+            return phases
+        of_groups = np.sqrt(np.add.reduceat(np.square(phases), self._first_rows, axis=0))
         return np.asarray(np.add.reduceat(of_groups, self._groups, axis=0))
 
 
@@ -87,14 +95,14 @@ class _Moving(NamedTuple):
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
         """Quadratic phase of each way and course, (parts, places). [rad]"""
-        weights, (found, seen) = there.phase_weights[0], np.zeros((2, 1, 1, 1))
-        for one in self.moves:
-            ways, courses = _of(one.ways, of), _of(one.courses, of)
-            along = weights * there.along(one.place, (ways[:, 0], ways[:, 1], ways[:, 2]))
-            found = found + np.einsum("anp,mnp->amp", along, courses)
+        weights, (total, seen) = there.phase_weights[0], np.zeros((2, 1, 1, 1))
+        for motion in self.moves:
+            ways, courses = _of(motion.ways, of), _of(motion.courses, of)
+            along = weights * there.along(motion.place, (ways[:, 0], ways[:, 1], ways[:, 2]))
+            total = total + np.einsum("anp,mnp->amp", along, courses)
             seen = seen + np.einsum("anp,mnp->amp", np.abs(along), np.abs(courses))
         # What is left of terms that cancel exactly is rounding.
-        phase = np.where(np.abs(found) > ROUNDING * seen, found, 0.0) * _of(self.size, of)
+        phase = np.where(np.abs(total) > VECTOR_ROUNDING_FRACTION * seen, total, 0.0) * _of(self.size, of)
         return np.asarray(phase.reshape(-1, of.size))
 
 
@@ -113,8 +121,8 @@ class _Clock(NamedTuple):
     @classmethod
     def of(cls, exact: ExactRanges, covariance: Floats, size: Floats) -> "_Clock":
         """That of a covariance of phases and displacement at the centre by a unit, (4, 4, cases)."""
-        known = covariance.reshape(4, 4, -1)[np.ix_((0, 2, 3), (0, 2, 3))]
-        quadratic, east, north = np.moveaxis(factor(np.moveaxis(known, 2, 0)), 0, 2) * size
+        joint = covariance.reshape(4, 4, -1)[np.ix_((0, 2, 3), (0, 2, 3))]
+        quadratic, east, north = np.moveaxis(factor(np.moveaxis(joint, 2, 0)), 0, 2) * size
         (a, b), (c, d) = _terms(exact.place_weights, exact)  # what a unit of each term displaces
         with np.errstate(all="ignore"):
             scale = 1 / (a * d - b * c)
@@ -124,13 +132,13 @@ class _Clock(NamedTuple):
     def there(self, there: ExactRanges, of: Indices) -> Floats:
         """Quadratic phase of each part, (parts, places). [rad]"""
         by_constant, by_linear = _terms(there.phase_weights, there)[0] - self.at_centre[:, of]
-        quadratic, constant, linear = (part[:, of] for part in self[:3])
+        quadratic, constant, linear = (term[:, of] for term in self[:3])
         return np.asarray(quadratic + by_constant * constant + by_linear * linear)
 
 
 def _terms(weights: Iterable[Floats], exact: ExactRanges) -> Floats:
     """Effects of a metre, and of a metre per second, of range error by weights at the nodes, (effects, 2, cases)."""
-    return np.array([[one.sum(axis=0), (one * exact.times).sum(axis=0)] for one in weights])
+    return np.array([[row.sum(axis=0), (row * exact.times).sum(axis=0)] for row in weights])
 
 
 class _Delay(NamedTuple):
@@ -140,19 +148,19 @@ class _Delay(NamedTuple):
     independent, and together the delay of the zenith over the aperture, of variance 1.
     """
 
-    places: tuple[int, ...]
+    platform_indices: tuple[int, ...]
     delay: str
-    middles: Sequence[Vectors]
+    middles: Sequence[VectorArrays]
     metres: Floats
     courses: Floats
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
         """Quadratic phase of each course, (courses, places). [rad]"""
-        along: Any = 0.0
-        for place, middle in zip(self.places, self.middles, strict=True):
-            x, y, z = (part[of] for part in middle)
-            along = along + group_at_nodes(self.delay, there.tracks[place], (x, y, z), self.metres[of])
+        along = np.zeros(())
+        for platform_index, middle in zip(self.platform_indices, self.middles, strict=True):
+            x, y, z = (component[of] for component in middle)
+            along = along + group_at_nodes(self.delay, there.tracks[platform_index], (x, y, z), self.metres[of])
         group = along * _of(self.courses, of)
         mean = np.einsum("n,mnp->mp", there.fit[0], group)[:, None]
         return np.asarray(np.einsum("np,mnp->mp", there.phase_weights[0], seen_course(group, mean, self.delay)))
@@ -163,48 +171,52 @@ def _at_random(
     errors: DeclaredErrors, random: Sequence[RandomError]
 ) -> Iterator[tuple[Subject, _Moving | _Clock | _Delay]]:
     for error in random:
-        what, kind = error.subject, error.subject.kind
+        subject, kind = error.subject, error.subject.kind
         if error.declared is None or error.counted_in or kind == "other":
             continue
         size = errors.array(error.declared)
         if error.moves:
-            yield what, _Moving(_at_nodes_of(errors, error.moves), size)
+            yield subject, _Moving(_at_nodes_of(errors, error.moves), size)
         elif kind in _CLOCKS:
-            yield what, _Clock.of(errors.exact, error.full.covariance, size)
+            assert error.full.covariance is not None, "the full model has one"
+            yield subject, _Clock.of(errors.exact, error.full.covariance, size)
         elif kind == "propagation":
-            places = tuple(map(PLATFORMS.index, legs_of(what.owner)))
-            middles = [errors.exact.positions[place] for place in places]
-            count = min(MOST_NODES, max(FEWEST_NODES, errors.exact.fit.shape[1]))
+            legs = tuple(map(PLATFORMS.index, legs_of(subject.owner)))
+            middles = [errors.exact.positions[leg] for leg in legs]
+            count = min(MOST_EFFECT_NODES, max(FEWEST_EFFECT_NODES, errors.exact.fit.shape[1]))
             between = _between(count, errors.exact.fit.shape[1])
-            courses = zenith_courses(errors.mission, what.owner, 2 * errors.exact.half, count)
+            courses = zenith_courses(errors.mission, subject.owner, 2 * errors.exact.half, count)
             courses = np.einsum("nm,fmc->fnc", between, courses)
-            yield what, _Delay(places, what.axis, middles, size * metres_per_unit(errors.mission, what.axis), courses)
+            yield (
+                subject,
+                _Delay(legs, subject.axis, middles, size * metres_per_unit(errors.mission, subject.axis), courses),
+            )
 
 
 def _vibrating(errors: DeclaredErrors) -> Iterator[tuple[Subject, _Moving]]:
-    for what, moves in slow_moves(SensorCases(errors.mission, errors.geometries, errors.cases)):
-        yield what, _Moving(_at_nodes_of(errors, [moves]), errors.array(1.0), len(moves.ways))
+    for subject, moves in slow_moves(SensorCases(errors.mission, errors.geometries, errors.cases)):
+        yield subject, _Moving(_at_nodes_of(errors, [moves]), errors.array(1.0), len(moves.ways))
 
 
 def _at_nodes_of(errors: DeclaredErrors, moves: Sequence[Moves]) -> list[Moves]:
     """The same at the nodes of declared errors."""
-    found = []
-    for one in moves:
-        between = _between(one.courses.shape[1], errors.exact.fit.shape[1])
-        ways = one.ways if one.ways.shape[2] == 1 else np.einsum("nm,axmc->axnc", between, one.ways)
-        found.append(Moves(one.place, ways, np.einsum("nm,fmc->fnc", between, one.courses)))
-    return found
+    resampled = []
+    for motion in moves:
+        between = _between(motion.courses.shape[1], errors.exact.fit.shape[1])
+        ways = motion.ways if motion.ways.shape[2] == 1 else np.einsum("nm,axmc->axnc", between, motion.ways)
+        resampled.append(Moves(motion.place, ways, np.einsum("nm,fmc->fnc", between, motion.courses)))
+    return resampled
 
 
 @cache
 def _between(sensed: int, count: int) -> Floats:
     """Takes courses at the nodes of sensors to other nodes, by the Legendre orders that both tell apart."""
-    places, weights = np.polynomial.legendre.leggauss(sensed)
+    node_times, weights = np.polynomial.legendre.leggauss(sensed)
     order = np.arange(min(sensed, count))
-    fit = (order + 0.5)[:, None] * np.polynomial.legendre.legvander(places, order[-1]).T * weights
+    fit = (order + 0.5)[:, None] * np.polynomial.legendre.legvander(node_times, order[-1]).T * weights
     return np.asarray(np.polynomial.legendre.legvander(nodes(count).places, order[-1]) @ fit)
 
 
-def _of(array: Any, some: Indices) -> Any:
+def _of(array: Floats, cases: Indices) -> Floats:
     """Some cases of an array (…, cases); what all share is there once."""
-    return array if array.shape[-1] == 1 else array.take(some, axis=-1)
+    return array if array.shape[-1] == 1 else array.take(cases, axis=-1)

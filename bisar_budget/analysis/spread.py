@@ -16,12 +16,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
 from bisar_budget.constants import MAINLOBE_ENERGY
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones
 from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
 from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES, counted, lines_of
+from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 
 if TYPE_CHECKING:
@@ -41,7 +43,7 @@ class Tone(NamedTuple):
     subject: Subject
     phase: Any
     cycles: Any
-    is_there: Any = True  # cases in which a vibration is fast enough
+    is_there: PerCaseFlag = True  # cases in which a vibration is fast enough
     in_quadrature: str | None = None
 
 
@@ -69,7 +71,7 @@ def mainlobe_energy(mission: Mission) -> float:
     return MAINLOBE_ENERGY[(mission.simulation or Simulation()).window]
 
 
-def spread_phase(ratio: Any, model: str, energy: float) -> Any:
+def spread_phase(ratio: PerCase, model: str, energy: float) -> Any:
     """Rms phase of noise that adds an ISLR, inverse of `islr_db`. [rad]
 
     Parameters
@@ -84,7 +86,7 @@ def spread_phase(ratio: Any, model: str, energy: float) -> Any:
     return np.sqrt(ratio if model == "published" else np.log1p(ratio * energy))
 
 
-def islr_db(variance: Any, model: str, energy: float) -> Any:
+def islr_db(variance: PerCase, model: str, energy: float) -> Any:
     """ISLR that noise of a phase variance [rad²] above 0 adds: by the paper's rule σ², else as in an image. [dB]
 
     `spread_phase` documents the parameters.
@@ -95,7 +97,7 @@ def islr_db(variance: Any, model: str, energy: float) -> Any:
     return 10 / math.log(10) * (variance + np.log(-np.expm1(-variance)) - math.log(energy))
 
 
-def islr_of(mission: Mission, variance: Any) -> Any:
+def islr_of(mission: Mission, variance: PerCase) -> Floats:
     """ISLR that noise of a phase variance [rad²] adds to an image; NaN without noise. [dB]"""
     with np.errstate(all="ignore"):
         return np.where(variance > 0, islr_db(variance, "full", mainlobe_energy(mission)), math.nan)
@@ -109,7 +111,7 @@ def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: st
     return rms_of_mission * np.sqrt(allocation.islr.of(owner))
 
 
-def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
+def tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Tone]:
     """List the tones that make paired echoes: vibrations from one cycle per aperture on, tones of oscillators, spurs.
 
     `geometry` holds many cases where numbers of the mission are arrays.
@@ -139,7 +141,7 @@ def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
     return [accelerated for accelerated in echoes if np.any(accelerated.is_there)]
 
 
-def _echoes(alone: Tone, free: Any, remaining: LeftTone, mission: Mission) -> list[Tone]:
+def _echoes(alone: Tone, free: PerCase, remaining: LeftTone, mission: Mission) -> list[Tone]:
     """Echoes of an oscillator's tone: for a folded tone one per frequency, or all power at the largest echo."""
     if not remaining.is_folded:
         return [alone]

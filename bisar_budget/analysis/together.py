@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.analysis.tone_displacement import ToneDisplacement
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.effects.combined import (
     Correlated,
     Moves,
@@ -18,11 +19,11 @@ from bisar_budget.effects.combined import (
     phase_parts,
 )
 from bisar_budget.effects.declared import DeclaredErrors
+from bisar_budget.effects.effect import plain
 from bisar_budget.effects.random_effect import RandomError, factor
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Shares
-from bisar_budget.ranges.exact_ranges import Floats
 
 
 class Together:
@@ -97,7 +98,7 @@ class Together:
         """Phases that count against the share of an owner; all phases count against the mission's."""
         return [phase for phase in self.phases if split.includes(phase.owner, owner)]
 
-    def judged_parts(self, members: Sequence[DeclaredPhase], rule: str = "", gain: Any = None) -> Phases:
+    def judged_parts(self, members: Sequence[DeclaredPhase], rule: str = "", gain: PerCase | None = None) -> Phases:
         """List the judged phases that a rule combines, with the mission's gain or the given gain. [rad]
 
         Under root-sum-square the six phases of a covariance are one phase, by their correlations.
@@ -114,7 +115,7 @@ class Together:
                     judged[group.id] = np.hypot(size, gain * self._hidden_of_groups[group.id])
         return list(judged.items())
 
-    def judged(self, members: Sequence[DeclaredPhase], rule: str = "", gain: Any = None) -> Floats:
+    def judged(self, members: Sequence[DeclaredPhase], rule: str = "", gain: PerCase | None = None) -> Floats:
         """Combine the judged phases of errors by the mission's rule, or by the given rule. [rad]"""
         return self.errors.array(combined_phase(self.judged_parts(members, rule, gain), rule or self.rule))
 
@@ -218,12 +219,12 @@ class Together:
     def phase_parts(self, phases: Phases, rule: str = "", case: int = 0) -> list[tuple[str, float]]:
         """List the parts of phases that the mission's rule, or the given rule, combines, signed. [rad]"""
         combined_parts = phase_parts(phases, rule or self.rule, self.groups)
-        return [(row_id, float(phase[case])) for row_id, phase in combined_parts]
+        return [(row_id, plain(phase, case)) for row_id, phase in combined_parts]
 
     def displacement_parts(self, case: int = 0) -> list[tuple[str, GroundVector]]:
         """List the parts of displacements that the mission's rule combines; empty if an error has no image. [m]"""
         named_moves = displacement_parts([*self.moves(self.rule), *self.undirected_moves], self.rule, self.groups)
-        combined_parts = [(row_id, (float(east[case]), float(north[case]))) for row_id, (east, north) in named_moves]
+        combined_parts = [(row_id, (plain(east, case), plain(north, case))) for row_id, (east, north) in named_moves]
         return [] if any(math.isnan(east) for _, (east, _) in combined_parts) else combined_parts
 
 

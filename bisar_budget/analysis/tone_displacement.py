@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.constants import ROUNDING
+from bisar_budget.arrays import Floats, PerCase
+from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.declared import published_planes
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones
@@ -27,7 +28,7 @@ from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES, counted
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
 from bisar_budget.mission.platforms import MotionError
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 
 class TonePart(NamedTuple):
@@ -73,6 +74,7 @@ def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: Exac
         error: MotionError = getattr(mission.platforms, name).motion_error
         for index, line in enumerate(error.vibration.sinusoidal):
             value, cycles = line.displacement, line.frequency * T
+            sizes: Sequence[float]
             if isinstance(value, tuple):
                 ways, sizes = getattr(geometry, name).frame(error.frame), value
             else:  # along the line of sight, as it turns
@@ -100,18 +102,21 @@ def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: Exac
     return displacements
 
 
-def _tones_of_oscillators(mission: Mission, geometry: BistaticGeometry) -> Iterator[tuple[Subject, Any, LeftTone]]:
+def _tones_of_oscillators(
+    mission: Mission, geometry: BistaticGeometry
+) -> Iterator[tuple[Subject, PerCase, LeftTone]]:
     """Row, peak phase of a free oscillator [rad], and the tone that the synchronization leaves, for each tone."""
     for spur in spurs_of(mission, geometry):
         yield spur.subject, spur.free, spur.left
     for accelerated in accelerated_tones(mission, geometry):
-        is_fast = accelerated.left.is_folded | (
+        is_fast: Any = accelerated.left.is_folded | (
             accelerated.frequency * mission.collection.aperture_time >= SLOWEST_ECHO_CYCLES
         )
-        yield accelerated.subject, is_fast * accelerated.free * accelerated.sensitivity, accelerated.left
+        phase: PerCase = is_fast * accelerated.free * accelerated.sensitivity
+        yield accelerated.subject, phase, accelerated.left
 
 
-def _orders(cycles: Any, size: Any) -> Floats:
+def _orders(cycles: PerCase, size: PerCase) -> Floats:
     """Orders 0 to 3 of a tone with `cycles` per aperture and an amplitude [m], (4, n). [m]"""
     quadratic, cubic, _, constant, linear = size * tone(math.pi * np.atleast_1d(cycles))
     return np.array([constant, linear, quadratic, cubic])
@@ -129,5 +134,5 @@ def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
 
 def _by_ranges(exact: ExactRanges, along: Floats) -> Floats:
     """Displacement by a metre of each order by exact ranges, if the range has `along` of it, (nodes, n). [m/m]"""
-    seen = np.where(np.abs(along) > ROUNDING, along, 0.0)
+    seen = np.where(np.abs(along) > VECTOR_ROUNDING_FRACTION, along, 0.0)
     return np.asarray(np.einsum("wnc,nc,no->owc", exact.place_weights, seen, orders_at(exact.sampling.places)))

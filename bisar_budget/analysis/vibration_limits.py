@@ -16,7 +16,7 @@ vibration makes no echoes, see `effects.vibration`.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,12 +25,17 @@ from numpy.typing import NDArray
 from bisar_budget import evaluators
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.spread import Tone, mainlobe_energy, spread_phase
+from bisar_budget.arrays import Booleans, Floats, PerCase
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.slow_tones import SlowTone
 from bisar_budget.effects.vibration import near_groups, worst_phases
 from bisar_budget.mission.model import Mission, Shares
 
-LARGEST_ECHO = 2.0  # rad; with a larger phase, echoes are above the response
+MAX_ECHO_PHASE_RAD = 2.0  # with a larger phase, echoes are above the response
+
+
+# The evaluators take and give numbers, or arrays of cases.
+_motion_of_phase: Callable[..., PerCase] = evaluators.motion_of_phase
 
 
 class VibrationLimits(NamedTuple):
@@ -49,15 +54,18 @@ class VibrationLimits(NamedTuple):
         return 20 * np.log10(self.full / self.published)
 
 
-def echo_level(phase: Any) -> Any:
+def echo_level(phase: PerCase) -> PerCase:
     """Amplitude of a paired echo over the response's, J₁(φ)/J₀(φ), for a sinusoid of peak φ up to 2 rad."""
     j0, j1 = bessel(phase)
     return j1 / j0
 
 
-def bessel(phase: Any) -> tuple[Any, Any]:
+def bessel(phase: PerCase) -> tuple[PerCase, PerCase]:
     """J₀(φ) and J₁(φ) of a phase φ up to 2 rad."""
-    square, term, j0, j1 = -((phase / 2) ** 2), 1.0, 0.0, 0.0
+    term: PerCase = 1.0
+    j0: PerCase = 0.0
+    j1: PerCase = 0.0
+    square = -((phase / 2) ** 2)
     for k in range(1, 13):  # the series of both; the last terms are rounding
         j0 = j0 + term
         j1 = j1 + term / k
@@ -79,9 +87,9 @@ class Echo(NamedTuple):
     is_of: NDArray[np.bool_]
 
 
-def level_of(phase: Any) -> Any:
+def level_of(phase: PerCase) -> PerCase:
     """Amplitude of a paired echo over the amplitude of the response; half the phase beyond 2 rad."""
-    return np.where(phase <= LARGEST_ECHO, echo_level(np.minimum(phase, LARGEST_ECHO)), phase / 2)[()]
+    return np.where(phase <= MAX_ECHO_PHASE_RAD, echo_level(np.minimum(phase, MAX_ECHO_PHASE_RAD)), phase / 2)[()]
 
 
 def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:
@@ -112,7 +120,7 @@ def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | N
         phases[second], phases[first] = np.hypot(phases[first], phases[second]), 0.0
     number = near_groups(np.where(is_there, cycles, 0.0))
     here = np.arange(phases.shape[1])
-    levels = level_of(phases)
+    levels = np.asarray(level_of(phases))
     largest = levels.argmax(axis=0)
     phase, frequency, level = (column[largest, here] for column in (phases, cycles, levels))
     is_of = np.arange(count)[:, None] == largest
@@ -124,7 +132,7 @@ def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | N
         is_higher = height > level[cases_with_group]
         cases_with_group = cases_with_group[is_higher]
         phase[cases_with_group], frequency[cases_with_group], level[cases_with_group] = (
-            column[is_higher] for column in (*worst, height)
+            np.asarray(column)[is_higher] for column in (*worst, height)
         )
         is_of[:, cases_with_group] = members[:, cases_with_group]
     for first, second in pairs:
@@ -133,7 +141,7 @@ def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | N
     return Echo(phase, frequency, level, is_of.reshape(count, *shape))
 
 
-def echo_phase(level: Any) -> Any:
+def echo_phase(level: PerCase) -> PerCase:
     """Peak phase of a sinusoid whose echoes have an amplitude of up to 1 times the response's. [rad]"""
     # J₁/J₀ is above φ/2, convex, and 1 at 1.43: from here Newton's steps go down to it.
     phase = np.minimum(2 * level, 1.5)
@@ -148,7 +156,7 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
     requirement_db, split = getattr(mission.requirements, metric), getattr(allocation, metric)
     if requirement_db is None:
         return {}
-    power: Any = 10 ** (requirement_db / 10)  # -30 dB is 10⁻³: PSLR and ISLR are power ratios
+    power: float = 10 ** (requirement_db / 10)  # -30 dB is 10⁻³: PSLR and ISLR are power ratios
     if metric == "pslr":
         largest = echo_phase(np.sqrt(power * (split.transmitter + split.receiver)))
     else:
@@ -158,7 +166,7 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
         # The squares of rms phases are the shares of power.
         share = amplitude_share(split, name) if metric == "pslr" else np.sqrt(split.of(name))
         published = evaluators.vibration_limit(wavelength, power, split.of(name))
-        limits[name] = VibrationLimits(published, evaluators.motion_of_phase(wavelength, largest * share))
+        limits[name] = VibrationLimits(published, _motion_of_phase(wavelength, largest * share))
     return limits
 
 
@@ -177,7 +185,7 @@ def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str
     }
 
 
-def amplitude_share(split: Shares, name: str) -> Any:
+def amplitude_share(split: Shares, name: str) -> PerCase:
     """Share of a platform in the summed amplitude: both shares sum to 1, in the ratio of the roots of power."""
     share, share_of_other = split.of(name), split.of(next(platform for platform in PLATFORMS if platform != name))
     return evaluators.amplitude_share(share, share_of_other)
@@ -190,18 +198,18 @@ class SlowLimits(NamedTuple):
     quadratic limit.
     """
 
-    quadratic: Any
-    cubic: Any | None
-    use: Any
-    quadratic_use: Any
+    quadratic: Floats
+    cubic: Floats | None
+    use: Floats
+    quadratic_use: Floats
 
     @property
-    def smallest(self) -> Any:
+    def smallest(self) -> Floats:
         """The limit that gates."""
         return self.quadratic if self.cubic is None else np.minimum(self.quadratic, self.cubic)
 
     @property
-    def is_cubic(self) -> Any:
+    def is_cubic(self) -> Booleans:
         """Whether the cubic phase sets the limit."""
         return self.use > self.quadratic_use
 

@@ -13,6 +13,7 @@ from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.scene import Corrections, SceneEdge, SceneEdges
 from bisar_budget.analysis.spread import noise, rests
 from bisar_budget.analysis.together import Together, cubics, quadratics
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.continued_masks import continuation_note, part_of, rests_on_masks
 from bisar_budget.budget.doubted_noise import doubted_noise_note, rests_on_doubted_noise
 from bisar_budget.budget.judged_requirements import (
@@ -33,7 +34,6 @@ from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Shares
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 PULL_IN = "autofocus_pull_in"
 
@@ -145,7 +145,7 @@ class Aggregates:
         """Errors of sensors, clocks and the air that count against the share of an owner."""
         return [error for error in self.together("full").random if split.includes(error.owner, owner)]
 
-    def _is_declared(self, members: Iterable[DeclaredPhase]) -> Truths:
+    def _is_declared(self, members: Iterable[DeclaredPhase]) -> Booleans:
         """Cases in which any of the phases is declared."""
         is_declared = np.zeros(self.judging.cases, dtype=bool)
         for member in members:
@@ -155,16 +155,16 @@ class Aggregates:
     def _row(
         self,
         row_subject: Subject,
-        is_declared: Any,
+        is_declared: PerCaseFlag,
         phases: Phases,
         size: Floats,
-        limit: Any,
+        limit: PerCase | None,
         theirs: Together,
-        size_by_theirs: Any = math.nan,
-        of_all: Any = math.nan,
+        size_by_theirs: PerCase = math.nan,
+        of_all: PerCase = math.nan,
         *,
         without_value: str = "",
-        without_autofocus: Any = 0.0,
+        without_autofocus: PerCase = 0.0,
         never_fails: bool = False,
         continued: tuple[str, Sequence[RandomError]] = ("quadratic", ()),
         **fields: Any,
@@ -175,10 +175,10 @@ class Aggregates:
         errors that the row adds up, and these errors. A pass that depends on noise below the first points of masks
         becomes a warning; a pass that depends on noise in doubt is not evaluated.
         """
-        rests_on: Any = False
-        is_in_doubt: Any = False
-        is_over_by_other: Any = False
-        is_over_of_all: Any = False
+        rests_on: PerCaseFlag = False
+        is_in_doubt: PerCaseFlag = False
+        is_over_by_other: PerCaseFlag = False
+        is_over_of_all: PerCaseFlag = False
         by_model: dict[str, Any] = {}
         if limit is not None:
             limit = self.array(limit)
@@ -221,14 +221,14 @@ class Aggregate(FamilyRow):
 
     rule: str
     phases: Phases
-    by_other: Any
-    of_all: Any = math.nan
-    is_over_by_other: Any = False
-    is_over_of_all: Any = False
-    without_autofocus: Any = 0.0
-    rests_on: Any = False  # depends on noise below the first points of masks; `continued` as in `Aggregates._row`
+    by_other: PerCase
+    of_all: PerCase = math.nan
+    is_over_by_other: PerCaseFlag = False
+    is_over_of_all: PerCaseFlag = False
+    without_autofocus: PerCase = 0.0
+    rests_on: PerCaseFlag = False  # on noise below the first points of masks; `continued` as in `Aggregates._row`
     continued: tuple[str, Sequence[RandomError]] = ("quadratic", ())
-    is_in_doubt: Any = False  # the noise that the row depends on is in doubt
+    is_in_doubt: PerCaseFlag = False  # the noise that the row depends on is in doubt
 
     def of_equal_loss(self, equal_loss: Floats, of_full: Floats) -> "Aggregate":
         """The row with the phase of equal loss as the declared value.
@@ -324,7 +324,7 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
     for kind, keys in TAKEN_BY.items():
         if any(getattr(needs, key) is not None for key in keys):
             continue
-        sum_of_all: Any = 0.0
+        sum_of_all: PerCase = 0.0
         sizes: dict[str, Floats] = {}
         for together, of_kinds in by_model:
             sum_of_all = np.fmax(sum_of_all, together.combined(of_kinds[kind], together.rule_of_all))
@@ -355,7 +355,7 @@ def _exchanged(phases_by_kind: Mapping[str, Phases], errors: Sequence[RandomErro
 
 
 # ---------------------------------------------------------------------- displacements that no row holds
-def unplaced(together: Together) -> dict[str, Truths]:
+def unplaced(together: Together) -> dict[str, Booleans]:
     """Find the clocks that displace the image by an amount that the file does not state, with the cases."""
     return {error.subject.id: together.errors.array(error.displaces_unknown) > 0 for error in together.random}
 
@@ -370,7 +370,7 @@ class _Words(NamedTuple):
     equation: tuple[str, str]  # by the published model, by the full model
 
 
-_EQUATIONS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "each": "largest of the rows"}
+_ROW_SUM_WORDS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "each": "largest of the rows"}
 _PATHS: dict[str, KeyPath] = {"mission": ("platforms",), "clock": ("timing_error",)}
 _WORDINGS = {
     CUBIC: _Words("cubic phase", "rad", ("requirements", CUBIC), ("Table I, cubic column", "full model")),
@@ -383,7 +383,7 @@ def _wording_of(row_subject: Subject, rule: str) -> _Words:
     if row_subject.kind in _WORDINGS:
         return _WORDINGS[row_subject.kind]
     path = _PATHS.get(row_subject.owner, ("platforms", row_subject.owner, "motion_error"))
-    return _Words("QPE", "rad", path, (_EQUATIONS[rule], _EQUATIONS[rule]))
+    return _Words("QPE", "rad", path, (_ROW_SUM_WORDS[rule], _ROW_SUM_WORDS[rule]))
 
 
 def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, Note]:

@@ -19,7 +19,7 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, by_nodes
 from bisar_budget.budget.confidence import confidence_of
 from bisar_budget.budget.declarations import declared_kinds
-from bisar_budget.budget.doubts import collection_notes, model_doubt
+from bisar_budget.budget.doubts import collection_notes, model_doubt, orbit_notes
 from bisar_budget.budget.file_warnings import file_warnings
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.requirement_table import negligible_effects, requirements_in_words, rows_in_words
@@ -122,6 +122,7 @@ def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) 
         notes=(
             *negligible_effects(judged, case),
             *collection_notes(case),
+            *orbit_notes(case, rows),
             *_unused_keys(mission),
             *_overridden(mission),
         ),

@@ -11,6 +11,7 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
+from bisar_budget.arrays import PerCase, PerCaseFlag
 from bisar_budget.effects.oscillators import COVERED_CYCLES
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.phrases import NOTHING, Note
@@ -26,16 +27,16 @@ def part_of(effect: RandomEffect, effect_kind: Part) -> Any:
     return getattr(effect, effect_kind)
 
 
-def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> Any:
+def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> PerCase:
     """Power of an effect of declared errors by noise below the first points of masks; 0 without such noise."""
-    power: Any = 0.0
+    power: PerCase = 0.0
     for error in errors:
         if error.continued is not None and error.declared is not None:
             power = power + np.nan_to_num(np.square(part_of(error.continued, effect_kind) * error.declared))
     return power
 
 
-def rests_on_masks(errors: Iterable[RandomError], effect_kind: Part, size: Any, limit: Any) -> Any:
+def rests_on_masks(errors: Iterable[RandomError], effect_kind: Part, size: PerCase, limit: PerCase) -> PerCaseFlag:
     """Whether a size, with its limit, depends on noise below the first points of masks, in each case."""
     power = continued_power(errors, effect_kind)
     with np.errstate(all="ignore"):

@@ -7,11 +7,11 @@ anyway.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
 from bisar_budget import phrases
+from bisar_budget.arrays import PerCase, PerCaseFlag
 from bisar_budget.budget.continued_masks import MIN_USE_FRACTION, Part, part_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import POOR_FIT_FRACTION, noise_of
@@ -20,9 +20,11 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 
 
-def rests_on_doubted_noise(errors: Iterable[RandomError], effect_kind: Part, model: str, limit: Any) -> Any:
+def rests_on_doubted_noise(
+    errors: Iterable[RandomError], effect_kind: Part, model: str, limit: PerCase
+) -> PerCaseFlag:
     """Whether oscillators in doubt use more than a tenth of a limit by one of their effects, in each case."""
-    power: Any = 0.0
+    power: PerCase = 0.0
     for error in errors:
         if error.declared is not None and np.any(error.is_in_doubt):
             size = part_of(error.effect(model), effect_kind) * np.asarray(error.declared)

@@ -10,6 +10,7 @@ the fixes has both errors in its image. If the file does not state the choice (`
 can be judged.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,17 +19,17 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.constants import ONE_PEAK_DB
 from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, Subject
 from bisar_budget.effects.navigation_errors import residual_subject
 from bisar_budget.findings.row import Row
-from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, norm, unit
-from bisar_budget.mission.covariance import KINDS
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, norm, unit
+from bisar_budget.mission.covariance import MOTION_KINDS
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath, LogNoise, MotionError, Platform
 from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 LEAST_M = 1e-3  # smallest doubt of a path that counts against a declared error, zero included
 NEGLIGIBLE_USE_FRACTION = 0.1  # of a requirement, by the doubt of a path or by a velocity that its source states
@@ -72,7 +73,7 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
             key = f"platforms.{name}.motion_error.position"
             note = phrases.input_in_doubt(path.doubt_m, path.doubt_of, declared, key)
             doubts.append(InputDoubt(name, path.doubt_m, declared or 0.0, note))
-        for kind in KINDS:
+        for kind in MOTION_KINDS:
             doubts += [
                 _stated_doubt(platform, name, kind, stated)
                 for stated in path.stated
@@ -87,13 +88,13 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
     return doubts
 
 
-def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Truths]:
+def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Booleans]:
     """Cases in which a platform's path is in doubt by more than the file declares, by platform and kind of error."""
     doubted = {}
     for name in PLATFORMS:
         path: FlownPath | None = getattr(mission.platforms, name).path
         if path is not None:
-            for kind in KINDS:
+            for kind in MOTION_KINDS:
                 doubts = [strays(mission, name), is_coarse(mission, name)] if kind == "position" else []
                 doubts += [states_more(mission, name, kind, stated) for stated in path.stated]
                 doubted[name, kind] = np.any([np.broadcast_to(doubt, (cases,)) for doubt in (False, *doubts)], axis=0)
@@ -102,7 +103,7 @@ def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Tru
 
 
 # ---------------------------------------------------------------------- how far the truth may be from a path
-def strays(mission: Mission, name: str) -> Any:
+def strays(mission: Mission, name: str) -> PerCaseFlag:
     """Whether the truth may be farther from a platform's path than the file declares, in each case.
 
     If no error is declared, age, interpolation and residual count if they are unusual, or if such an error would use
@@ -113,7 +114,7 @@ def strays(mission: Mission, name: str) -> Any:
     if path is None:
         return False
     if declared is not None:
-        return np.asarray(path.doubt_m) > np.maximum(declared, LEAST_M)
+        return np.asarray(np.asarray(path.doubt_m) > np.maximum(declared, LEAST_M))
     is_large = np.asarray(path.doubt_m) > LEAST_M
     if not is_large.any() or path.is_doubted:
         return is_large
@@ -146,7 +147,7 @@ def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, kind: str = 
 
 
 # ---------------------------------------------------------------------- errors that the source of a path states
-def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) -> Any:
+def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) -> PerCaseFlag:
     """Whether the source of a path states a larger error than the file declares, in each case.
 
     An error is larger if it has more variance in any direction. For a source without directions the root-sum-squares
@@ -155,7 +156,7 @@ def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) 
     usual position error if the file declares no position error.
     """
     platform: Platform = getattr(mission.platforms, name)
-    stated_covariance = _stated_covariance(stated, kind)
+    stated_covariance = _stated_covariance(stated, kind, platform)
     declared = _declared_covariance(platform, kind)
     if stated.covariance is None:
         is_more = kind == "position" and stated.total**2 > np.trace(declared, axis1=-2, axis2=-1) * (
@@ -172,18 +173,28 @@ def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) 
     is_open = stated.is_typical and platform.motion_error.stated(kind) is None and not platform.motion_error.random
     if is_more.any() and (kind == "velocity" or is_open):
         is_more = is_more & _matters(mission, name, kind, stated_covariance)
-    return is_more
+    return np.asarray(is_more)
 
 
-def _stated_covariance(stated: StatedAccuracy, kind: str) -> Floats | None:
-    """Covariance (..., 3, 3) of a kind of error along the scene's axes; None if the source does not state it."""
-    if stated.covariance is None:
+def _stated_covariance(stated: StatedAccuracy, kind: str, platform: Platform) -> Floats | None:
+    """Covariance (..., 3, 3) of a kind of error along the scene's axes; None if the source does not state it.
+
+    A velocity of a platform in free fall is against the stars where the file states its errors in `ric`.
+    """
+    covariance, row, fall = stated.covariance, 3 * MOTION_KINDS.index(kind), platform.state.fall
+    if covariance is None or len(covariance) <= row:
         return None
-    first = 3 * KINDS.index(kind)
-    if len(stated.covariance) <= first:
-        return None
-    rows = [row[first : first + 3] for row in stated.covariance[first : first + 3]]
-    return _stack(rows)
+
+    def block(first: int, second: int) -> Floats:
+        return _stack([line[second : second + 3] for line in covariance[first : first + 3]])
+
+    if kind == "position" or fall is None or platform.motion_error.frame != "ric":
+        return block(row, row)
+    x, y, z = fall.rotation
+    turning = _stack(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    mixed = turning @ block(0, 3)
+    turned = turning @ block(0, 0) @ np.swapaxes(turning, -1, -2)
+    return np.asarray(block(3, 3) + mixed + np.swapaxes(mixed, -1, -2) + turned)
 
 
 def _declared_covariance(platform: Platform, kind: str) -> Floats:
@@ -200,7 +211,7 @@ def _declared_covariance(platform: Platform, kind: str) -> Floats:
     return np.asarray(np.swapaxes(axes, -1, -2) @ _stack(along) @ axes)
 
 
-def _stack(rows: Sequence[Sequence[Any]]) -> Floats:
+def _stack(rows: Sequence[Sequence[PerCase]]) -> Floats:
     """A matrix (..., 3, 3) from its elements, numbers or arrays (cases,)."""
     elements = np.broadcast_arrays(*(np.asarray(element, dtype=float) for row in rows for element in row))
     return np.moveaxis(np.array(elements).reshape(3, 3, *elements[0].shape), (0, 1), (-2, -1))
@@ -210,7 +221,7 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
     """The doubt by the errors that a source states and that the file declares, on the axis of largest difference."""
     error = platform.motion_error
     key = f"platforms.{name}.motion_error.{kind if error.covariance is None else 'covariance'}"
-    stated_covariance, declared = _stated_covariance(stated, kind), _declared_covariance(platform, kind)
+    stated_covariance, declared = _stated_covariance(stated, kind, platform), _declared_covariance(platform, kind)
     unit_name = MOTION_UNITS[kind]
     is_declared = error.stated(kind) is not None or (kind == "position" and bool(error.random))
     if stated_covariance is None:
@@ -240,26 +251,27 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
 
 
 # ---------------------------------------------------------------------- the residual of a log
-def leaves_unsaid(mission: Mission, name: str) -> Any:
+def leaves_unsaid(mission: Mission, name: str) -> PerCaseFlag:
     """Whether a log has too large a residual, and the file does not state whether the processor uses its fixes."""
     log = _unsaid_log(mission, name)
     return False if log is None else np.asarray(residual_phase(mission, name)) > MOST_RESIDUAL_RAD
 
 
-def residual_phase(mission: Mission, name: str) -> Any:
+def residual_phase(mission: Mission, name: str) -> PerCase:
     """Phase of the residual of a log's fixes along the line of sight, rms over the aperture. [rad]"""
     path: FlownPath | None = getattr(mission.platforms, name).path
     if path is None or path.log_noise is None:
         return 0.0
     residual, half = _stack(path.log_noise.residual), np.asarray(mission.collection.aperture_time) / 2
-    square = 0.0
+    square: PerCase = 0.0
     for weight, time in ((1 / 6, -half), (2 / 3, 0.0 * half), (1 / 6, half)):  # Simpson, over the aperture
         sight = np.stack(np.broadcast_arrays(*_sight(mission, name, time)), axis=-1)
         square = square + weight * np.einsum("...i,...ij,...j->...", sight, residual, sight)
-    return 2 * np.pi / np.asarray(mission.radar.wavelength) * np.sqrt(np.maximum(square, 0.0))
+    phase: PerCase = 2 * np.pi / np.asarray(mission.radar.wavelength) * np.sqrt(np.maximum(square, 0.0))
+    return phase
 
 
-def is_coarse(mission: Mission, name: str) -> Any:
+def is_coarse(mission: Mission, name: str) -> PerCaseFlag:
     """Whether a step of a log's fixes is too coarse, and the file does not state whether the processor uses them.
 
     A step is too coarse if it exceeds a tenth of the declared position error along any direction. If the file
@@ -305,17 +317,13 @@ def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
 
 
 # ---------------------------------------------------------------------- the effect of a doubt
-def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Any:
+def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Booleans:
     """Whether an error of a platform, by its covariance, uses more than a negligible part of a requirement."""
     needs, half = mission.requirements, np.asarray(mission.collection.aperture_time) / 2
     with np.errstate(all="ignore"):
-        ways = [_sight(mission, name, time) for time in (-half, 0.0 * half, half)]
-        before, middle, after = (np.stack(np.broadcast_arrays(*way), axis=-1) for way in ways)
+        before, middle, after = _range_errors(mission, name, kind, half)
         at_ends = np.asarray(half)[..., None]
-        if kind == "position":
-            constant, linear, edge = middle, (after - before) / (2 * at_ends), (after + before) / 2 - middle
-        else:
-            constant, linear, edge = 0 * middle, (after + before) / 2, (after - before) * at_ends / 2
+        constant, linear, edge = middle, (after - before) / (2 * at_ends), (after + before) / 2 - middle
         at_edge = np.sqrt(np.einsum("...i,...ij,...j->...", edge, covariance, edge))
         phase = 2 * np.pi / np.asarray(mission.radar.wavelength) * at_edge
         matters = np.logical_not(
@@ -325,18 +333,45 @@ def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Any:
             moved = _moved(mission.geometry, constant, linear)
             spread = np.sqrt(np.einsum("...ai,...ij,...aj->...", moved, covariance, moved))
             matters = matters | np.logical_not(spread < NEGLIGIBLE_USE_FRACTION * np.asarray(needs.location_error))
-    return matters
+    return np.asarray(matters)
+
+
+def _range_errors(mission: Mission, name: str, kind: str, half: Floats) -> Sequence[Floats]:
+    """Range that a unit error of a platform along each axis adds at both ends of the aperture and in its middle.
+
+    At −T/2, 0 and T/2, (..., 3) each. [m]
+    """
+    sights = [
+        np.stack(np.broadcast_arrays(*_sight(mission, name, time)), axis=-1) for time in (-half, 0.0 * half, half)
+    ]
+    platform: Platform = getattr(mission.platforms, name)
+    path = platform.state
+    if path.fall is None:
+        powers = [1.0, 1.0, 1.0] if kind == "position" else [-half[..., None], 0.0, half[..., None]]
+        return [sight * power for sight, power in zip(sights, powers, strict=True)]
+    halves = np.atleast_1d(np.broadcast_to(half, np.broadcast_shapes(half.shape, sights[0].shape[:-1])))
+    motions = path.fall.motions(path, halves, np.array((-1.0, 0.0, 1.0)))
+    units = motions[MOTION_KINDS.index(kind)]
+    if kind == "position" and platform.motion_error.frame == "ric":
+        rates = [path.fall.rate_against_stars(axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+        turned = [sum(motions[1][i] * rate[i] for i in range(3)) for rate in rates]
+        units = units + np.stack(turned)
+    at_times = np.stack([np.broadcast_to(sight, (*halves.shape, 3)) for sight in sights])
+    ranges = np.einsum("acqn,qnc->qna", units, at_times)
+    return [range_error.reshape(*sight.shape) for range_error, sight in zip(ranges, sights, strict=True)]
 
 
 def _sight(mission: Mission, name: str, time: Any) -> Any:
     """Range that a metre of a platform's motion along each axis adds at a slow time, less the direct path's range."""
     platforms = mission.platforms
-    sight = unit(getattr(platforms, name).state.place(time))
+    path: PlatformState = getattr(platforms, name).state
+    sight = unit(path.place(time))
     if not mission.has_direct_path:
         return sight
     sign = 1.0 if name == "transmitter" else -1.0
     baseline = unit(platforms.geometry.apart.place(time))
-    return [towards - sign * along for towards, along in zip(sight, baseline, strict=True)]
+    x, y, z = (towards - sign * along for towards, along in zip(sight, baseline, strict=True))
+    return (x, y, z)
 
 
 def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floats:
@@ -346,6 +381,26 @@ def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floa
     east = (np.asarray(d)[..., None] * constant - np.asarray(b)[..., None] * linear) / determinant
     north = (np.asarray(a)[..., None] * linear - np.asarray(c)[..., None] * constant) / determinant
     return np.stack((east, north), axis=-2)
+
+
+# ---------------------------------------------------------------------- errors of an orbit
+def orbit_notes(case: Case, rows: Sequence[Row]) -> Iterator[Note]:
+    """Notes on platforms in free fall whose position and velocity errors cannot be independent.
+
+    The errors of an orbit are correlated: a position error δr goes with a velocity error of about n·δr, n the rate of
+    the orbit. Declared as independent and smaller than n·δr, they leave more phase than the orbit's covariance. The
+    note is given if the position errors use more than a negligible part of a limit.
+    """
+    for index, name in enumerate(PLATFORMS):
+        state, error = case.geometry.both[index], getattr(case.mission.platforms, name).motion_error
+        position, velocity = error.stated("position"), error.stated("velocity") or (0.0, 0.0, 0.0)
+        if state.fall is None or error.covariance is not None or position is None:
+            continue
+        rate = float(norm(state.fall.orbit_rate(state)))
+        sizes = math.hypot(*position), math.hypot(*velocity)
+        uses = [row.utilization or 0.0 for row in rows if row.owner == name and row.subject.kind == "position"]
+        if rate * sizes[0] > sizes[1] and max(uses, default=0.0) > NEGLIGIBLE_USE_FRACTION:
+            yield phrases.orbit_errors_are_independent(name, sizes[0], rate, sizes[1])
 
 
 # ---------------------------------------------------------------------- the published model
@@ -408,7 +463,7 @@ def collection_notes(case: Case) -> Iterator[Note]:
     for name, state in zip(PLATFORMS, case.geometry.both, strict=True):
         if not state.is_straight:
             yield phrases.note("path-curves", platform=name)
-        turn = norm(state.look_rate) * mission.collection.aperture_time / 2
+        turn = float(norm(state.look_rate)) * mission.collection.aperture_time / 2
         if turn > _TURNING_RAD:
             yield phrases.note("sight-turns", platform=name, half_turn=turn)
     if case.peak_loss_db is not None and case.peak_loss_db > ONE_PEAK_DB:

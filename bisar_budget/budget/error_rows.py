@@ -1,7 +1,7 @@
 """Rows of errors: the declared size against the largest size that requirements, or a specification, allow."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,9 +9,10 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, Model
+from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.judged_rows import (
     CODE,
-    EFFECTS,
+    EFFECT_WORDS,
     LIMIT_RATIO,
     REQUIREMENTS,
     FamilyRow,
@@ -19,16 +20,25 @@ from bisar_budget.budget.judged_rows import (
     Judging,
     worded,
 )
-from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, OTHER_MODEL, QUADRATIC, Declared
+from bisar_budget.effects.declared import (
+    CUBIC,
+    END_OF_IMAGE,
+    LIMITING_REQUIREMENTS,
+    LOCATION,
+    OTHER_MODEL,
+    QUADRATIC,
+    Declared,
+)
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.changes import name_of_error, parts_of
 from bisar_budget.mission.quantities import Number, largest_at
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats
 
-_BINDING = np.array([REQUIREMENTS.index(name) for name in (*HELD, END_OF_IMAGE)] + [-1], dtype=np.int8)
+_BINDING = np.array(
+    [REQUIREMENTS.index(name) for name in (*LIMITING_REQUIREMENTS, END_OF_IMAGE)] + [-1], dtype=np.int8
+)
 
 
 class ErrorRows:
@@ -98,7 +108,9 @@ class ErrorRows:
             yield ErrorRow(judged.at(row, source.subject), source, self.limits[source.owner])
 
 
-def _is_over(does: Declared, gain: Any, limits: tuple[Floats, float | None, float | None], is_motion: Any) -> Any:
+def _is_over(
+    does: Declared, gain: PerCase, limits: tuple[Floats, float | None, float | None], is_motion: PerCaseFlag
+) -> PerCaseFlag:
     """Whether any effect of the errors exceeds its limit."""
     limit, cubic, location = limits
     is_over = does.judged(gain) / limit > LIMIT_RATIO
@@ -190,8 +202,8 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
     if size <= allowed * LIMIT_RATIO or other.is_blind:
         return NOTHING
     if binding == QUADRATIC and other.is_published:
-        return phrases.other_model_fails(other.name, size, allowed, *EFFECTS[binding], source.equation)
-    note = phrases.other_model_fails(other.name, size, allowed, *EFFECTS[binding])
+        return phrases.other_model_fails(other.name, size, allowed, *EFFECT_WORDS[binding], source.equation)
+    note = phrases.other_model_fails(other.name, size, allowed, *EFFECT_WORDS[binding])
     return note.then(_cause(source)) if binding == QUADRATIC else note
 
 
@@ -221,7 +233,7 @@ def specification_rows(judging: Judging, analysis: Analysis) -> Iterator["Specif
     for number in analysis.mission.specifications.values():
         most, largest_declared = judging.array(number.value), judging.array(largest_at(analysis.mission, number))
         row_subject = subject(_owner(number.key), SPECIFICATION, name_of_error(number.key))
-        of_amplitudes = _amplitude if number.is_level else np.asarray
+        of_amplitudes: Callable[[Floats], Floats] = _amplitude if number.is_level else np.asarray
         judged = judging._replace(warn_above=1.0).row(
             row_subject, of_amplitudes(largest_declared), of_amplitudes(most)
         )
@@ -250,8 +262,8 @@ class SpecificationRow(FamilyRow):
         )
 
 
-def _amplitude(level: Any) -> Any:
-    return 10 ** (level / 20)
+def _amplitude(level: Floats) -> Floats:
+    return np.asarray(10 ** (level / 20))
 
 
 def _owner(key: str) -> str:

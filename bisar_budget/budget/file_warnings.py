@@ -14,13 +14,13 @@ from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubted_noise import noise_doubts
 from bisar_budget.budget.doubts import input_doubts, missing_settings
 from bisar_budget.budget.fit_noise import MAX_UNSAID_CHANGE_FRACTION, allowable_noise
-from bisar_budget.constants import FASTEST_FLIGHT
+from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.findings.row import Row
-from bisar_budget.geometry import norm
+from bisar_budget.geometry import norm, plain_vector
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.phrases import Note
@@ -128,13 +128,13 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
     """
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
-        speed, axes = norm(platform.state.velocity), mission.scene.axes
-        if speed <= FASTEST_FLIGHT or platform.acceleration is not None or platform.is_of_the_earth:
+        speed, axes = float(norm(platform.state.velocity)), mission.scene.axes
+        if speed <= MAX_FLIGHT_SPEED_MPS or platform.acceleration is not None or platform.is_of_the_earth:
             continue
         key = ("platforms", name, "speed" if platform.velocity is None else "velocity")
         from bisar_budget.paths.earth import free_fall  # takes 8 ms; most missions do not need it
 
-        acceleration = free_fall(platform.state.position, platform.state.velocity, axes)
+        acceleration = free_fall(plain_vector(platform.state.position), plain_vector(platform.state.velocity), axes)
         yield _Warned(
             key, phrases.satellite_flies_straight(name, speed, acceleration, axes is not None), is_doubt=True
         )
@@ -211,7 +211,7 @@ def _of_autofocus(mission: Mission, resolution: Resolution) -> Iterator[_Warned]
             key, phrases.note("walks-over-range-cells", n_pull=n_pull, cells=cells, cap=rounded_down(limit.walk))
         )
     if radius is not None and limit.scene is not None and n_pull > limit.scene:
-        smear, largest_n_pull = 4 * n_pull * resolution.cross_range, rounded_down(limit.scene)
+        smear, largest_n_pull = 4 * n_pull * float(resolution.cross_range), rounded_down(limit.scene)
         yield _Warned(
             key,
             phrases.note(

@@ -9,19 +9,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bisar_budget.arrays import Floats
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.sources import ErrorListing, exact_ranges
 from bisar_budget.geometry import PlatformState
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
-from bisar_budget.ranges.exact_ranges import Floats
 
 MAX_UNSAID_CHANGE_FRACTION = 0.05  # largest change of an allowable without a warning
 _DECISIVE_EFFECT_FRACTION = (
     0.1  # of the largest effect per unit of a kind: the allowable of a smaller effect decides nothing
 )
-_KINDS = ("position", "velocity")
+_MOTION_KINDS = ("position", "velocity")
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
     exact = exact_ranges(cases, geometry, int(np.max(count)), cases=len(sides))
     listing = ErrorListing(cases, geometry, exact)
     worst = AllowableNoise(sigma, 0.0, "")
-    for kind in _KINDS:
+    for kind in _MOTION_KINDS:
         units = np.array(
             [
                 [np.broadcast_to(effect.qpe, (len(sides),)) for effect in listing.legs(place, kind)[1]]

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise, rests
+from bisar_budget.arrays import Booleans, Floats, PerCaseFlag
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations, swings_nothing
 from bisar_budget.budget.dispersion_row import dispersion_rows
@@ -25,7 +25,7 @@ from bisar_budget.budget.error_rows import ErrorRows, specification_rows
 from bisar_budget.budget.file_warnings import calm_oscillators
 from bisar_budget.budget.half_causes import HalfCause, half_causes
 from bisar_budget.budget.judged_requirements import (
-    KEYS,
+    REQUIREMENT_KEYS,
     RequirementState,
     UntakenEffect,
     is_as_high,
@@ -39,16 +39,15 @@ from bisar_budget.budget.staying_air import StayingAir, staying_air
 from bisar_budget.budget.tone_rows import accelerated_rows, pslr_row, spur_rows
 from bisar_budget.budget.vibration_rows import Vibrations
 from bisar_budget.budget.waivers import holding_place
-from bisar_budget.constants import FASTEST_FLIGHT
+from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.findings.row import DECLARE, SPECIFICATION
 from bisar_budget.findings.status import BROKEN, STATUS
 from bisar_budget.geometry import BistaticGeometry, norm
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import Truths
 
-_BROKEN = [CODE[name] for name in BROKEN]
+_BROKEN_CODES = [CODE[name] for name in BROKEN]
 _GATES = np.array([status.gates for status in STATUS.values()])
 _OWNERS = (*PLATFORMS, "clock", "mission")
 
@@ -67,12 +66,12 @@ class JudgedMission:
     before: tuple[Judged, ...]
     requirements: tuple[RequirementState, ...]
     untaken: Sequence[UntakenEffect]
-    unplaced: Mapping[str, Truths]
+    unplaced: Mapping[str, Booleans]
     air: StayingAir
     scene: JudgedScene | None
     floor: Codes  # the best status that each case can have
     waivers: NDArray[np.intp]  # index in the file of each row's waiver, (rows, n); -1: no waiver
-    waived_requirements: Sequence[tuple[Truths, int]]  # cases in which each is waived, index of its waiver or -1
+    waived_requirements: Sequence[tuple[Booleans, int]]  # cases in which each is waived, index of its waiver or -1
 
     @property
     def is_empty(self) -> bool:
@@ -84,7 +83,7 @@ class JudgedMission:
         )
         return all(nothing)
 
-    def covering(self, row_id: str | None = None) -> Iterator[tuple[str, Truths]]:
+    def covering(self, row_id: str | None = None) -> Iterator[tuple[str, Booleans]]:
         """Ids of the waivers, in the order of the file, each with the cases in which it covers anything, or a row."""
         rows = [row_id is None or row.subject.id == row_id for row in self.rows]
         requirements = self.waived_requirements if row_id is None else ()
@@ -149,11 +148,13 @@ class _Judgement:
         before = of_all.status
         waivers = of_all.waivers(self.today)
         after = np.where(waivers >= 0, CODE["waived"], before)
-        of_requirements = {key: holding_place(mission, self.today, [f"mission.{key}"]) for key in KEYS}
+        of_requirements = {key: holding_place(mission, self.today, [f"mission.{key}"]) for key in REQUIREMENT_KEYS}
         states = requirement_states(
             mission,
             # A requirement judges its effects without the row's status, but a waiver of its row waives it too.
-            np.where((after == CODE["waived"]) & np.isin(by_themselves, _BROKEN), CODE["waived"], by_themselves),
+            np.where(
+                (after == CODE["waived"]) & np.isin(by_themselves, _BROKEN_CODES), CODE["waived"], by_themselves
+            ),
             np.array([row.utilization for row in rows]),
             of_all.judges(),
             np.array([row.quadratic_use for row in rows]),
@@ -223,7 +224,7 @@ class _Judgement:
         return ErrorRows(self.judging, self.analysis, self._limits)
 
     @cached_property
-    def _limits(self) -> Mapping[str, Any]:
+    def _limits(self) -> Mapping[str, Floats]:
         """Limit on the quadratic phase of each owner, gain of autofocus included. [rad]"""
         allocation = self.analysis.allocation
         return {owner: self.judging.array(allocation.qpe_allowed(owner)) for owner in _OWNERS}
@@ -257,7 +258,7 @@ class _Judgement:
 
     # ---------------------------------------------------------------- judgements beyond single rows
     @cached_property
-    def _in_doubt(self) -> dict[tuple[str, str], Truths]:
+    def _in_doubt(self) -> dict[tuple[str, str], Booleans]:
         """Cases in which a platform's path is in doubt by more than is declared, by platform and kind of error."""
         return doubted_platforms(self.mission, self.cases)
 
@@ -279,7 +280,7 @@ class _Judgement:
             if row_id not in there
         )
 
-    def _has_noise(self) -> Truths:
+    def _has_noise(self) -> Booleans:
         """Cases that declare an error that spreads, or a tone that ISLR limits.
 
         The phase of a motion error beyond the cubic spreads if it is not negligible.
@@ -294,7 +295,7 @@ class _Judgement:
             has_any += [np.broadcast_to(phase.is_there, (self.cases,)) for phase in self.analysis.tones]
         return np.asarray(np.any([np.zeros(self.cases, bool), *has_any], axis=0))
 
-    def _doubted_rows(self, rows: Sequence[Judged]) -> Truths:
+    def _doubted_rows(self, rows: Sequence[Judged]) -> Booleans:
         """Rows of oscillators with doubted noise, (rows, cases)."""
         doubted = {error.id: error.is_in_doubt for error in self.analysis.random if np.any(error.is_in_doubt)}
         in_doubt = np.zeros((len(rows), self.cases), dtype=bool)
@@ -311,7 +312,9 @@ class _Judgement:
                 strays_from_log = strays(self.mission, name) & (not platform.path.samples)
                 floor[~np.broadcast_to(strays_from_log, floor.shape)] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
-                floor[np.broadcast_to(np.asarray(norm(path.velocity)) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
+                floor[np.broadcast_to(np.asarray(norm(path.velocity)) > MAX_FLIGHT_SPEED_MPS, floor.shape)] = CODE[
+                    "warn"
+                ]
         platforms = (getattr(self.mission.platforms, name) for name in PLATFORMS)
         if calm_oscillators(self.mission) or any(map(swings_nothing, platforms)):
             floor[:] = CODE["warn"]
@@ -332,7 +335,7 @@ class RowStatuses:
         self.subjects = [row.subject for row in rows]
         self.status, self.why = np.array([row.status for row in rows]), np.array([row.why for row in rows])
 
-    def _settle(self, rows: Sequence[bool], is_so: Any, why: Why) -> None:
+    def _settle(self, rows: Sequence[bool], is_so: PerCaseFlag, why: Why) -> None:
         """Set `rows` to not evaluated in the cases where `is_so`, (rows, cases) or (cases,)."""
         are_settled = np.array(rows, dtype=bool)[:, None] & is_so
         self.status = np.where(are_settled, CODE["not_evaluated"], self.status)
@@ -352,14 +355,14 @@ class RowStatuses:
             owed = [any(is_asked_for(row_subject, error) for error in missing) for row_subject in self.subjects]
             self._settle(owed, cases & (self.status == CODE["not_declared"]), Why.NOT_DECLARED_AS_REQUIRED)
 
-    def doubt_inputs(self, in_doubt: Mapping[tuple[str, str], Truths]) -> None:
+    def doubt_inputs(self, in_doubt: Mapping[tuple[str, str], Booleans]) -> None:
         """Set errors of a path that is in doubt by more than the file declares to not evaluated."""
         for (name, kind), is_doubtful in in_doubt.items():
             if is_doubtful.any():
                 owed = [is_in_doubt(row_subject, name, self.mission, kind) for row_subject in self.subjects]
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
-    def doubt_air(self, doubted: Mapping[str, Truths]) -> None:
+    def doubt_air(self, doubted: Mapping[str, Booleans]) -> None:
         """Set rows that depend on constant air, by their ids, to not evaluated."""
         for row_id, is_doubted in doubted.items():
             if is_doubted.any():
@@ -387,7 +390,7 @@ class RowStatuses:
             self.status[row_index] = status
             self.why[row_index] = np.where(makes_up, np.int8(Why.EFFECT_NOT_TAKEN), self.why[row_index])
 
-    def judge_place(self, is_misplaced: Truths) -> None:
+    def judge_place(self, is_misplaced: Booleans) -> None:
         """Set the location to not evaluated if an error displaces the image by an amount that no row limits."""
         if self.mission.requirements.location_error is not None:
             rows = [row_subject.id == f"mission.{LOCATION}" for row_subject in self.subjects]
@@ -398,7 +401,7 @@ class RowStatuses:
         for half in halves:
             self._settle([half.holds(row_subject) for row_subject in self.subjects], self._is_open, Why.HALF_A_CAUSE)
 
-    def judge_spread(self, has_noise: Truths) -> None:
+    def judge_spread(self, has_noise: Booleans) -> None:
         """Set ISLR to not evaluated if only a cubic phase contributes to it."""
         if not has_noise.all():
             rows = [row_subject.kind == "islr" for row_subject in self.subjects]
@@ -406,7 +409,7 @@ class RowStatuses:
             self._settle(rows, ~has_noise & self._is_open & is_new, Why.NOTHING_SPREADS)
 
     @property
-    def _is_open(self) -> Truths:
+    def _is_open(self) -> Booleans:
         return np.asarray((self.status != CODE["fail"]) & (self.status != CODE["not_declared"]))
 
     def waivers(self, today: date) -> NDArray[np.intp]:
@@ -420,12 +423,14 @@ class RowStatuses:
             waiver_of_row = holding_place(self.mission, today, [row_subject.id])
             both = [waiver_index for waiver_index in (waiver_of_row, of_missing) if waiver_index >= 0]
             indices[row] = np.where(is_missing[row], min(both, default=-1), waiver_of_row)
-        return np.where(np.isin(self.status, _BROKEN), indices, -1)
+        return np.where(np.isin(self.status, _BROKEN_CODES), indices, -1)
 
     def judges(self) -> Codes:
-        """Index in `KEYS` of the requirement that judges each row; -1: no requirement, or not declared."""
+        """Index in `REQUIREMENT_KEYS` of the requirement that judges each row; -1: none, or not declared."""
         binding = np.array([row.binding for row in self.rows])
-        metric = np.array([[KEYS.index(row.metric) if row.metric in KEYS else -1] for row in self.rows])
+        metric = np.array(
+            [[REQUIREMENT_KEYS.index(row.metric) if row.metric in REQUIREMENT_KEYS else -1] for row in self.rows]
+        )
         judges = np.where((binding >= 0) & (binding < REQUIREMENTS.index(END_OF_IMAGE)), binding, metric)
         return np.where(self.why == Why.NOT_DECLARED_AS_REQUIRED, -1, judges).astype(np.int8)
 

@@ -10,20 +10,20 @@ Every number is an array over the cases, (n,): a check is one case.
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.continued_masks import MIN_USE_FRACTION
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, Codes
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.findings.status import BROKEN, RANK, STATUS
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
-KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
-UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
+REQUIREMENT_KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
+REQUIREMENT_UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
 EQUAL_USE_FRACTION = 1e-9  # relative difference below which utilizations are equal, but for rounding
 NEGLIGIBLE_FRACTION, SMALL_RAD = 0.1, 0.08  # of the quadratic requirement; phase that is small in any image
 # Relative to the largest part: rows with smaller parts do not make up an effect if their sum is negligible.
@@ -49,8 +49,8 @@ class UntakenEffect(NamedTuple):
 
     kind: str  # cubic, spread or tone
     total: Floats
-    is_negligible: Truths
-    makers: Mapping[str, Truths]
+    is_negligible: Booleans
+    makers: Mapping[str, Booleans]
     least: Floats
     parts: Mapping[str, Floats]
 
@@ -68,8 +68,8 @@ class RequirementState(NamedTuple):
     decider: NDArray[np.intp]
     user: NDArray[np.intp]
     utilization: Floats
-    judges: Truths  # (rows, n)
-    is_unjudged: Truths
+    judges: Booleans  # (rows, n)
+    is_unjudged: Booleans
 
 
 def first_highest(uses: Floats) -> NDArray[np.intp]:
@@ -77,13 +77,13 @@ def first_highest(uses: Floats) -> NDArray[np.intp]:
     return np.asarray(is_as_high(uses, uses.max(axis=0)).argmax(axis=0))
 
 
-def is_as_high(uses: Any, other_uses: Any) -> Truths:
+def is_as_high(uses: PerCase, other_uses: PerCase) -> Booleans:
     """Whether `uses` are as high as `other_uses`, but for rounding."""
     with np.errstate(invalid="ignore"):  # an infinite utilization is as high as itself
         return np.asarray((uses >= other_uses - EQUAL_USE_FRACTION * np.abs(other_uses)) | (uses == other_uses))
 
 
-def negligible_rad(mission: Mission) -> Any:
+def negligible_rad(mission: Mission) -> PerCase:
     """Total below which an effect that no requirement covers is negligible. [rad]"""
     return np.minimum(NEGLIGIBLE_FRACTION * np.asarray(mission.requirements.quadratic_phase_error), SMALL_RAD)
 
@@ -91,7 +91,9 @@ def negligible_rad(mission: Mission) -> Any:
 def required_keys(mission: Mission) -> tuple[str, ...]:
     """Keys of the requirements that a mission has, the default of the quadratic phase included."""
     needs = mission.requirements
-    return tuple(key for key in KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None))
+    return tuple(
+        key for key in REQUIREMENT_KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None)
+    )
 
 
 def requirement_states(
@@ -100,13 +102,13 @@ def requirement_states(
     utilization: Floats,
     judges: Codes,
     quadratic_use: Floats,
-    waived: Mapping[str, Any],
+    waived: Mapping[str, PerCaseFlag],
     *,
     before: Codes,
-    in_doubt: Truths,
-    has_noise: Any,
-    is_misplaced: Any,
-    unjudged: Mapping[str, Any],
+    in_doubt: Booleans,
+    has_noise: PerCaseFlag,
+    is_misplaced: PerCaseFlag,
+    unjudged: Mapping[str, PerCaseFlag],
 ) -> list[RequirementState]:
     """Judge every requirement.
 
@@ -119,7 +121,7 @@ def requirement_states(
     utilization : (rows, n)
         Utilizations of the rows; NaN without a value.
     judges : (rows, n)
-        Index in KEYS of the requirement that each row judges; -1: no requirement.
+        Index in `REQUIREMENT_KEYS` of the requirement that each row judges; -1: no requirement.
     quadratic_use : (rows, n)
         Quadratic phase of each row over its limit, for any requirement that sets the allowable; NaN without a phase.
     waived : mapping of str to bool
@@ -140,7 +142,7 @@ def requirement_states(
     uses, states = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     is_open = before == RANK["not_evaluated"]
     for key in required_keys(mission):
-        mine = IS_JUDGED[codes] & (judges == KEYS.index(key))
+        mine = IS_JUDGED[codes] & (judges == REQUIREMENT_KEYS.index(key))
         levels, used = np.where(mine, codes, _NONE), uses
         if key == QUADRATIC:  # this requirement also limits a row that another requirement binds
             is_of_other = IS_JUDGED[codes] & ~mine & ~np.isnan(quadratic_use)

@@ -13,31 +13,41 @@ from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
-from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
+from bisar_budget.constants import UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import Subject
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats
 
 Codes = NDArray[np.int8]  # indices of statuses in STATUS: the worst has the lowest
 
-LIMIT_RATIO = 1 + UTILIZATION_TOLERANCE
+LIMIT_RATIO = 1 + UTILIZATION_TOLERANCE_FRACTION
 CODE = {name: np.int8(rank) for name, rank in RANK.items()}
-_NAMES = np.array(list(STATUS), dtype=object)
+_STATUS_NAMES = np.array(list(STATUS), dtype=object)
 REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", END_OF_IMAGE)
-EFFECTS = {QUADRATIC: ("rad", "QPE"), CUBIC: ("rad", "cubic phase"), LOCATION: ("m", "displacement")}  # in a sentence
+EFFECT_WORDS = {
+    QUADRATIC: ("rad", "QPE"),
+    CUBIC: ("rad", "cubic phase"),
+    LOCATION: ("m", "displacement"),
+}  # in a sentence
 
-WHOLE = ("allowable_published", "allowable_full", "qpe_full_rad", "qpe_exact_rad", "islr_db")  # see `Judging`
+COMPLETE_FIELDS = (
+    "allowable_published",
+    "allowable_full",
+    "qpe_full_rad",
+    "qpe_exact_rad",
+    "islr_db",
+)  # see `Judging`
 NUMBERS = (
     "declared",
     "allowable",
     "utilization",
     "qpe_published_rad",
     "cubic_rad",
-    *WHOLE[:3],
+    *COMPLETE_FIELDS[:3],
     "islr_db",
     "equal_loss_qpe_rad",
     "rest_rad",
@@ -46,9 +56,9 @@ _columns_of_numbers = attrgetter(*NUMBERS)
 IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # columns in the unit of their row
 
 
-def statuses(codes: Any) -> Any:
+def statuses(codes: Codes | np.int8) -> Any:
     """Name of the status with a code, or names for an array of codes."""
-    return _NAMES[codes]
+    return _STATUS_NAMES[codes]
 
 
 class Why(IntEnum):
@@ -109,12 +119,12 @@ class Judged(NamedTuple):
 
     def at(self, row_index: int, row_subject: Subject) -> "Judged":
         """The row at `row_index` of several rows that were judged together, (rows, cases)."""
-        return self._of_columns(lambda column: column[row_index], _COLUMNS)._replace(subject=row_subject)
+        return self._of_columns(lambda column: column[row_index], _ARRAY_FIELDS)._replace(subject=row_subject)
 
-    def where(self, takes_other: Any, other: "Judged") -> "Judged":
+    def where(self, takes_other: PerCaseFlag, other: "Judged") -> "Judged":
         """This row, with the values of `other` in the cases where `takes_other` is true."""
         columns: dict[str, Any] = {
-            name: np.where(takes_other, getattr(other, name), getattr(self, name)) for name in _COLUMNS
+            name: np.where(takes_other, getattr(other, name), getattr(self, name)) for name in _ARRAY_FIELDS
         }
         return self._replace(**columns)
 
@@ -122,7 +132,7 @@ class Judged(NamedTuple):
         """The row with its amplitude factors in decibel; the utilization remains a ratio of amplitudes."""
         return self._of_columns(decibels, IN_UNIT)
 
-    def in_unit(self, factor: Any) -> "Judged":
+    def in_unit(self, factor: PerCase) -> "Judged":
         """The row with its sizes in another unit: each size multiplied by `factor`."""
         return self._of_columns(lambda column: column * factor, IN_UNIT)
 
@@ -158,10 +168,10 @@ class Judged(NamedTuple):
         return margin
 
 
-_COLUMNS = tuple(name for name in Judged._fields if name not in ("subject", "metric", "is_of_ranges"))
+_ARRAY_FIELDS = tuple(name for name in Judged._fields if name not in ("subject", "metric", "is_of_ranges"))
 
 
-def decibels(amplitude: Any) -> Floats:
+def decibels(amplitude: PerCase) -> Floats:
     """Levels of amplitude factors; NaN for a factor that is not above 0. [dB]"""
     with np.errstate(all="ignore"):
         return np.where(amplitude > 0, 20 * np.log10(amplitude) + 0.0, math.nan)
@@ -174,10 +184,10 @@ class Judging(NamedTuple):
     """
 
     cases: int
-    warn_above: Any
+    warn_above: PerCase
     is_complete: bool = False
 
-    def array(self, value: Any) -> Floats:
+    def array(self, value: PerCase | None) -> Floats:
         """One number for each case, (cases,); NaN for None."""
         return np.full(self.cases, math.nan if value is None else value, dtype=float)
 
@@ -187,10 +197,10 @@ class Judging(NamedTuple):
         declared: Floats | None,
         allowable: Floats | None,
         *,
-        doubt: Any = False,
-        without_autofocus: Any = 0.0,
-        is_info: Any = False,
-        is_unknown: Any = False,
+        doubt: PerCaseFlag = False,
+        without_autofocus: PerCase = 0.0,
+        is_info: PerCaseFlag = False,
+        is_unknown: PerCaseFlag = False,
         never_fails: bool = False,
     ) -> Judged:
         """Judge a row: the first status that applies; where `is_unknown`, the declared value cannot be judged.

@@ -6,19 +6,19 @@ platform's share, autofocus included, the cubic phase by the full requirement.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Case
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, REQUIREMENTS, Judged, Judging
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
 from bisar_budget.effects.effect import Subject
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 
 class NearPhases(NamedTuple):
@@ -41,8 +41,8 @@ class NearPhases(NamedTuple):
         mission: Mission,
         allocation: Allocation,
         owner: str,
-        is_near: Truths,
-        phases: tuple[Any, Any, Any, Any],
+        is_near: Booleans,
+        phases: tuple[PerCase, PerCase, PerCase, PerCase],
     ) -> "NearPhases":
         """Phases of an owner's tone: quadratic, cubic, equal-loss and judged phase. [rad]"""
         quadratic, cubic, equal_loss, judged = (np.where(is_near, phase, math.nan) for phase in phases)
@@ -54,7 +54,7 @@ class NearPhases(NamedTuple):
         return cls(use, quadratic_use, without, quadratic, cubic, equal_loss)
 
     @property
-    def is_over(self) -> Truths:
+    def is_over(self) -> Booleans:
         """Whether the phases break a requirement."""
         return np.asarray(self.use > LIMIT_RATIO)
 
@@ -71,8 +71,8 @@ class NearPhases(NamedTuple):
         declared: Floats,
         by_echoes: Floats | None,
         *,
-        doubt: Any = False,
-        is_unknown: Any = False,
+        doubt: PerCaseFlag = False,
+        is_unknown: PerCaseFlag = False,
     ) -> Judged:
         """Judge the tone by its echoes and by its phases.
 

@@ -25,6 +25,7 @@ from bisar_budget.analysis.spread import (
     spread_limit,
     stated_powers,
 )
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.continued_masks import (
     MIN_USE_FRACTION,
     continuation_note,
@@ -33,7 +34,7 @@ from bisar_budget.budget.continued_masks import (
     rests_on_masks,
 )
 from bisar_budget.budget.doubted_noise import doubted_noise_note, rests_on_doubted_noise
-from bisar_budget.budget.judged_rows import CODE, EFFECTS, LIMIT_RATIO, REQUIREMENTS, FamilyRow, Judging, worded
+from bisar_budget.budget.judged_rows import CODE, EFFECT_WORDS, LIMIT_RATIO, REQUIREMENTS, FamilyRow, Judging, worded
 from bisar_budget.budget.tone_rows import evidence, notes_of_acceleration
 from bisar_budget.effects.air_delays import CONTENT, legs_of
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
@@ -46,16 +47,15 @@ from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.vibration import counted, displacement_rms, power_of, projected
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
-from bisar_budget.mission.instruments import FORMS, Oscillator, Synchronization
+from bisar_budget.mission.instruments import OSCILLATOR_NOISE_FORMS, Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath, MotionError
 from bisar_budget.mission.readers import SortedPoints
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 ISLR = "islr"
-HELD = (QUADRATIC, CUBIC, ISLR, LOCATION)  # requirements, in the order of the effects of an error
+RANDOM_REQUIREMENTS = (QUADRATIC, CUBIC, ISLR, LOCATION)  # in the order of the effects of an error
 _GOOD_FIT_FRACTION = 0.005  # misfit to an Allan deviation, up to which a power law needs no remark
 
 
@@ -68,14 +68,14 @@ class Limits(NamedTuple):
     displacement: Any
 
 
-def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: Any = 1.0) -> Limits:
+def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: PerCase = 1.0) -> Limits:
     """Limits on the errors of an owner by a model; `gain` is the gain of autofocus."""
     spread = spread_limit(mission, allocation, owner, model)
     needs = mission.requirements
     return Limits(allocation.qpe_limit(owner) * gain, needs.cubic_phase_error, spread, needs.location_error)
 
 
-def held_effect(mission: Mission, effect: RandomEffect, coverage: Any, gain: Any = 1.0) -> RandomEffect:
+def held_effect(mission: Mission, effect: RandomEffect, coverage: PerCase, gain: PerCase = 1.0) -> RandomEffect:
     """An effect as requirements limit it: without a cubic requirement, the cubic phase adds to ISLR, at one sigma.
 
     The quadratic phase of the result is the judged phase, with the `gain` of autofocus. `coverage` is the coverage
@@ -88,8 +88,8 @@ def held_effect(mission: Mission, effect: RandomEffect, coverage: Any, gain: Any
     return effect._replace(spread=np.sqrt(effect.spread**2 + CUBIC_POWER * cubic**2))
 
 
-def sizes_at(effect: RandomEffect, limits: Limits) -> list[Any]:
-    """Size at which an error reaches each requirement, in the order of `HELD`; infinite if never. [unit]"""
+def sizes_at(effect: RandomEffect, limits: Limits) -> list[PerCase]:
+    """Size at which an error reaches each of `RANDOM_REQUIREMENTS`, in their order; infinite if never. [unit]"""
     with np.errstate(all="ignore"):
         return [
             math.inf
@@ -106,7 +106,7 @@ class RandomRows:
         self.judging, self.analysis, self.mission = judging, analysis, analysis.mission
         self.allocation, self.errors = analysis.allocation, analysis.random
 
-    def _table(self, values: Sequence[Any]) -> Floats:
+    def _table(self, values: Sequence[PerCase | PerCaseFlag]) -> Floats:
         """Table (values, cases) of numbers, or of arrays (cases,)."""
         table = np.empty((len(values), self.judging.cases))
         for row, value in zip(table, values, strict=True):
@@ -130,7 +130,7 @@ class RandomRows:
         }
         columns = zip(*(by_owner[owner] for owner in owners), strict=True)
         limits = Limits(*(None if column[0] is None else self._table(column) for column in columns))
-        sizes = np.full((len(HELD), len(owners), self.judging.cases), math.inf)
+        sizes = np.full((len(RANDOM_REQUIREMENTS), len(owners), self.judging.cases), math.inf)
         coverage = self._table([error.coverage(self.mission) for error in self.errors])
         judged_effects = held_effect(self.mission, effects, coverage, gain)
         for row, size in zip(sizes, sizes_at(judged_effects, limits), strict=True):
@@ -149,7 +149,7 @@ class RandomRows:
         gain = allocation.autofocus_gain
         is_open = self._table([_is_open(self.mission, error) for error in self.errors]) > 0
         is_limited = np.isfinite(smallest) & ~is_open
-        binds = np.where(is_open, HELD.index(ISLR), np.where(is_limited, sizes.argmin(axis=0), -1))
+        binds = np.where(is_open, RANDOM_REQUIREMENTS.index(ISLR), np.where(is_limited, sizes.argmin(axis=0), -1))
         allowable = np.where(is_limited, smallest, math.nan)
         qpe, limit = (
             mine.judged(1.0) * declared,
@@ -174,7 +174,7 @@ class RandomRows:
             & ~is_open,
             is_unknown=is_open | is_in_doubt,
         )._replace(
-            binding=np.array([-1, *map(REQUIREMENTS.index, HELD)], np.int8)[binds + 1],
+            binding=np.array([-1, *map(REQUIREMENTS.index, RANDOM_REQUIREMENTS)], np.int8)[binds + 1],
             qpe_published_rad=published.quadratic * declared,
             cubic_rad=mine.cubic * declared,
             # If an aggregate limits the phase, a row that cannot be judged breaks no quadratic requirement.
@@ -201,7 +201,7 @@ class RandomRows:
             row = judged.at(error_index, error.subject)
             yield RandomRow(row.in_decibel() if error.unit == "dB" else row, error_index, *columns_of_error)
 
-    def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Truths:
+    def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Booleans:
         """Whether an error's use of a requirement depends on noise below the first point of its mask."""
         rests_on_mask = np.zeros(sizes.shape[1:], dtype=bool)
         for row, error in enumerate(self.errors):
@@ -308,12 +308,12 @@ class RandomRows:
 class RandomRow(FamilyRow):
     """The row of one error in many cases; `error_index` is its index among the errors.
 
-    `is_over_other`: the model that does not gate fails the error. `bound_by_other`: index in `HELD` of the
-    requirement that the error breaks by that model.
+    `is_over_other`: the model that does not gate fails the error. `bound_by_other`: index in `RANDOM_REQUIREMENTS` of
+    the requirement that the error breaks by that model.
     """
 
     place: int
-    is_over_other: Truths
+    is_over_other: Booleans
     bound_by_other: NDArray[np.intp]
     without_autofocus: Floats
 
@@ -325,7 +325,7 @@ class RandomRow(FamilyRow):
             over = _over(mission, error, gating, binding, allocation).then(error.extrapolated)
         if self.is_over_other[case.place]:
             limit = allocation.qpe_allowed(error.owner)
-            doubt = _doubt(mission, error, gating, HELD[self.bound_by_other[case.place]], limit)
+            doubt = _doubt(mission, error, gating, RANDOM_REQUIREMENTS[self.bound_by_other[case.place]], limit)
         elif error.continued is not None:
             doubt = _continuation(case, error, gating)
         equation, evidence, notes = _wording(mission, error)
@@ -431,7 +431,7 @@ class StatedRow(FamilyRow):
         )
 
 
-def _is_open(mission: Mission, error: RandomError) -> Any:
+def _is_open(mission: Mission, error: RandomError) -> PerCaseFlag:
     """Whether the file lacks a spectrum that makes part of an error, per case: ISLR cannot be judged without it."""
     is_shaken = error.subject.kind == "oscillator" and error.subject.axis == "acceleration"
     return is_shaken and lacks_a_spectrum(mission, error.owner)
@@ -502,7 +502,7 @@ def _acceleration_wording(mission: Mission, error: RandomError) -> tuple[str, st
 def _oscillator_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
     oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
     noise, sync = error.noise, mission.synchronization
-    notes = [*override_notes(error.owner, oscillator.overridden, *FORMS, "frequency")]
+    notes = [*override_notes(error.owner, oscillator.overridden, *OSCILLATOR_NOISE_FORMS, "frequency")]
     if oscillator.level:
         notes.append(phrases.note("noise-is-shifted", level_db=oscillator.level))
     is_heard = not mission.has_direct_path or error.owner == "receiver"
@@ -530,7 +530,7 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
     elif sync.age is not None and sync.averaging is not None:
         yield phrases.note("left-since-setting", age=sync.age, averaging=sync.averaging)
     else:
-        yield phrases.note("heard-twice", delay=mission.geometry.echo_delay)
+        yield phrases.note("heard-twice", delay=float(mission.geometry.echo_delay))
 
 
 def _air_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
@@ -606,7 +606,7 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
         )
     per_unit = {QUADRATIC: effect.quadratic, CUBIC: effect.cubic, LOCATION: effect.displacement}[binding]
     allowed = limit if binding == QUADRATIC else getattr(mission.requirements, binding)
-    return phrases.other_model_fails(other_model, per_unit * size, allowed, *EFFECTS[binding])
+    return phrases.other_model_fails(other_model, per_unit * size, allowed, *EFFECT_WORDS[binding])
 
 
 def _levels(mission: Mission, model: str) -> Callable[[float], float]:

@@ -23,8 +23,8 @@ from bisar_budget.budget.half_causes import half_cause_of, half_causes
 from bisar_budget.budget.judged_mission import JudgedMission
 from bisar_budget.budget.judged_requirements import (
     EXAMPLES,
+    REQUIREMENT_UNITS,
     TAKEN_BY,
-    UNITS,
     RequirementState,
 )
 from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why, statuses
@@ -172,7 +172,7 @@ def _entry(
     return JudgedRequirement(
         key=key,
         value=value,
-        unit=UNITS[key],
+        unit=REQUIREMENT_UNITS[key],
         is_default=path not in mission.places and not mission.is_changed(path),
         status=status,
         allowed=value,

@@ -9,17 +9,18 @@ rule of `UntakenEffect`.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
+from bisar_budget.arrays import Booleans, Floats, PerCase
 from bisar_budget.budget.aggregates import untaken_effects
 from bisar_budget.budget.judged_requirements import EXAMPLES, NEGLIGIBLE_FRACTION, TAKEN_BY, UntakenEffect
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, Judged
-from bisar_budget.budget.random_rows import HELD, ISLR, held_effect
+from bisar_budget.budget.random_rows import ISLR, RANDOM_REQUIREMENTS, held_effect
 from bisar_budget.effects.air_delays import changing_air
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
@@ -27,7 +28,6 @@ from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 LONG_APERTURE_S = 60.0  # aperture time from which on the air differs at both ends
 AIR_CHANGES_IN_S = 600.0  # correlation time of the zenith delay that remains after correction by a model or a map
@@ -44,7 +44,7 @@ class AirUse(NamedTuple):
     key: str  # of the requirement that limits the row
     size: Floats
     use: Floats
-    is_doubted: Truths
+    is_doubted: Booleans
     model: str
 
 
@@ -57,7 +57,7 @@ class StayingAir:
     """
 
     errors: Sequence[RandomError] = ()
-    is_long: Truths = field(default_factory=lambda: np.zeros(1, dtype=bool))
+    is_long: Booleans = field(default_factory=lambda: np.zeros(1, dtype=bool))
     uses: Mapping[str, AirUse] = field(default_factory=dict)
     untaken: Sequence[UntakenEffect] = ()
 
@@ -70,19 +70,19 @@ class StayingAir:
         """
         return frozenset(error.id for error in self.errors)
 
-    def doubted_rows(self) -> dict[str, Truths]:
+    def doubted_rows(self) -> dict[str, Booleans]:
         """Ids of the rows of sums that are not evaluated, with the cases (cases,)."""
         return {row_id: use.is_doubted for row_id, use in self.uses.items() if row_id not in self._delays}
 
-    def doubted_requirements(self) -> dict[str, Truths]:
+    def doubted_requirements(self) -> dict[str, Booleans]:
         """Requirements that are not evaluated, with the cases; a platform's share concerns its row alone."""
-        doubted: dict[str, Truths] = {}
+        doubted: dict[str, Booleans] = {}
         for use in self.uses.values():
             if use.row_id in self._delays or use.row_id == subject("mission", use.key).id:
                 doubted[use.key] = doubted.get(use.key, np.False_) | use.is_doubted
         return doubted
 
-    def untaken_rows(self) -> dict[str, Truths]:
+    def untaken_rows(self) -> dict[str, Booleans]:
         """Rows of delays that would make up an effect which no requirement covers, with the cases."""
         return {
             error.id: np.any([effect.makers.get(error.id, False) & self.is_long for effect in self.untaken], axis=0)
@@ -169,7 +169,7 @@ def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
     return StayingAir(errors, is_long, uses, untaken_effects(analysis, errors))
 
 
-def _rests_on(mission: Mission, use: AirUse, declared_use: Floats) -> Truths:
+def _rests_on(mission: Mission, use: AirUse, declared_use: Floats) -> Booleans:
     """Whether delays would use more than a tenth, or break a requirement together with the declared errors."""
     rule = "rss" if use.key == ISLR else mission.allocation.combine
     together = combined((use.use, declared_use), rule)
@@ -180,7 +180,7 @@ def _uses(analysis: Analysis, errors: Sequence[RandomError], model: str) -> Iter
     """Use of each row that a requirement limits, by changing delays, by one model."""
     mission, allocation = analysis.mission, analysis.allocation
     rule = mission.allocation.combine
-    for key in HELD:
+    for key in RANDOM_REQUIREMENTS:
         sizes = [(error, _size(analysis, error, model, key)) for error in errors]
         if key == QUADRATIC and rule == "each":
             for error, size in sizes:
@@ -202,12 +202,12 @@ def _uses(analysis: Analysis, errors: Sequence[RandomError], model: str) -> Iter
             yield _use(analysis, subject("mission", key).id, key, size, getattr(mission.requirements, key), model)
 
 
-def _use(analysis: Analysis, row_id: str, key: str, size: Any, limit: Any, model: str) -> AirUse:
+def _use(analysis: Analysis, row_id: str, key: str, size: PerCase, limit: PerCase, model: str) -> AirUse:
     sizes = np.broadcast_to(np.asarray(size, dtype=float), (analysis.cases,))
     return AirUse(row_id, key, sizes, sizes / limit, np.zeros(analysis.cases, dtype=bool), model)
 
 
-def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> Any:
+def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCase:
     """Size of a delay's effect, as the requirement limits it, with the gain of autofocus. [rad] or [m]
 
     For a displacement the size is the increase by the change of the delay, by root-sum-square: the image moves by the
@@ -222,10 +222,12 @@ def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> Any:
             model
         )
         added = np.square(effect.displacement) - np.square(stays.displacement)
-        return np.sqrt(np.maximum(added, 0.0)) * error.declared
-    return {QUADRATIC: judged_effect.quadratic, CUBIC: judged_effect.cubic, ISLR: judged_effect.spread}[
+        grown: PerCase = np.sqrt(np.maximum(added, 0.0)) * error.declared
+        return grown
+    size: PerCase = {QUADRATIC: judged_effect.quadratic, CUBIC: judged_effect.cubic, ISLR: judged_effect.spread}[
         key
     ] * np.asarray(error.declared)
+    return size
 
 
 def _keys(mission: Mission) -> list[str]:

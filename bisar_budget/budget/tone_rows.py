@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import Tone, islr_of
 from bisar_budget.analysis.vibration_limits import Echo, VibrationLimits, highest_echo, tone_limits
+from bisar_budget.arrays import Booleans, PerCase
 from bisar_budget.budget.continued_masks import MIN_USE_FRACTION
 from bisar_budget.budget.doubted_noise import doubted_noise_note, has_doubted_frequency
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, FamilyRow, Judging, worded
@@ -29,13 +29,12 @@ from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission, has_instruments
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Truths
 
 SENSITIVITY = "acceleration_sensitivity"
 
 
 # ---------------------------------------------------------------------- all tones together
-def pslr_row(judging: Judging, tones: Sequence[Tone], required: Any) -> "PslrRow":
+def pslr_row(judging: Judging, tones: Sequence[Tone], required: PerCase) -> "PslrRow":
     """Judge the highest echo that all tones make together, in the worst case of their phases.
 
     Both models use first principles: shares by the paper's rule are 3 dB stricter. Tones at most 2.5 cycles per
@@ -110,7 +109,7 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
         yield SpurRow(judged, spur_index, is_over_other, is_there=is_there)
 
 
-def _is_used(size: Any, limit: Any) -> Truths:
+def _is_used(size: PerCase, limit: PerCase) -> Booleans:
     """Whether a size uses enough of its limit for a doubt about the size to count, and does not break the limit."""
     return np.asarray((size > MIN_USE_FRACTION * limit) & ~(size > limit * LIMIT_RATIO))
 
@@ -123,7 +122,7 @@ class SpurRow(FamilyRow):
     """
 
     spur_index: int
-    is_over_other: Any
+    is_over_other: Booleans
 
     def in_words(self, case: Case, model: str) -> Row:
         """Row of a case in words, by the model that judges it."""
@@ -165,7 +164,7 @@ class SpurRow(FamilyRow):
             evidence=oscillator.source,
             remarks=(
                 phrases.note("tone-lies", frequency=spur.frequency, cells=spur.frequency * T),
-                *_folds(spur.left, spur.free, T, f"{spur.name}.oscillator"),
+                *_folds(spur.left, float(spur.free), T, f"{spur.name}.oscillator"),
                 *override_notes(spur.name, oscillator.overridden, "frequency"),
             ),
             binding_requirement=phase_requirement(case, row),
@@ -242,7 +241,7 @@ class AcceleratedRow(FamilyRow):
     """
 
     tone_index: int
-    is_over_other: Any
+    is_over_other: Booleans
 
     def in_words(self, case: Case, model: str) -> Row:
         """Row of a case in words, by the model that judges it."""
@@ -276,9 +275,9 @@ class AcceleratedRow(FamilyRow):
             info=missing,
             evidence=evidence(oscillator),
             remarks=(
-                phrases.note("tone-lies", frequency=tone.frequency, cells=tone.frequency * T),
-                phrases.note("shakes-an-oscillator", acceleration=float(tone.acceleration), phase=tone.phase),
-                *_folds(tone.left, tone.free * tone.sensitivity, T, f"{tone.name}.oscillator.acceleration"),
+                phrases.note("tone-lies", frequency=float(tone.frequency), cells=float(tone.frequency * T)),
+                phrases.note("shakes-an-oscillator", acceleration=float(tone.acceleration), phase=float(tone.phase)),
+                *_folds(tone.left, float(tone.free * tone.sensitivity), T, f"{tone.name}.oscillator.acceleration"),
                 *_whose(mission, tone.name),
                 *override_notes(tone.name, oscillator.overridden, SENSITIVITY),
             ),
@@ -287,10 +286,10 @@ class AcceleratedRow(FamilyRow):
         )
 
 
-def _phases_beside(folded: LeftTone, free: Any, aperture_time: Any) -> tuple[Any, Any]:
+def _phases_beside(folded: LeftTone, free: PerCase, aperture_time: PerCase) -> tuple[PerCase, PerCase]:
     """Quadratic and cubic phase of the echoes beside the mainlobe, in their worst phases. [rad]"""
-    qpe: Any = 0.0
-    cubic: Any = 0.0
+    qpe: PerCase = 0.0
+    cubic: PerCase = 0.0
     for frequency, share in zip(folded.frequencies, folded.echoes(aperture_time), strict=True):
         cycles = frequency * aperture_time
         phase = np.where(cycles < ECHO_CYCLES, free * share, 0.0)
@@ -298,7 +297,7 @@ def _phases_beside(folded: LeftTone, free: Any, aperture_time: Any) -> tuple[Any
     return qpe, cubic
 
 
-def _near_phases(judging: Judging, analysis: Analysis, name: str, phases: tuple[Any, Any]) -> NearPhases:
+def _near_phases(judging: Judging, analysis: Analysis, name: str, phases: tuple[PerCase, PerCase]) -> NearPhases:
     """Quadratic and cubic phase of a platform's tone, which limit its row. [rad]"""
     qpe, cubic = map(judging.array, phases)
     return NearPhases.of(analysis.mission, analysis.allocation, name, qpe + cubic > 0, (qpe, cubic, qpe, qpe))
@@ -334,5 +333,5 @@ def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
     if mission.synchronization is not None and mission.synchronization.interval is not None:
         notes.append(phrases.note("left-by-exchanges", interval=mission.synchronization.interval))
     if mission.has_direct_path:
-        notes.append(phrases.note("heard-twice", delay=mission.geometry.echo_delay))
+        notes.append(phrases.note("heard-twice", delay=float(mission.geometry.echo_delay)))
     return (*notes, *override_notes(name, oscillator.overridden, SENSITIVITY))

@@ -12,13 +12,14 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import islr_of
 from bisar_budget.analysis.vibration_limits import (
-    LARGEST_ECHO,
+    MAX_ECHO_PHASE_RAD,
     VibrationLimits,
     echo_level,
     slow_limits,
     tone_limits,
     vibration_limits,
 )
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, REQUIREMENTS, FamilyRow, Judged, Judging, worded
 from bisar_budget.budget.near_phases import NearPhases, phase_over, phase_requirement
 from bisar_budget.effects.declared import CUBIC, OTHER_MODEL, QUADRATIC
@@ -35,9 +36,9 @@ from bisar_budget.effects.vibration import (
     worst_phases,
 )
 from bisar_budget.findings.row import Row
+from bisar_budget.geometry import Vector
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.units import format_quantity
 
 _ROUNDING_DB = 1e-6  # by which a level may exceed the required level
@@ -69,7 +70,7 @@ class Vibrations:
             for name, lines_of_platform in lines.items()
         }
 
-    def _columns(self, numbers: Sequence[Any]) -> Floats:
+    def _columns(self, numbers: Sequence[PerCase]) -> Floats:
         return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
 
     def rows(self, model: str) -> Iterator["VibrationRow"]:
@@ -104,9 +105,9 @@ class Vibrations:
         metric: str,
         declared: Floats | None,
         limits: VibrationLimits | None,
-        is_there: Truths,
+        is_there: Booleans,
         *,
-        doubt: Any = False,
+        doubt: PerCaseFlag = False,
         phases: NearPhases | None = None,
         **others: Any,
     ) -> "VibrationRow":
@@ -140,7 +141,7 @@ class Vibrations:
         published, full = map(self.array, limits)
         return judged._replace(allowable_published=published, allowable_full=full)
 
-    def _line(self, model: str, name: str, index: int, is_there: Truths) -> "VibrationRow":
+    def _line(self, model: str, name: str, index: int, is_there: Booleans) -> "VibrationRow":
         """The row of a vibration of one or more cycles per aperture: its echoes, or their power if ISLR limits them.
 
         Below three cycles its quadratic and cubic phase are limited as well.
@@ -152,7 +153,7 @@ class Vibrations:
             does, gain = self.slow_tones[row_subject.id].declared, self.allocation.autofocus_gain
             phases_of_line = (does.quadratic, does.cubic, does.judged(1.0), does.judged(gain))
             phases = NearPhases.of(self.mission, self.allocation, name, is_near, phases_of_line)
-        level = 20 * np.log10(echo_level(np.minimum(both, LARGEST_ECHO)))
+        level = 20 * np.log10(echo_level(np.minimum(both, MAX_ECHO_PHASE_RAD)))
         required = self.mission.requirements.pslr
         is_over_both = np.zeros(is_there.shape, dtype=bool) if required is None else level > required + _ROUNDING_DB
         return self._row(
@@ -173,7 +174,7 @@ class Vibrations:
             is_over_both=is_over_both,
         )
 
-    def _slow(self, name: str, index: int, is_there: Truths) -> "VibrationRow":
+    def _slow(self, name: str, index: int, is_there: Booleans) -> "VibrationRow":
         """The row of a vibration below one cycle per aperture, judged by its quadratic and cubic phase.
 
         A vibration along three axes is declared as the amplitude along the line of sight with the same utilization.
@@ -222,7 +223,7 @@ class Vibrations:
             yield self._row(model, row_subject, "pslr", amplitude, self.tones.get(name), is_there, members=members)
 
     @cached_property
-    def _near(self) -> dict[str, list[tuple[Truths, Floats]]]:
+    def _near(self) -> dict[str, list[tuple[Booleans, Floats]]]:
         """Lines near each other on each platform, and the amplitude of one line with an equally high echo. [m]"""
         return {name: list(_together(self.amplitudes[name], self.cycles[name])) for name in PLATFORMS}
 
@@ -244,7 +245,7 @@ class Vibrations:
         return {PLATFORMS[0]: phases[:ours], PLATFORMS[1]: phases[ours:]}
 
 
-def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Truths, Floats]]:
+def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Booleans, Floats]]:
     """Lines near each other, and the amplitude of one line with an equally high echo, or 0 without lines. [m]"""
     groups = near_groups(cycles)
     for index in range(groups.max(initial=-1) + 1):
@@ -268,7 +269,7 @@ class VibrationRow(FamilyRow):
 
     limits: VibrationLimits | None = None
     is_slow: bool = False
-    members: Truths | None = None
+    members: Booleans | None = None
     cycles: Any = math.nan
     qpe: Any = math.nan
     cubic: Any = math.nan
@@ -276,8 +277,8 @@ class VibrationRow(FamilyRow):
     level: Any = math.nan
     is_over_other: Any = False
     is_over_both: Any = False
-    without_autofocus: Any = 0.0
-    per_metre: Any = 1.0
+    without_autofocus: PerCase = 0.0
+    per_metre: PerCase = 1.0
 
     def in_unit(self, per_metre: Floats) -> "VibrationRow":
         """The row in the unit that the file uses for the line."""
@@ -316,7 +317,7 @@ def _line_row(case: Case, vibration_row: VibrationRow, error: MotionError, model
             other_platform,
             NEAR_CYCLES,
             float(vibration_row.level[case_index]),
-            bool(vibration_row.both[case_index] > LARGEST_ECHO),
+            bool(vibration_row.both[case_index] > MAX_ECHO_PHASE_RAD),
             required,
         )
         more, doubt = [note], note if vibration_row.is_over_both[case_index] else NOTHING
@@ -385,7 +386,7 @@ def _row(
     )
 
 
-def _seen(case: Case, vibration_row: VibrationRow, error: MotionError, value: Any) -> tuple[Note, ...]:
+def _seen(case: Case, vibration_row: VibrationRow, error: MotionError, value: float | Vector) -> tuple[Note, ...]:
     metres = case.number(vibration_row.judged.declared) / case.number(vibration_row.per_metre)
     seen = projected(case.mission, value, error, metres, is_slow=vibration_row.is_slow)
     stated = (

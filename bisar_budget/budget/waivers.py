@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from bisar_budget import phrases
 from bisar_budget.budget.declarations import shifted_figures
-from bisar_budget.budget.judged_requirements import KEYS
+from bisar_budget.budget.judged_requirements import REQUIREMENT_KEYS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.requirement import JudgedRequirement, Outside, Override
@@ -68,7 +68,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
     """
     ids = [row.id for row in rows]
     broken = {position for position, row in enumerate(rows) if row.status in BROKEN}
-    requirements = [f"mission.{key}" for key in KEYS]
+    requirements = [f"mission.{key}" for key in REQUIREMENT_KEYS]
     missing = [n for n, row in enumerate(rows) if row.is_of_declare and row.status == "not_evaluated"]
     # A thousand waivers of one row would fill a report: a row has its first valid waiver and its last expired waiver.
     holding: dict[int, AppliedWaiver] = {}

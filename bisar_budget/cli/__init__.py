@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from bisar_budget import __version__, memory
-from bisar_budget.cli.streams import EXIT_INTERRUPTED, EXIT_OUR_FAULT, complain, drop_output, fail
+from bisar_budget.cli.streams import DEFECT_EXIT_CODE, INTERRUPTED_EXIT_CODE, complain, drop_output, fail
 from bisar_budget.faults import ClusterError, WorkerLostError, printable
 from bisar_budget.front.progress import SAYING
 from bisar_budget.resources import docstring, hold_files, release_files
@@ -50,7 +50,7 @@ class _Commands(click.Group):
             return None
         if cmd_name not in _FRUGAL:
             memory.spare_threads()
-            memory.hold_room(memory.LEAST, cmd_name)
+            memory.hold_room(memory.MIN_MEMORY_BYTES, cmd_name)
         module = import_module(f"bisar_budget.cli.{_MODULES[cmd_name]}")
         command: click.Command = getattr(module, "import_file" if cmd_name == "import" else cmd_name)
         command.help = command.help or docstring(command.callback)  # functions have no docstrings under -OO
@@ -77,7 +77,7 @@ class _Commands(click.Group):
         except (click.Abort, KeyboardInterrupt) as error:
             if isinstance(error.__cause__, EOFError):  # Click takes it for Ctrl-D, and nothing here asks a question
                 _own_fault(error.__cause__)
-            sys.exit(EXIT_INTERRUPTED)
+            sys.exit(INTERRUPTED_EXIT_CODE)
         except OSError as error:
             if error.errno in _NO_ROOM:
                 drop_output()
@@ -114,7 +114,7 @@ def _own_fault(error: BaseException) -> NoReturn:
         f"({type(error).__name__}: {printable(str(error))}).\n"
         "Please report it; BISAR_BUDGET_DEBUG=1 shows where it happened."
     )
-    sys.exit(EXIT_OUR_FAULT)
+    sys.exit(DEFECT_EXIT_CODE)
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -12,7 +12,7 @@ import click
 
 from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, ask_each, format_option
 from bisar_budget.cli.streams import (
-    EXIT_BROKEN,
+    BROKEN_EXIT_CODE,
     MISSION_SUFFIXES,
     complain,
     deliver_found,
@@ -102,7 +102,7 @@ def allocate(
         output = None
     deliver_found(specification_sheet, sheets, format_name, output)
     complies = all(sheet.complies and (of_offer is None or of_offer.complies) for sheet, of_offer in sheets)
-    sys.exit(0 if complies else EXIT_BROKEN)
+    sys.exit(0 if complies else BROKEN_EXIT_CODE)
 
 
 def _write_mission(sheet: "SpecificationSheet", output: str, model: str | None) -> None:

@@ -27,7 +27,7 @@ from bisar_budget.cli.options import (
 )
 from bisar_budget.cli.projects import Project, by_settings
 from bisar_budget.cli.streams import (
-    EXIT_BROKEN,
+    BROKEN_EXIT_CODE,
     complain,
     deliver,
     expand,
@@ -41,8 +41,9 @@ from bisar_budget.cli.streams import (
     wants_color,
     write_file,
 )
-from bisar_budget.constants import MAX_DRAWS, MAX_DRAWS_HERE
+from bisar_budget.constants import MAX_DRAWS, MAX_LOCAL_DRAWS
 from bisar_budget.faults import closed, fault_words, printable
+from bisar_budget.json_types import JsonObject
 from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
@@ -53,6 +54,8 @@ if TYPE_CHECKING:
     from bisar_budget.settings import Settings
 
 
+Arguments = dict[str, Any]
+"""Arguments of a function by name."""
 _PROJECTS = "bisar_budget.projects"  # in the context of a command
 _OF_RUN = ("format", "color")  # settings of a whole run, if all its projects agree
 
@@ -81,7 +84,7 @@ class _Gate(click.Command):
         context.meta[_PROJECTS] = projects
         return context
 
-    def _common_defaults(self, settings: "Sequence[Settings | None]") -> dict[str, Any]:
+    def _common_defaults(self, settings: "Sequence[Settings | None]") -> JsonObject:
         """Defaults of a run of several projects: options of the whole run on which all settings agree."""
         agreed = {}
         for key in _OF_RUN:
@@ -93,7 +96,7 @@ class _Gate(click.Command):
         options = {p.opts[0].removeprefix("--"): str(p.name) for p in self.params}
         return {options[key]: value for key, value in agreed.items() if value is not None}
 
-    def _context(self, defaults: dict[str, Any], *arguments: Any, **extra: Any) -> click.Context:
+    def _context(self, defaults: JsonObject, *arguments: Any, **extra: Any) -> click.Context:
         try:
             return super().make_context(*arguments, default_map=defaults, **extra)
         except click.BadParameter as error:
@@ -105,7 +108,7 @@ class _Gate(click.Command):
                     )  # the variable, and not the option, which the user did not write
             raise
 
-    def _defaults(self, settings: "Settings | None") -> dict[str, Any]:
+    def _defaults(self, settings: "Settings | None") -> JsonObject:
         from bisar_budget.settings import TABLE
 
         options = {p.opts[0].removeprefix("--"): p for p in self.params if isinstance(p, click.Option) and p.envvar}
@@ -159,7 +162,7 @@ class _Draws(ParamType[int]):
 
     name = "number"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> int:
         from decimal import Decimal, InvalidOperation
 
         try:
@@ -167,7 +170,7 @@ class _Draws(ParamType[int]):
         except InvalidOperation:
             number = Decimal(0)
         if not (number.is_finite() and 1 <= number <= MAX_DRAWS and number == int(number)):
-            most = f"{MAX_DRAWS_HERE:,}, or {MAX_DRAWS:,} with --scheduler"
+            most = f"{MAX_LOCAL_DRAWS:,}, or {MAX_DRAWS:,} with --scheduler"
             accepted = f"must be a whole number of draws from 1 to {most}, such as 100000 or 1e6"
             self.fail(f"{printable(str(value))}: {accepted}.", param, ctx)
         return int(number)
@@ -358,7 +361,7 @@ def check(
         from bisar_budget.front.checks import checked, drawn_by
         from bisar_budget.mission.quantities import QuestionError
 
-        settings: dict[str, Any] = {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
+        settings: Arguments = {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
         found: dict[str, MissionFindings | UnusableMission] = {}
         for project in projects:
             judged_on, arguments = _asked(project, len(projects) > 1, today, changes)
@@ -401,7 +404,7 @@ def _code_of(project: Project, statuses: "Sequence[frozenset[str]]") -> int:
 
     strict, exit_zero = (project.context.params[name] for name in ("strict", "exit_zero"))
     code = exit_code(frozenset[str]().union(*statuses), strict)
-    return 0 if exit_zero and code == EXIT_BROKEN else code
+    return 0 if exit_zero and code == BROKEN_EXIT_CODE else code
 
 
 def _reports_of(projects: Sequence[Project]) -> list[tuple[Project, str, str]]:
@@ -416,7 +419,7 @@ def _reports_of(projects: Sequence[Project]) -> list[tuple[Project, str, str]]:
 
 def _asked(
     project: Project, is_among_others: bool, today: datetime | None, changes: "Sequence[SetValue]"
-) -> tuple[date, dict[str, Any]]:
+) -> tuple[date, Arguments]:
     """Day of waivers and arguments of the check for a project; one of several projects also names its settings."""
     from bisar_budget.findings.requirement import Override
 
@@ -471,9 +474,9 @@ def _check_draws(context: click.Context, scheduler: str | None) -> None:
             raise click.UsageError("--seed needs --monte-carlo N.")
         if scheduler is not None:
             raise click.UsageError(f"--scheduler {scheduler}: shares out draws, and needs --monte-carlo N.")
-    elif scheduler is None and draws > MAX_DRAWS_HERE:
+    elif scheduler is None and draws > MAX_LOCAL_DRAWS:
         raise click.UsageError(
-            f"--monte-carlo {draws:,}: must be at most {MAX_DRAWS_HERE:,} draws; with --scheduler ADDRESS, whose "
+            f"--monte-carlo {draws:,}: must be at most {MAX_LOCAL_DRAWS:,} draws; with --scheduler ADDRESS, whose "
             f"workers share them, {MAX_DRAWS:,}."
         )
 

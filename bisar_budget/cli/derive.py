@@ -5,7 +5,7 @@ import sys
 import click
 
 from bisar_budget.cli.options import format_option
-from bisar_budget.cli.streams import EXIT_BROKEN, complain, deliver, write_file
+from bisar_budget.cli.streams import BROKEN_EXIT_CODE, complain, deliver, write_file
 
 
 @click.command()
@@ -68,4 +68,4 @@ def _generated(write: bool) -> None:
         differs = f"{name} differs from the derivation {derived_with}"
         complain(f"{differs}; `bisar-budget derive --write` rewrites it.")
     if not is_current:
-        sys.exit(EXIT_BROKEN)
+        sys.exit(BROKEN_EXIT_CODE)

@@ -2,10 +2,10 @@
 
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -21,7 +21,7 @@ from bisar_budget.cli.options import (
     settings_here,
 )
 from bisar_budget.cli.projects import folder_of_file
-from bisar_budget.cli.streams import EXIT_BROKEN, deliver, expand, fail, read_all, spare
+from bisar_budget.cli.streams import BROKEN_EXIT_CODE, deliver, expand, fail, read_all, spare
 from bisar_budget.faults import printable
 from bisar_budget.resources import DISK, Files
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
     from bisar_budget.mission.model import Mission
     from bisar_budget.report.change.comparison import ChangeSet, Loosened, MissionChange
+    from bisar_budget.settings import SettingValues
 
 _Read = Callable[[], "Mission"]
 
@@ -38,7 +39,7 @@ class _Part(ParamType[float]):
 
     name = "percent"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
         from bisar_budget.faults import InvalidValueError
         from bisar_budget.units import RATIO, parse_quantity
 
@@ -124,7 +125,7 @@ def diff(
         write = difference.as_text if format_name == "text" else difference.as_markdown
         text = write(comparison, gate, all_rows)
     deliver(text, output, format_name)
-    sys.exit(EXIT_BROKEN if gate is not None and comparison.is_refused(gate) else 0)
+    sys.exit(BROKEN_EXIT_CODE if gate is not None and comparison.is_refused(gate) else 0)
 
 
 def _with_files(
@@ -204,7 +205,7 @@ def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime |
     return tuple(compare(*pair) for pair in zip(findings[::2], findings[1::2], strict=True))
 
 
-def _settings(mission: str, files: Files = DISK) -> Mapping[str, Any]:
+def _settings(mission: str, files: Files = DISK) -> "SettingValues":
     """Settings nearest to a mission, as for `check`, on disk or in a revision."""
     from bisar_budget.settings import TABLE
 

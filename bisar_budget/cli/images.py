@@ -18,8 +18,8 @@ from bisar_budget.cli.options import (
     wrong_usage,
 )
 from bisar_budget.cli.streams import (
-    EXIT_BROKEN,
-    EXIT_USAGE,
+    BROKEN_EXIT_CODE,
+    USAGE_EXIT_CODE,
     complain,
     deliver,
     deliver_found,
@@ -82,8 +82,8 @@ def verify(
     for mission in doubts:
         complain(f"{printable(mission.file)}: {mission.doubt}")
     if doubts:
-        sys.exit(EXIT_USAGE)
-    sys.exit(EXIT_BROKEN if any(mission.status == "fail" for mission in verified) else 0)
+        sys.exit(USAGE_EXIT_CODE)
+    sys.exit(BROKEN_EXIT_CODE if any(mission.status == "fail" for mission in verified) else 0)
 
 
 @click.command()

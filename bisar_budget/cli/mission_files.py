@@ -71,7 +71,7 @@ def import_file(file: str, output: str | None, channel: str | None, force: bool)
     has the scene point, the band, the aperture by the dwell on that point, both platforms' paths, and the errors that
     the file declares. Data without a key in the mission are written as comments. Needs the extra `formats`.
     """
-    from bisar_budget.constants import SPEED_OF_LIGHT
+    from bisar_budget.constants import SPEED_OF_LIGHT_MPS
     from bisar_budget.faults import MissionError
     from bisar_budget.formats.collected import mission_text
     from bisar_budget.formats.containers import FormatError, MissingExtraError
@@ -98,7 +98,10 @@ def import_file(file: str, output: str | None, channel: str | None, force: bool)
         if track.farthest > track.state.slant_range / 100:
             fail(f"{file}: a {name} position is {away[name]} from its path, more than a hundredth of its range")
     farthest = max(track.farthest for track in tracks.values())
-    if collection.unused or farthest > SPEED_OF_LIGHT / collection.center_frequency / _WAVELENGTH_PER_VISIBLE_OFFSET:
+    if (
+        collection.unused
+        or farthest > SPEED_OF_LIGHT_MPS / collection.center_frequency / _WAVELENGTH_PER_VISIBLE_OFFSET
+    ):
         doubts = [collection.unused] if collection.unused else []
         doubts += [f"positions of the {name} are up to {length} from its path" for name, length in away.items()]
         complain(f"warning: {'; '.join(doubts)}; the comments say more")

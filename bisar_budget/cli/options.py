@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import date, datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from click.core import ParameterSource
@@ -31,8 +31,10 @@ else:
             return cls
 
 
+Answer = TypeVar("Answer")
 COMMAND_LINE = "command line"
-_Option = Callable[[Callable[..., Any]], Callable[..., Any]]  # a decorator of a command
+_Function = Callable[..., object]
+_Option = Callable[[_Function], _Function]  # a decorator of a command
 _BEARING = ("model", "strict", "exit_zero")  # options with influence on the verdict, besides the day and --set
 
 
@@ -202,8 +204,8 @@ def wrong_usage() -> Iterator[None]:
 
 
 def ask_each(
-    missions: "Sequence[Mission]", model: str | None, today: datetime | None, ask: Callable[..., Any]
-) -> Iterator[Any]:
+    missions: "Sequence[Mission]", model: str | None, today: datetime | None, ask: Callable[..., Answer]
+) -> Iterator[Answer]:
     """Answers of each mission in turn; exits if a mission cannot answer the question."""
     from bisar_budget.mission.quantities import QuestionError
 

@@ -23,10 +23,10 @@ from bisar_budget.cli.options import (
     wrong_usage,
 )
 from bisar_budget.cli.streams import (
-    EXIT_BROKEN,
-    EXIT_USAGE,
+    BROKEN_EXIT_CODE,
     MISSION_SUFFIXES,
     PICTURE_SUFFIXES,
+    USAGE_EXIT_CODE,
     complain,
     deliver,
     deliver_found,
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
     from bisar_budget.front.results import PassesResult
 
-_FORMATS = {".txt": "text", ".json": "json", ".csv": "csv", ".ics": "ics"}  # by the suffix of -o
+_FORMAT_BY_SUFFIX = {".txt": "text", ".json": "json", ".csv": "csv", ".ics": "ics"}  # by the suffix of -o
 
 
 @click.command()
@@ -88,7 +88,7 @@ _FORMATS = {".txt": "text", ".json": "json", ".csv": "csv", ".ics": "ics"}  # by
 @SET
 @DATE
 @format_option(
-    _FORMATS.values(),
+    _FORMAT_BY_SUFFIX.values(),
     "Format of the list; ics is a calendar (default: that of -o's suffix, else text).",
     default=None,
     show_default=False,
@@ -126,7 +126,7 @@ def passes(
     is_folder = output is not None and (output.endswith(("/", os.sep)) or os.path.isdir(output))
     if format_name is None:
         is_file = output not in (None, "-") and not is_folder
-        format_name = _FORMATS[suffix_of(output, tuple(_FORMATS))] if is_file else "text"
+        format_name = _FORMAT_BY_SUFFIX[suffix_of(output, tuple(_FORMAT_BY_SUFFIX))] if is_file else "text"
     spare([mission], [None if is_folder else output, plot])
     from bisar_budget.faults import MissionError
     from bisar_budget.front import questions
@@ -155,7 +155,7 @@ def passes(
         fail(f"{mission}: {error}")
     except MissionError as error:
         say_faults(error.file, error.faults)
-        sys.exit(EXIT_USAGE)
+        sys.exit(USAGE_EXIT_CODE)
     if is_folder and output is not None:
         _write_missions(result, output, judged_on)
         output = None
@@ -165,7 +165,7 @@ def passes(
         deliver(pass_list.as_ics(result.found, judged_on), output, format_name)
     else:
         deliver_found(pass_list, result.found, format_name, output)
-    sys.exit(0 if result.accepted else EXIT_BROKEN)
+    sys.exit(0 if result.accepted else BROKEN_EXIT_CODE)
 
 
 # ---------------------------------------------------------------- a mission file for each pass

@@ -4,29 +4,30 @@ import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from bisar_budget.cli.options import FILE, TEXT_OR_JSON
-from bisar_budget.cli.streams import EXIT_USAGE, complain, deliver, expand, say_faults, spare
+from bisar_budget.cli.streams import USAGE_EXIT_CODE, complain, deliver, expand, say_faults, spare
 from bisar_budget.faults import file_fault, printable, sentences
+from bisar_budget.json_types import JsonObject
 
 if TYPE_CHECKING:
     from bisar_budget.mission.parts import Entry, PartError
 
-_TITLES = {
+_KIND_TITLES = {
     "imu": "Inertial sensors (motion_error.sensor), 1 sigma, each axis",
     "gnss": "GNSS receivers, each in one mode (motion_error.sensor), 1 sigma east, north, up",
     "oscillator": "Oscillators (oscillator.sensor)",
 }
-_KINDS = {"imu": "inertial sensor", "gnss": "GNSS receiver", "oscillator": "oscillator"}
+_PART_KIND_WORDS = {"imu": "inertial sensor", "gnss": "GNSS receiver", "oscillator": "oscillator"}
 _IN_A_FOLDER = "accepted: a folder with files that end in .yaml or .yml"
 
 
 @click.command()
 @click.argument("patterns", nargs=-1, type=FILE, metavar="[PATTERN|FILE]...")
-@click.option("--kind", type=click.Choice(list(_TITLES)), help="Only parts of this kind.")
+@click.option("--kind", type=click.Choice(list(_KIND_TITLES)), help="Only parts of this kind.")
 @click.option("--check", "checking", is_flag=True, help="Check files of parts of your own, instead of a list.")
 @TEXT_OR_JSON
 def sensors(patterns: Sequence[str], kind: str | None, checking: bool, format_name: str) -> None:
@@ -65,7 +66,7 @@ def _listed(patterns: Sequence[str], kind: str | None) -> "list[Entry]":
     except PartError as error:
         for reason in error.args:
             complain(f"error: {printable(reason)}")
-        sys.exit(EXIT_USAGE)
+        sys.exit(USAGE_EXIT_CODE)
     matching = {
         pattern: [each for each in catalogued if fnmatchcase(each.id, pattern) and kind in (None, each.part.kind)]
         for pattern in patterns
@@ -80,7 +81,7 @@ def _listed(patterns: Sequence[str], kind: str | None) -> "list[Entry]":
             listed = "`bisar-budget sensors` lists them"
             complain(f"error: {sentences(f'no part of the catalogue matches {printable(pattern)}; {listed}', hint)}")
     if not all(matching.values()):
-        sys.exit(EXIT_USAGE)
+        sys.exit(USAGE_EXIT_CODE)
     return [each for each in catalogued if any(each in matches for matches in matching.values())]
 
 
@@ -113,11 +114,11 @@ def _check(names: Sequence[str], format_name: str) -> None:
         else:
             count = len(result.figures)
             figures = f"{count} figures, each with a source" if count > 1 else "1 figure, with a source"
-            description = f"{printable(result.part.name)}, {_KINDS[result.part.kind]}, {figures}"
+            description = f"{printable(result.part.name)}, {_PART_KIND_WORDS[result.part.kind]}, {figures}"
             lines.append(f"{printable(file)}: fine: {description}\n")
     deliver(_checked_as_json(checked) if format_name == "json" else "".join(lines), None, format_name)
     if len(lines) < len(checked):
-        sys.exit(EXIT_USAGE)
+        sys.exit(USAGE_EXIT_CODE)
 
 
 def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
@@ -125,7 +126,7 @@ def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
     from bisar_budget.mission.parts import PartError
     from bisar_budget.report.formats.json_document import fault_item
 
-    parts = []
+    parts: list[JsonObject] = []
     for file, result in checked.items():
         if isinstance(result, PartError):
             faults = [fault_item(fault) for fault in result.faults]
@@ -136,7 +137,7 @@ def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
     return _document({"format": "bisar-budget/sensors-check/1", "status": status, "parts": parts})
 
 
-def _document(content: dict[str, Any]) -> str:
+def _document(content: JsonObject) -> str:
     """Text of a JSON document."""
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
@@ -147,7 +148,7 @@ def _as_text(chosen: "list[Entry]") -> str:
     from bisar_budget.report.words.sentences import wrapped
 
     lines: list[str] = []
-    for kind, title in _TITLES.items():
+    for kind, title in _KIND_TITLES.items():
         of_kind = [each for each in chosen if each.part.kind == kind]
         if of_kind:
             lines += [title, ""]
@@ -165,7 +166,7 @@ def _as_text(chosen: "list[Entry]") -> str:
     return "\n".join(lines)
 
 
-def _item(entry: "Entry") -> dict[str, Any]:
+def _item(entry: "Entry") -> JsonObject:
     """JSON item of a part."""
     from bisar_budget.mission.parts import evidence
 

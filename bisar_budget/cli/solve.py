@@ -20,7 +20,7 @@ from bisar_budget.cli.options import (
     wrong_usage,
 )
 from bisar_budget.cli.streams import (
-    EXIT_BROKEN,
+    BROKEN_EXIT_CODE,
     PICTURE_SUFFIXES,
     deliver_found,
     expand,
@@ -102,7 +102,7 @@ def solve(
     solutions = [answer.found for answer in ask_each(load_all(files, model, changes), model, today, ask)]
     deliver_found(answers, solutions, format_name, output)
     is_broken = any(each.status == "none" or (each.imaged and each.imaged.is_optimistic) for each in solutions)
-    sys.exit(EXIT_BROKEN if is_broken else 0)
+    sys.exit(BROKEN_EXIT_CODE if is_broken else 0)
 
 
 @click.command()

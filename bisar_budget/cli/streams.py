@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 MISSION_SUFFIXES = (".yaml", ".yml")
 PICTURE_SUFFIXES = (".svg", ".png", ".pdf")
 _TEMPORARY = (".bisar-budget.", ".tmp")  # first and last letters of the name of a temporary folder
-EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
+BROKEN_EXIT_CODE, USAGE_EXIT_CODE, DEFECT_EXIT_CODE, INTERRUPTED_EXIT_CODE = 1, 2, 3, 130
 
 
 def expand(patterns: Iterable[str]) -> list[str]:
@@ -63,7 +63,7 @@ def read_all(reads: "Iterable[Callable[[], Mission]]") -> "list[Mission]":
             is_usable = False
             say_faults(error.file, error.faults)
     if not is_usable:
-        sys.exit(EXIT_USAGE)
+        sys.exit(USAGE_EXIT_CODE)
     return found
 
 
@@ -102,9 +102,9 @@ def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable
                 fail(f"{name} is in the folder of a report's pictures, {folder}")
     for file in files:
         for real_path, target in written.items():
-            if _is_same(0 if file == "-" else file, real_path):
+            if _is_open_as(0 if file == "-" else file, real_path):
                 fail(f"{target} is to be read; a result would replace it")
-        if file != "-" and _is_same(1, file):
+        if file != "-" and _is_open_as(1, file):
             fail(f"{file} is to be read; standard output goes to it")
 
 
@@ -116,7 +116,7 @@ def _real_path(path: str) -> str:
         fail(f"cannot write {path}: {getattr(error, 'strerror', None) or error}")
 
 
-def _is_same(file: str | int, path: str) -> bool:
+def _is_open_as(file: str | int, path: str) -> bool:
     """Whether a path, or an open stream, and another path are one regular file."""
     try:
         return os.path.isfile(file) and os.path.samestat(os.stat(file), os.stat(path))
@@ -230,7 +230,7 @@ def complain(message: str) -> None:
 def fail(message: str) -> NoReturn:
     """Write an error about the usage of the command, and exit with 2."""
     complain(f"Error: {printable(message)}")
-    sys.exit(EXIT_USAGE)
+    sys.exit(USAGE_EXIT_CODE)
 
 
 def deliver(text: str, output: str | None = None, format_name: str = "text") -> None:
@@ -241,7 +241,7 @@ def deliver(text: str, output: str | None = None, format_name: str = "text") -> 
         write_file(output, harmless(text, format_name).replace("\n", _LINE_ENDS.get(format_name, "\n")))
 
 
-def deliver_found(form: "ModuleType", results: Any, format_name: str, output: str | None) -> None:
+def deliver_found(form: "ModuleType", results: object, format_name: str, output: str | None) -> None:
     """Write results in a format; `form` is the module with a function for each format."""
     from bisar_budget.report import Style
 

@@ -19,7 +19,7 @@ from bisar_budget.cli.options import (
     scheduler_options,
 )
 from bisar_budget.cli.streams import (
-    EXIT_BROKEN,
+    BROKEN_EXIT_CODE,
     PICTURE_SUFFIXES,
     complain,
     deliver_parts,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
     from bisar_budget.front.sweeps import SweepResult
 
-MAX_CASES = 100_000_000  # that are started without being asked twice: tens of gigabytes
+MAX_UNFORCED_CASES = 100_000_000  # started without --force: tens of gigabytes
 
 
 @click.command()
@@ -83,7 +83,7 @@ MAX_CASES = 100_000_000  # that are started without being asked twice: tens of g
     is_flag=True,
     help="Go on from the parts in FILE.parts that an earlier run left; without any, keep parts to go on from.",
 )
-@click.option("--force", is_flag=True, help=f"Start also with more than {MAX_CASES} cases.")
+@click.option("--force", is_flag=True, help=f"Start also with more than {MAX_UNFORCED_CASES} cases.")
 def sweep(
     mission: str,
     varied: Sequence[str],
@@ -149,7 +149,7 @@ def sweep(
             run.workers, run.beside, run.is_resumed = workers, output if is_kept else None, is_resumed
             _foresee(run, force)
             _write(run, output, plot, plot_column, is_polar)
-        sys.exit(EXIT_BROKEN if run.is_unjudged else 0)
+        sys.exit(BROKEN_EXIT_CODE if run.is_unjudged else 0)
     except TableError as error:
         for line in error.lines:
             complain(line)
@@ -159,14 +159,14 @@ def sweep(
 
 
 def _foresee(run: "SweepResult", force: bool) -> None:
-    """Announce a long time, and refuse more than `MAX_CASES` cases without --force."""
+    """Announce a long time, and refuse more than `MAX_UNFORCED_CASES` cases without --force."""
     from bisar_budget.front.progress import foretell, lasting
 
     count, seconds = run.cases.count, run.foreseen()
-    if count > MAX_CASES and not force:
+    if count > MAX_UNFORCED_CASES and not force:
         fail(
             f"{run.mission.file}: {count} cases will take about {lasting(seconds)}; "
-            f"accepted: up to {MAX_CASES}, or more with --force"
+            f"accepted: up to {MAX_UNFORCED_CASES}, or more with --force"
         )
     foretell(seconds, f"{count} cases")
 

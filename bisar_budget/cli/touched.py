@@ -16,7 +16,7 @@ _SUFFIXES = (".yaml", ".yml")
 _FOLDER = "missions"  # every YAML file below such a folder is a mission, except parts
 _IS_MISSION = re.compile(rb"(?m)^[\"']?(?:schema_version|platforms|radar|collection)[\"']?\s*:")
 _IS_PART = re.compile(rb"(?m)^[\"']?kind[\"']?\s*:")
-_SETTINGS = "pyproject.toml"
+_SETTINGS_FILE = "pyproject.toml"
 
 
 class _ReadFiles:
@@ -43,7 +43,7 @@ def touched_missions(changed: Sequence[str]) -> list[str]:
     because a deleted file is in no list of changes.
     """
     paths = {os.path.realpath(file) for file in changed}
-    tops = [os.path.join(os.path.dirname(path), "") for path in paths if os.path.basename(path) == _SETTINGS]
+    tops = [os.path.join(os.path.dirname(path), "") for path in paths if os.path.basename(path) == _SETTINGS_FILE]
     files = dict.fromkeys(file for file in changed if _is_mission(file))
     for file in _missions_below(os.curdir):
         real = os.path.realpath(file)

@@ -20,13 +20,17 @@ from itertools import islice
 from multiprocessing import resource_tracker
 from queue import Empty, SimpleQueue
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from bisar_budget import __version__
 from bisar_budget.cluster.parts_folder import check_libraries
 from bisar_budget.faults import ClusterError, MissionError, printable
-from bisar_budget.memory import OF_CLUSTER
+from bisar_budget.memory import CLUSTER_MEMORY_BYTES
+from bisar_budget.workers import Block, Common, Result
+
+if TYPE_CHECKING:
+    from distributed import Client, Future, LocalCluster
 
 _ADDRESS = re.compile(r"(?:tcp|tls)://\S+:\d{1,5}", re.ASCII)
 _LOCAL = re.compile(r"local:([1-9]\d{0,2})", re.ASCII)
@@ -49,7 +53,7 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
     local = _LOCAL.fullmatch(address)
     if not (local or _ADDRESS.fullmatch(address)):
         raise ClusterError(f"--scheduler {printable(address)}: is no scheduler; {_ACCEPTED_ADDRESSES}")
-    check_libraries("--scheduler", OF_CLUSTER, "cluster", "distributed", "pyarrow")
+    check_libraries("--scheduler", CLUSTER_MEMORY_BYTES, "cluster", "distributed", "pyarrow")
     from distributed import Client
 
     with ExitStack() as ends:
@@ -76,14 +80,14 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
         yield workers
 
 
-def _local_cluster(count: int, ends: ExitStack) -> Any:
+def _local_cluster(count: int, ends: ExitStack) -> "LocalCluster":
     """Start a scheduler and workers on this machine; `ends` closes them.
 
     A thread starts them, because Ctrl-C does not interrupt a thread: an incomplete cluster could not be closed.
     """
     from distributed import LocalCluster
 
-    def started() -> Any:
+    def started() -> LocalCluster:
         cluster = LocalCluster(
             n_workers=count,
             threads_per_worker=1,
@@ -110,7 +114,7 @@ def dask_setup(worker: object) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _close(opened: Any, seconds: float) -> None:
+def _close(opened: "Client | LocalCluster", seconds: float) -> None:
     with suppress(Exception):  # anything still open ends with this process
         opened.close(timeout=seconds)
 
@@ -123,7 +127,7 @@ def _greet(address: str) -> None:
     url = urlsplit(address)
     socket.create_connection((url.hostname or "", url.port or 0), timeout=_CONNECTION_TIMEOUT_S).close()
 
-    async def identity() -> Any:
+    async def identity() -> dict[str, str]:
         secured = Security().get_connection_args("client")
         async with rpc(address, timeout=_CONNECTION_TIMEOUT_S, connection_args=secured) as scheduler:
             return await asyncio.wait_for(scheduler.identity(), _CONNECTION_TIMEOUT_S)
@@ -140,7 +144,7 @@ def _greet(address: str) -> None:
 class Workers:
     """Workers of a scheduler; `threads` is the number of their threads at the last count."""
 
-    client: Any
+    client: "Client"
     address: str
     patience: float
     tell: Callable[[str], None]
@@ -165,18 +169,22 @@ class Workers:
         self.threads = sum(self.client.nthreads().values())
 
     def mapped(
-        self, function: Callable[[Any, Any], Any], common: Any, blocks: Iterable[Any], about: Callable[[Any], str]
-    ) -> Iterator[tuple[Any, Any]]:
+        self,
+        function: Callable[[Common, Block], Result],
+        common: Common,
+        blocks: Iterable[Block],
+        about: Callable[[Block], str],
+    ) -> Iterator[tuple[Block, Result]]:
         """Call `function(common, block)` on workers; yields each block and its result, in any order.
 
         `about` names a block in messages. Only a few blocks are submitted ahead. Raises `ClusterError` if the
         scheduler or all workers went away, if a block ended every worker that had it, or if a worker cannot do a
         block. Raises `RuntimeError` if the function raised an error.
         """
-        finished: SimpleQueue[Any] = SimpleQueue()
+        finished: SimpleQueue[Future[Result]] = SimpleQueue()
         # A task makes the common data, not the client: Dask makes them again if a worker with them is lost.
         shared = self.client.submit(pickle.loads, pickle.dumps(common), pure=False)
-        pending: dict[str, tuple[Any, Any]] = {}
+        pending: dict[object, tuple[Future[Result], Block]] = {}
         remaining, next_look = iter(blocks), 0.0
         try:
             while True:
@@ -210,7 +218,7 @@ class Workers:
         return ClusterError(f"--scheduler {self.address}: went away")
 
 
-def _called(version: str, function: Callable[[Any, Any], Any], common: Any, block: Any) -> Any:
+def _called(version: str, function: Callable[[Common, Block], Result], common: Common, block: Block) -> Result:
     """Do a block on a worker. A worker that came after the check of versions may have another version."""
     from distributed import get_worker
 

@@ -16,6 +16,7 @@ from itertools import compress
 
 import numpy as np
 
+from bisar_budget.arrays import Booleans, Floats
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS
 from bisar_budget.design.geometric_program import Rows, largest_sizes
@@ -23,12 +24,11 @@ from bisar_budget.design.row_uses import Near, SpecifiedMission
 from bisar_budget.design.specified import Specified, catalogue, ordered_noise, specified_errors, suitable_parts
 from bisar_budget.design.table import Variation
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION
-from bisar_budget.findings.specification import LEAST_ROOM, Broken, RowUse, Specification, SpecificationSheet
+from bisar_budget.findings.specification import MIN_ROOM_FRACTION, Broken, RowUse, Specification, SpecificationSheet
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import Entry
 from bisar_budget.mission.quantities import QuestionError, tree_of
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.workers import Progress, unseen
 
 
@@ -69,7 +69,7 @@ class AllocationSettings:
     close_fraction: float = 1e-9
 
 
-SETTINGS = AllocationSettings()
+ALLOCATION_SETTINGS = AllocationSettings()
 
 
 # ---------------------------------------------------------------- the search
@@ -139,7 +139,7 @@ def _broken(specified_mission: SpecifiedMission) -> tuple[Broken, ...]:
             specified_mission.allowed(row_uses.ids),
             strict=True,
         )
-        if use >= most * (1 - LEAST_ROOM)
+        if use >= most * (1 - MIN_ROOM_FRACTION)
     )
 
 
@@ -157,8 +157,8 @@ class _SizeSearch:
         sizes = self._first_sizes()
         inside, is_extended = np.minimum(self.mission.tiny, sizes), False
         before = Rows(np.zeros((0, sizes.size)), np.zeros(0), np.zeros(0))
-        for done in range(SETTINGS.max_rounds):
-            progress(done, SETTINGS.max_rounds)
+        for done in range(ALLOCATION_SETTINGS.max_rounds):
+            progress(done, ALLOCATION_SETTINGS.max_rounds)
             near = self.mission.near(sizes)
             if near is None:  # too far: halfway back, and never again to sizes without an image
                 self._find_ends(inside, sizes)
@@ -171,33 +171,33 @@ class _SizeSearch:
                 ).log
                 inside, sizes = sizes, sizes.copy()
                 sizes[is_limited] = np.exp(log)
-                if done >= SETTINGS.full_step_rounds:
+                if done >= ALLOCATION_SETTINGS.full_step_rounds:
                     sizes = np.sqrt(sizes * inside)
                 # A sum over all signs is the largest over all directions, so earlier directions still limit it.
                 if self.mission.combine == "sum":
                     before = before.with_rows(near.rows(f"mission.{LOCATION}"))
             self.mission.most = np.where(sizes > self.mission.largest, self.mission.largest, self.mission.most)
-            if not is_limited.any() or np.abs(np.log(sizes / inside)).max() < SETTINGS.settled_change:
+            if not is_limited.any() or np.abs(np.log(sizes / inside)).max() < ALLOCATION_SETTINGS.settled_change:
                 if is_extended or is_limited.all():
                     break
                 sizes, is_extended = self._free_sizes(sizes, ~is_limited), True
         return self._kept(sizes, before)
 
-    def _free_sizes(self, sizes: Floats, is_free: Truths) -> Floats:
+    def _free_sizes(self, sizes: Floats, is_free: Booleans) -> Floats:
         """For errors without an apparent limit, the size just before they begin to use budget; others unchanged."""
         extended = sizes.copy()
         for index in np.flatnonzero(is_free).tolist():
             steps = np.geomspace(
                 sizes[index],
-                min(self.mission.largest[index], sizes[index] * SETTINGS.free_ratio),
-                SETTINGS.free_steps,
+                min(self.mission.largest[index], sizes[index] * ALLOCATION_SETTINGS.free_ratio),
+                ALLOCATION_SETTINGS.free_steps,
             )
-            cases = np.repeat(sizes[:, None], SETTINGS.free_steps, axis=1)
+            cases = np.repeat(sizes[:, None], ALLOCATION_SETTINGS.free_steps, axis=1)
             cases[index] = steps
             rows = self.mission.uses(cases)
             with np.errstate(invalid="ignore"):
                 rise = (rows.uses - rows.uses[:, :1]) / self.mission.allowed(rows.ids)[:, None]
-                begins = rise > SETTINGS.free_fraction
+                begins = rise > ALLOCATION_SETTINGS.free_fraction
             first = int(begins.any(axis=0).argmax())
             extended[index] = steps[max(first - 1, 0)]
             if first and np.isinf(rows.uses[:, first]).any():
@@ -216,11 +216,11 @@ class _SizeSearch:
         """Largest size of an error with an image, between its size in `inside`, which has one, and `high`."""
         low = float(inside[index])
         for _ in range(2):
-            steps = np.geomspace(low, high, SETTINGS.end_steps)
-            cases = np.repeat(inside[:, None], SETTINGS.end_steps, axis=1)
+            steps = np.geomspace(low, high, ALLOCATION_SETTINGS.end_steps)
+            cases = np.repeat(inside[:, None], ALLOCATION_SETTINGS.end_steps, axis=1)
             cases[index] = steps
             is_lost = np.isinf(self.mission.uses(cases).uses).any(axis=0)
-            first = int(is_lost.argmax()) if is_lost.any() else SETTINGS.end_steps - 1
+            first = int(is_lost.argmax()) if is_lost.any() else ALLOCATION_SETTINGS.end_steps - 1
             low, high = float(steps[max(first - 1, 0)]), float(steps[first])
         return low
 
@@ -242,19 +242,19 @@ class _SizeSearch:
     def _kept(self, sizes: Floats, before: Rows) -> tuple[Floats, tuple[RowUse, ...]]:
         """Sizes shrunk to the allowed utilizations, and the rows with the shares of each error."""
         near = self.mission.near(sizes)
-        for _ in range(SETTINGS.max_shrinks):
+        for _ in range(ALLOCATION_SETTINGS.max_shrinks):
             if near is not None:
                 break
             sizes = sizes * 0.9
             near = self.mission.near(sizes)
         if near is None:
             raise QuestionError("no sizes are found that leave an image")
-        for _ in range(SETTINGS.max_rounds):
+        for _ in range(ALLOCATION_SETTINGS.max_rounds):
             used = self._used(near, sizes)
             over = float((used / near.allowed)[near.is_limit].max(initial=0.0))
             if over <= 1:
                 break
-            sizes = np.where(near.is_free, sizes, sizes / (over * (1 + SETTINGS.close_fraction)))
+            sizes = np.where(near.is_free, sizes, sizes / (over * (1 + ALLOCATION_SETTINGS.close_fraction)))
         else:
             used = self._used(near, sizes)
         is_limited, limits = ~near.is_free, near.is_limit

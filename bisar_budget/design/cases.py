@@ -6,12 +6,14 @@ import re
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bisar_budget.arrays import Floats
 from bisar_budget.faults import Fault, InvalidValueError, shown
+from bisar_budget.json_types import JsonObject
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.quantities import (
     Choices,
@@ -23,24 +25,25 @@ from bisar_budget.mission.quantities import (
     number_of,
 )
 from bisar_budget.mission.readers import DIRECTION, TextList
-from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.resources import special_file
 from bisar_budget.units import Dimension, normal_unit, parse_quantity
 
 Values = Floats | NDArray[np.object_]  # numbers in SI, or words
 
-MAX_VALUES = 10_000_000  # of one key, and of all keys of a table: 80 MB
-LARGEST_TABLE = 256 << 20  # characters; enough for `MAX_VALUES` values of seventeen digits with sign and exponent
-_MAX_FAULTS = 20  # of a table in a message
+MAX_TABLE_VALUE_COUNT = 10_000_000  # of one key, and of all keys of a table: 80 MB
+MAX_TABLE_CHARACTERS = 256 << 20  # enough for `MAX_TABLE_VALUE_COUNT` values of 17 digits with sign and exponent
+_SHOWN_FAULT_COUNT = 20  # of a table in a message
 # A sample of cases: number of stretches, and the fraction of all cases between them, which fits no step of a grid.
 _STRETCH_COUNT, _GOLDEN_FRACTION = 100, (math.sqrt(5) - 1) / 2
 _FLOAT_DIGITS = 15  # decimal digits that every float keeps
-_NUMBER = re.compile(r"^\s*[+-]?[\d.]*(?:[eE][+-]?\d+)?\s*", re.ASCII)
-_RANGE = "accepted: KEY=FROM:TO UNIT:COUNT, such as {key}=1:10 s:91, with :log behind it for equal ratios"
-_FORMS = "accepted: KEY=FROM:TO UNIT:COUNT or KEY=VALUE,VALUE,..., such as collection.aperture_time=1:10s:91"
-_WORDS = re.compile(r",(?![^\[]*\])")  # between words, not within a list of parts
+_NUMBER_PREFIX = re.compile(r"^\s*[+-]?[\d.]*(?:[eE][+-]?\d+)?\s*", re.ASCII)
+_ACCEPTED_RANGE = "accepted: KEY=FROM:TO UNIT:COUNT, such as {key}=1:10 s:91, with :log behind it for equal ratios"
+_ACCEPTED_VARIATIONS = (
+    "accepted: KEY=FROM:TO UNIT:COUNT or KEY=VALUE,VALUE,..., such as collection.aperture_time=1:10s:91"
+)
+_WORD_SEPARATOR = re.compile(r",(?![^\[]*\])")  # between words, not within a list of parts
 _LATIN = "accepted: latin:COUNT:SEED, such as latin:10000:1"
-_HEADER = re.compile(r"^([^\[\]\s]+(?:\[\d+\][^\[\]\s]*)*)\s*(?:\[([^\[\]]*)\])?$", re.ASCII)
+_KEY_HEADER_PATTERN = re.compile(r"^([^\[\]\s]+(?:\[\d+\][^\[\]\s]*)*)\s*(?:\[([^\[\]]*)\])?$", re.ASCII)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +70,7 @@ class Cases:
 
     def values(self, start: int, stop: int) -> Mapping[str, Values]:
         """Values of cases `start` to `stop` by key, (stop - start,)."""
-        indices: Any = [slice(start, stop)] * len(self.columns)
+        indices: Sequence[slice | NDArray[np.intp]] = [slice(start, stop)] * len(self.columns)
         if self.is_grid:
             indices = np.unravel_index(np.arange(start, stop), self.shape)
         columns = zip(self.varied, self.columns, indices, strict=True)
@@ -75,7 +78,7 @@ class Cases:
 
 
 # ---------------------------------------------------------------- cases of arrays
-def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Cases:
+def grid_of(tree: JsonObject, values: Mapping[str, ArrayLike]) -> Cases:
     """Every combination of values in arrays; the last key is the fastest.
 
     Parameters
@@ -108,7 +111,7 @@ def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Cases:
         arrays.append(_texts(key, choices, words))
         varied.append(choices)
     if not varied:
-        raise QuestionError(f"no key: nothing would vary; {_FORMS}")
+        raise QuestionError(f"no key: nothing would vary; {_ACCEPTED_VARIATIONS}")
     return Cases(tuple(varied), tuple(arrays), is_grid=True)
 
 
@@ -143,7 +146,7 @@ class _Asked(NamedTuple):
     is_log: bool = False
 
 
-def grid(tree: dict[str, Any], texts: Sequence[str], name: str = "--vary") -> Cases:
+def grid(tree: JsonObject, texts: Sequence[str], name: str = "--vary") -> Cases:
     """Cases of options `KEY=FROM:TO UNIT:COUNT`, with a further `:log` for equal ratios, or `KEY=VALUE,VALUE,...`.
 
     Keys without a number take `KEY=WORD,WORD,...`. Ends belong to the range. Values have few digits in the unit of
@@ -172,17 +175,17 @@ def _axis(asked: _Asked) -> Values:
     if asked.listed is not None:
         return asked.listed
     if not asked.size:
-        raise QuestionError(f"{asked.option}: has no count of values; {_RANGE.format(key=asked.varied.key)}")
+        raise QuestionError(f"{asked.option}: has no count of values; {_ACCEPTED_RANGE.format(key=asked.varied.key)}")
     count = _count(asked.size, f"{asked.option}: the count of values", 2, "; KEY=VALUE is a single value")
-    if count > MAX_VALUES:
+    if count > MAX_TABLE_VALUE_COUNT:
         raise QuestionError(
-            f"{asked.option}: {count} values of one key; accepted: up to {MAX_VALUES}, "
+            f"{asked.option}: {count} values of one key; accepted: up to {MAX_TABLE_VALUE_COUNT}, "
             "which are as many cases for each combination of the other keys"
         )
     return _spread(asked, np.arange(count) / (count - 1))
 
 
-def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Cases:
+def sample(tree: JsonObject, texts: Sequence[str], how: str) -> Cases:
     """Draw a Latin hypercube over ranges: each of `COUNT` equal parts of a range has one value.
 
     Parameters
@@ -200,18 +203,18 @@ def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Cases:
         As for a grid; or the method, count or seed of `how` is invalid.
     """
     option = f"--sample {shown(how)}"
-    kind, *parts = (part.strip() for part in how.split(":"))
-    if kind != "latin" or len(parts) != 2:
+    kind, *fields = (field.strip() for field in how.split(":"))
+    if kind != "latin" or len(fields) != 2:
         raise QuestionError(f"{option}: is no way to draw cases; {_LATIN}")
-    count = _count(parts[0], f"{option}: the count of cases", 1)
-    if not (parts[1].isascii() and parts[1].isdigit() and len(parts[1]) <= 18):
+    count = _count(fields[0], f"{option}: the count of cases", 1)
+    if not (fields[1].isascii() and fields[1].isdigit() and len(fields[1]) <= 18):
         raise QuestionError(f"{option}: the seed must be a whole number; {_LATIN}")
-    rng = np.random.default_rng(int(parts[1]))
+    rng = np.random.default_rng(int(fields[1]))
     every = list(_all_asked(tree, texts, "--vary"))
-    if count * len(every) > MAX_VALUES:
+    if count * len(every) > MAX_TABLE_VALUE_COUNT:
         raise QuestionError(
             f"{option}: {count} cases of {len(every)} keys do not fit into memory; accepted: up to "
-            f"{MAX_VALUES // len(every)} cases. Samples of other seeds go on from there"
+            f"{MAX_TABLE_VALUE_COUNT // len(every)} cases. Samples of other seeds go on from there"
         )
     columns: list[Values] = []
     for asked in every:
@@ -220,41 +223,44 @@ def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Cases:
         elif isinstance(asked.varied, Choices):
             columns.append(asked.listed[rng.permutation(count) * asked.listed.size // count])
         else:
-            raise QuestionError(f"{asked.option}: --sample draws from a range; {_RANGE.format(key=asked.varied.key)}")
+            raise QuestionError(
+                f"{asked.option}: --sample draws from a range; {_ACCEPTED_RANGE.format(key=asked.varied.key)}"
+            )
     return Cases(tuple(asked.varied for asked in every), tuple(columns))
 
 
-def _all_asked(tree: dict[str, Any], texts: Sequence[str], name: str) -> Iterator[_Asked]:
+def _all_asked(tree: JsonObject, texts: Sequence[str], name: str) -> Iterator[_Asked]:
     """Options of texts, each key once."""
     if not texts:
-        raise QuestionError(f"no {name}: nothing would vary; {_FORMS}")
+        raise QuestionError(f"no {name}: nothing would vary; {_ACCEPTED_VARIATIONS}")
     seen: set[tuple[str, ...]] = set()
     for text in texts:
         asked = _asked(tree, text, name)
-        parts = tuple(parts_of(asked.varied.key))
-        if parts in seen:
+        steps = tuple(parts_of(asked.varied.key))
+        if steps in seen:
             raise QuestionError(f"{name} {asked.varied.key}: varies twice; accepted: each key once")
-        seen.add(parts)
+        seen.add(steps)
         yield asked
 
 
-def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked:
+def _asked(tree: JsonObject, text: str, name: str) -> _Asked:
     """Read one option; its values are checked against the bounds of the key."""
-    key, equals, values_text = (part.strip() for part in text.partition("="))
+    key, equals, values_text = (field.strip() for field in text.partition("="))
     option = f"{name} {shown(text)}"
     if not (key and equals and values_text):
-        raise QuestionError(f"{option}: does not say which values; {_FORMS}")
+        raise QuestionError(f"{option}: does not say which values; {_ACCEPTED_VARIATIONS}")
     varied: Varied
     if (choices := choices_of(tree, key, values_text)) is not None:
-        varied, values = choices, _texts(option, choices, [word.strip() for word in _WORDS.split(values_text)])
+        words = [word.strip() for word in _WORD_SEPARATOR.split(values_text)]
+        varied, values = choices, _texts(option, choices, words)
     else:
         number = number_of(tree, key)
-        parts = [part.strip() for part in values_text.split(":")]
-        if len(parts) > 1:
-            return _range(option, number, parts)
+        fields = [field.strip() for field in values_text.split(":")]
+        if len(fields) > 1:
+            return _range(option, number, fields)
         texts = values_text.split(",")
-        if len(texts) > MAX_VALUES:
-            raise QuestionError(f"{option}: {len(texts)} values; accepted: up to {MAX_VALUES}")
+        if len(texts) > MAX_TABLE_VALUE_COUNT:
+            raise QuestionError(f"{option}: {len(texts)} values; accepted: up to {MAX_TABLE_VALUE_COUNT}")
         varied, listed = _read(option, number, texts)
         values = np.array(listed)
     if len(set(values.tolist())) < values.size:
@@ -262,13 +268,13 @@ def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked:
     return _Asked(option, varied, values)
 
 
-def _range(option: str, number: Number, parts: list[str]) -> _Asked:
-    """Read a range of an option from the parts between its colons."""
-    if is_log := len(parts) > 2 and parts[-1] == "log":
-        parts.pop()
-    if len(parts) > 3 or "" in parts:
-        raise QuestionError(f"{option}: is no range; {_RANGE.format(key=number.key)}")
-    number, (low, high) = _read(option, number, parts[:2])
+def _range(option: str, number: Number, fields: list[str]) -> _Asked:
+    """Read a range of an option from the fields between its colons."""
+    if is_log := len(fields) > 2 and fields[-1] == "log":
+        fields.pop()
+    if len(fields) > 3 or "" in fields:
+        raise QuestionError(f"{option}: is no range; {_ACCEPTED_RANGE.format(key=number.key)}")
+    number, (low, high) = _read(option, number, fields[:2])
     if not low < high:
         kind, hint = ("empty", "; KEY=VALUE is a single value") if low == high else ("reversed", "")
         if number.reader is DIRECTION and low > high:
@@ -276,12 +282,12 @@ def _range(option: str, number: Number, parts: list[str]) -> _Asked:
         raise QuestionError(f"{option}: the range is {kind}; accepted: FROM < TO{hint}")
     if is_log and low <= 0:
         raise QuestionError(f"{option}: equal ratios begin above 0; accepted: FROM > 0, or no :log")
-    return _Asked(option, number, None, (low, high), parts[2] if len(parts) == 3 else "", is_log)
+    return _Asked(option, number, None, (low, high), fields[2] if len(fields) == 3 else "", is_log)
 
 
 def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tuple[float, ...]]:
     """Values in SI, and the number with the unit of the last; values without a unit have this unit."""
-    units = [normal_unit(_NUMBER.sub("", text).strip()) for text in texts]
+    units = [normal_unit(_NUMBER_PREFIX.sub("", text).strip()) for text in texts]
     values = []
     for text, unit in zip(texts, units, strict=True):
         full_text = f"{text.strip()} {units[-1]}" if not unit and units[-1] else text.strip()
@@ -317,7 +323,7 @@ def _spread(asked: _Asked, fractions: Floats) -> Floats:
 
 
 # ---------------------------------------------------------------- values of cases
-def some_of(cases: Cases, count: int) -> Cases:
+def sampled_cases(cases: Cases, count: int) -> Cases:
     """A sample of cases in short stretches, spread over all cases."""
     length = max(1, count // _STRETCH_COUNT)
     starts = [
@@ -353,22 +359,22 @@ def _rounded(values: Floats) -> Floats:
 
 
 # ---------------------------------------------------------------- cases of a file
-def table_file(tree: dict[str, Any], path: str) -> Cases:
+def table_file(tree: JsonObject, path: str) -> Cases:
     """Read a CSV file of cases, as `table` does; raises `TableError` also if the file is unreadable or too large."""
     if kind := special_file(path):
         raise TableError.of_file(path, f"cannot be read: {kind}; accepted: a regular file")
     try:
         with open(path, encoding="utf-8", newline="") as file:
-            text = file.read(LARGEST_TABLE + 1)
+            text = file.read(MAX_TABLE_CHARACTERS + 1)
     except (OSError, ValueError) as error:  # ValueError: not UTF-8, a NUL in the name
         raise TableError.of_file(path, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(text) > LARGEST_TABLE:
-        most = f"{LARGEST_TABLE >> 20} MiB; accepted: up to {MAX_VALUES} values"
+    if len(text) > MAX_TABLE_CHARACTERS:
+        most = f"{MAX_TABLE_CHARACTERS >> 20} MiB; accepted: up to {MAX_TABLE_VALUE_COUNT} values"
         raise TableError.of_file(path, f"is larger than {most}")
     return table(tree, text, path)
 
 
-def table(tree: dict[str, Any], text: str, file: str) -> Cases:
+def table(tree: JsonObject, text: str, file: str) -> Cases:
     """Read a CSV of cases: a header `KEY [unit]` for each column, then one case in each line.
 
     Empty lines and lines that begin with `#` are left out. Plain numbers need no unit, and words have none. The check
@@ -405,13 +411,19 @@ def table(tree: dict[str, Any], text: str, file: str) -> Cases:
         row = _row(line, varied, words, line_number)
         if isinstance(row, Fault):
             faults.append(row)
-            if len(faults) == _MAX_FAULTS:
+            if len(faults) == _SHOWN_FAULT_COUNT:
                 break
             continue
         numbers.extend(row)
-        if len(numbers) > MAX_VALUES:
+        if len(numbers) > MAX_TABLE_VALUE_COUNT:
             faults.append(
-                Fault(line_number, 1, "", f"has more than {MAX_VALUES} values", accepted="accepted: fewer cases")
+                Fault(
+                    line_number,
+                    1,
+                    "",
+                    f"has more than {MAX_TABLE_VALUE_COUNT} values",
+                    accepted="accepted: fewer cases",
+                )
             )
             break
     if not numbers and not faults:
@@ -439,7 +451,7 @@ def _cells(line: str) -> Iterator[tuple[int, str]]:
         at += len(cell) + 1
 
 
-def _headed(tree: dict[str, Any], header: str, line_number: int, file: str) -> tuple[Varied, ...]:
+def _headed(tree: JsonObject, header: str, line_number: int, file: str) -> tuple[Varied, ...]:
     """Keys of the header; numbers have the unit of the header."""
     if not header:
         accepted = "accepted: KEY [unit], KEY [unit], ..."
@@ -459,13 +471,13 @@ def _headed(tree: dict[str, Any], header: str, line_number: int, file: str) -> t
         except QuestionError as error:
             faults.append(Fault(line_number, column, "", str(error)))
     if faults:
-        raise TableError.of_faults(file, faults[:_MAX_FAULTS])
+        raise TableError.of_faults(file, faults[:_SHOWN_FAULT_COUNT])
     return tuple(varied.values())
 
 
-def _column(tree: dict[str, Any], cell: str) -> Varied:
+def _column(tree: JsonObject, cell: str) -> Varied:
     """Number with the unit of a cell of the header, or the key of words."""
-    match = _HEADER.match(cell)
+    match = _KEY_HEADER_PATTERN.match(cell)
     if match is None:
         hint = "Cells are separated by commas" if ";" in cell or "\t" in cell else ""
         raise InvalidValueError("is no header of a column", "accepted: KEY [unit]", hint)

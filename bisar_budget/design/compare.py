@@ -23,7 +23,7 @@ from bisar_budget.mission.parts import FIGURES, Part, PartError, entries, eviden
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.workers import Progress, unseen
 
-_KINDS = {"motion_error": ("imu", "gnss"), "oscillator": ("oscillator",)}
+_PART_KINDS_BY_SECTION = {"motion_error": ("imu", "gnss"), "oscillator": ("oscillator",)}
 
 
 class PartState(NamedTuple):
@@ -91,7 +91,7 @@ class Comparison(NamedTuple):
     @property
     def complying(self) -> tuple[PartState, ...]:
         """Parts with which the mission complies."""
-        return tuple(part for part in self.parts if part.complies)
+        return tuple(state for state in self.parts if state.complies)
 
     @property
     def status(self) -> str:
@@ -99,12 +99,14 @@ class Comparison(NamedTuple):
         count = len(self.complying)
         if count:
             return "all" if count == len(self.parts) else "some"
-        return "waived" if any(part.standing.status == "waived" for part in self.parts) else "none"
+        return "waived" if any(state.standing.status == "waived" for state in self.parts) else "none"
 
 
-def is_of_parts(key: str) -> bool:
+def is_sensor_key(key: str) -> bool:
     """Whether a key names parts of the catalogue, which `solve` compares."""
-    return parts_of(key) in {("platforms", name, section, "sensor") for name in PLATFORMS for section in _KINDS}
+    return parts_of(key) in {
+        ("platforms", name, section, "sensor") for name in PLATFORMS for section in _PART_KINDS_BY_SECTION
+    }
 
 
 def compare_parts(
@@ -138,7 +140,7 @@ def compare_parts(
         The catalogue cannot be read, no part has the right kind, the mission takes no figure from any part, or no row
         decides.
     """
-    if not is_of_parts(key):
+    if not is_sensor_key(key):
         raise QuestionError(f"{key}: takes no parts; accepted: platforms.receiver.motion_error.sensor and the like")
     variation = Variation(mission, model)
     try:
@@ -194,9 +196,9 @@ def _order(state: PartState) -> tuple[int, float, float, str]:
     sign = -1 if state.complies else 1
     uses = (state.standing.utilization, state.own_utilization)
     # Utilizations that agree to six digits are a tie.
-    worst, own = (math.inf if use is None else sign * float(f"{use:.6g}") for use in uses)
+    worst, own_use = (math.inf if use is None else sign * float(f"{use:.6g}") for use in uses)
     rank = 0 if state.complies else 1 if state.standing.status == "waived" else 2
-    return rank, worst, own, state.id
+    return rank, worst, own_use, state.id
 
 
 class _Candidate(NamedTuple):
@@ -220,24 +222,26 @@ class _PartSearch:
     def __init__(self, variation: Variation, key: str) -> None:
         self.variation, self.key = variation, key
         _, self.platform, self.section, _ = parts_of(key)
-        beside = folder_of(variation.mission.file)
+        folder = folder_of(variation.mission.file)
         section = getattr(getattr(variation.mission.platforms, self.platform), self.section)
         named = None if section is None else section.sensor
         names = named if isinstance(named, tuple) else [named] if named else []
-        self.given = {name: find_part(name, beside) for name in names}
-        given_kinds = {part.kind for part in self.given.values()}
-        self.kinds = tuple(kind for kind in _KINDS[self.section] if not given_kinds or kind in given_kinds)
-        catalogued = {entry.id: _Candidate(entry.id, entry.file, entry.part) for entry in entries(folders(beside))}
+        self.given = {name: find_part(name, folder) for name in names}
+        given_kinds = {device.kind for device in self.given.values()}
+        self.kinds = tuple(
+            kind for kind in _PART_KINDS_BY_SECTION[self.section] if not given_kinds or kind in given_kinds
+        )
+        catalogued = {entry.id: _Candidate(entry.id, entry.file, entry.part) for entry in entries(folders(folder))}
         project_files = [
-            _Candidate(name, os.path.join(beside, name), part)
-            for name, part in self.given.items()
+            _Candidate(name, os.path.join(folder, name), device)
+            for name, device in self.given.items()
             if name not in catalogued
         ]
         self.candidates = [each for each in (*project_files, *catalogued.values()) if each.part.kind in self.kinds]
 
     def value(self, name: str, kind: str) -> str:
         """Text of the key's value with a part; parts of other kinds stay."""
-        kept = [given for given, part in self.given.items() if part.kind != kind]
+        kept = [named for named, device in self.given.items() if device.kind != kind]
         return json.dumps([*kept, name] if kept else name, ensure_ascii=False)
 
     def checked(self, candidate: _Candidate, today: date) -> _Candidate:
@@ -253,12 +257,14 @@ class _PartSearch:
             for each in mission.taken
             if each.part == candidate.id and each.key.startswith(prefix)
         }
-        of_part = tuple(
+        part_figures = tuple(
             figure for figure in FIGURES[candidate.part.kind] if figure in taken and getattr(candidate.part, figure)
         )
         section = getattr(getattr(mission.platforms, self.platform), self.section)
         stated = tuple(each.figure for each in section.overridden if each.part == candidate.part.name)
-        return candidate._replace(judged=judged_mission(Analysis(mission), today), figures=of_part, stated=stated)
+        return candidate._replace(
+            judged=judged_mission(Analysis(mission), today), figures=part_figures, stated=stated
+        )
 
     def state(self, candidate: _Candidate, row: str | None, breaks: frozenset[str]) -> PartState:
         """State of the mission with a part."""
@@ -283,15 +289,15 @@ class _PartSearch:
             reason = f"{row} is {STATUS[part_standing.status].words} with it"
             return state._replace(standing=part_standing._replace(complies=False), reason=reason)
         texts = {evidence(candidate.part, figure) for figure in candidate.figures}
-        own = [
+        own_rows = [
             (each.utilization, each.id)
             for each in rows_in_words(judged, Case(judged.analysis))
             if each.owner == self.platform and each.evidence in texts and each.utilization is not None
         ]
-        use, own_row = max(own, default=(None, None))
+        use, own_row = max(own_rows, default=(None, None))
         return state._replace(standing=part_standing, own_row=own_row, own_utilization=use)
 
 
-def mission_with(variation: Variation, key: str, part: PartState) -> Mission:
-    """Read the mission with a part that was compared."""
-    return variation.read([SetValue(key, _PartSearch(variation, key).value(part.id, part.kind))])
+def mission_with(variation: Variation, key: str, state: PartState) -> Mission:
+    """Read the mission with the part of a compared state."""
+    return variation.read([SetValue(key, _PartSearch(variation, key).value(state.id, state.kind))])

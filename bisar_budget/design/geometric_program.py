@@ -5,16 +5,37 @@ is one maximum. A barrier keeps inside the rows' room, and Newton's method follo
 way. Derived here; the method is that of Boyd & Vandenberghe, Convex Optimization, 4.5 and 11.3.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.ranges.exact_ranges import Floats, Truths
+from bisar_budget.arrays import Booleans, Floats
 
-_GAP = 1e-8  # of Σ w·x, that the maximum may be above what is found
-_STEP = 30.0  # by which the barrier gives way each time
-_NEWTON = 60  # steps to follow it once; some ten are enough
-_SETTLED = 1e-9  # half the square of Newton's decrement
+
+@dataclass(frozen=True)
+class BarrierSettings:
+    """Tunings of the barrier method.
+
+    Attributes
+    ----------
+    gap_fraction : float
+        Largest distance of Σ w·x to its maximum, as a fraction of Σ w.
+    firmness_factor : float
+        Factor by which the barrier gives way each time.
+    max_newton_steps : int
+        Largest number of steps of Newton's method each time; ten are usually enough.
+    decrement_ratio : float
+        Half the square of Newton's decrement that ends the steps.
+    """
+
+    gap_fraction: float = 1e-8
+    firmness_factor: float = 30.0
+    max_newton_steps: int = 60
+    decrement_ratio: float = 1e-9
+
+
+_BARRIER = BarrierSettings()
 
 
 class Rows(NamedTuple):
@@ -33,7 +54,7 @@ class Rows(NamedTuple):
         """The rows, followed by other rows."""
         return Rows(*(np.concatenate(both) for both in zip(self, further, strict=True)))
 
-    def of_sizes(self, chosen: Truths) -> "Rows":
+    def of_sizes(self, chosen: Booleans) -> "Rows":
         """The rows for some of the sizes."""
         return self._replace(share=self.share[:, chosen])
 
@@ -60,7 +81,7 @@ def largest_sizes(weights: Floats, rows: Rows) -> Largest:
     x: Floats = alone.min(axis=0)  # half of every room is left
     firmness, count = max(1.0, float(weights.sum())), rows.room.size
     while True:
-        for _ in range(_NEWTON):
+        for _ in range(_BARRIER.max_newton_steps):
             part = rows.at(x)
             left = 1 - part.sum(axis=1)
             slope = rows.power[:, None] * part / left[:, None]  # of each row's barrier
@@ -68,14 +89,14 @@ def largest_sizes(weights: Floats, rows: Rows) -> Largest:
             curvature = np.diag((rows.power[:, None] * slope).sum(axis=0)) + slope.T @ slope
             step = -np.linalg.solve(curvature, gradient)
             decrement = float(-gradient @ step)
-            if decrement / 2 < _SETTLED:
+            if decrement / 2 < _BARRIER.decrement_ratio:
                 break
             x = _towards(x, step, gradient, firmness * weights, rows)
-        if count / firmness < _GAP * max(1.0, float(weights.sum())):
+        if count / firmness < _BARRIER.gap_fraction * max(1.0, float(weights.sum())):
             part = rows.at(x)
             multipliers = rows.power / (firmness * (1 - part.sum(axis=1)))
             return Largest(x, multipliers)
-        firmness *= _STEP
+        firmness *= _BARRIER.firmness_factor
 
 
 def _towards(x: Floats, step: Floats, gradient: Floats, pull: Floats, rows: Rows) -> Floats:

@@ -12,7 +12,7 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import AllocationRules, MetricSplits, Mission
 from bisar_budget.mission.quantities import QuestionError, tree_of
 
-_CURVES = ("frequency", "phase_noise", "power_law", "allan_deviation", "bandwidth", "spurs")
+_OSCILLATOR_KEYS = ("frequency", "phase_noise", "power_law", "allan_deviation", "bandwidth", "spurs")
 
 
 class OfferedFigure(NamedTuple):
@@ -97,7 +97,7 @@ def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
     """The spectrum that a level shifts, without the level."""
     platform = getattr(mission.platforms, parts[1])
     if parts[-1] == "level":
-        return [getattr(platform.oscillator, name, None) for name in _CURVES]
+        return [getattr(platform.oscillator, name, None) for name in _OSCILLATOR_KEYS]
     return platform.motion_error.vibration.spectrum
 
 

@@ -22,20 +22,20 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.row import worst_first
 from bisar_budget.findings.status import RANK, STATUS
-from bisar_budget.geometry import PlatformState, cross, dot
+from bisar_budget.geometry import PlatformState, cross, dot, plain_vector
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.paths import orbits_of, reader_of
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.paths.earth import Floats, SceneAxes
 from bisar_budget.paths.flight import PathFileError
-from bisar_budget.paths.instant import DAY, Instant, parse_instant
+from bisar_budget.paths.instant import DAY_S, Instant, parse_instant
 from bisar_budget.paths.visibility import Stretch, Watched, shared
 from bisar_budget.workers import Progress, unseen
 
 CENTER_TIME = "collection.center_time"
 MIN_ELEVATION = math.radians(20)
-_BLOCK_PASSES = 64  # that are checked together
+_PASSES_PER_BLOCK = 64  # checked together
 _YEARS = (1957, 2200)  # first year with orbits, and the year after the last
 _TRACK_POINTS = 41  # of a pass in a drawing
 
@@ -114,7 +114,7 @@ class SatellitePass(NamedTuple):
     @property
     def bearing(self) -> float | None:
         """Direction to the satellite at the mid-time, from north, clockwise. [rad]"""
-        return None if self.state is None else bearing(self.state.azimuth)
+        return None if self.state is None else bearing(float(self.state.azimuth))
 
 
 def bearing(azimuth: float) -> float:
@@ -231,7 +231,7 @@ def passes(
         model=model if model is not None and not mission.has_direct_path else mission.gating_model,
         platform=chosen,
         start=start,
-        stop=start.after(days * DAY),
+        stop=start.after(days * DAY_S),
         min_elevation=min_elevation,
         squint=squint,
         found=tuple(_checked(unchecked, chosen, variation, today, progress)),
@@ -269,7 +269,7 @@ def _watched(
         if route is None:
             continue
         try:
-            seen[name] = Watched.over(orbits_of(mission, route, read), axes, start, days * DAY)
+            seen[name] = Watched.over(orbits_of(mission, route, read), axes, start, days * DAY_S)
         except PathFileError as error:  # the file went away since the mission was loaded
             raise QuestionError(f"platforms.{name}.orbit: {error}") from None
         if not seen[name].pieces:
@@ -302,7 +302,7 @@ def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneA
         rises=stretch.rises,
         sets=stretch.sets,
         culmination=satellite.origin.after(culmination),
-        max_elevation=satellite.state(culmination).elevation,
+        max_elevation=float(satellite.state(culmination).elevation),
         track=np.stack([np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))], axis=1),
     )
     time = satellite.with_squint(stretch, squint)
@@ -320,14 +320,14 @@ def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneA
         center=center,
         state=state,
         side=_side(state, axes),
-        is_ascending=axes.turned_back(state.velocity)[2] > 0,
+        is_ascending=axes.turned_back(plain_vector(state.velocity))[2] > 0,
         doubt=satellite.orbit(time).largest_doubt_m(center),
     )
 
 
 def _side(state: PlatformState, axes: SceneAxes) -> str:
     """Side of the track over ground on which the scene lies, looking ahead: right is along v × r from the Earth."""
-    right = cross(state.velocity, axes.turned(axes.earth_fixed(state.position)))
+    right = cross(plain_vector(state.velocity), axes.turned(axes.earth_fixed(plain_vector(state.position))))
     return "left" if dot(state.look, right) > 0 else "right"
 
 
@@ -336,8 +336,8 @@ def _checked(
     found: Sequence[SatellitePass], platform: str, variation: Variation, today: date, progress: Progress
 ) -> Iterator[SatellitePass]:
     """Check the mission at the mid-time of each pass."""
-    for first in range(0, len(found), _BLOCK_PASSES):
-        block = list(found[first : first + _BLOCK_PASSES])
+    for first in range(0, len(found), _PASSES_PER_BLOCK):
+        block = list(found[first : first + _PASSES_PER_BLOCK])
         missions, places = [], []
         for position, unjudged in enumerate(block):
             if unjudged.center is None:
@@ -368,10 +368,10 @@ def _judged(unjudged: SatellitePass, findings: MissionFindings, mission: Mission
         doubt=path.largest_doubt_m,
         status=findings.status,
         reason=reason,
-        bistatic_angle=findings.geometry.bistatic_angle,
-        gradient_angle=findings.geometry.gradient_angle,
-        range_resolution=findings.resolution.range,
-        cross_range_resolution=findings.resolution.cross_range,
+        bistatic_angle=float(findings.geometry.bistatic_angle),
+        gradient_angle=float(findings.geometry.gradient_angle),
+        range_resolution=float(findings.resolution.range),
+        cross_range_resolution=float(findings.resolution.cross_range),
         row=row,
         requirement=requirement,
         utilization=utilization,

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.arrays import Booleans, Floats
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import NEGLIGIBLE_FRACTION, SMALL_RAD
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Why
@@ -26,15 +27,14 @@ from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.mission.changes import ACCEPTED_ERRORS
 from bisar_budget.mission.model import MetricSplits, Mission
 from bisar_budget.mission.quantities import QuestionError, tree_of, with_number
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
-NEIGHBOUR_FACTORS = (0.8, 1.2)  # of a size, at which the effect of an error is measured
+PROBE_FACTORS = (0.8, 1.2)  # of a size, at which the effect of an error is measured
 _MAX_STEP_RATIO = 3.0  # of utilization to allowed utilization, after a step of the search
 _SURE_FRACTION = 1 - 1e-5  # of a limit, because a single case settles to other last digits
 _END_FRACTION = 0.995  # of the size without an image, which is found to 0.1 %
-_ROUNDING_FRACTION = 1e-13  # of a row; a smaller part of an error is a rounding error
+_ROW_ROUNDING_FRACTION = 1e-13  # of a row; a smaller part of an error is a rounding error
 # First words of the ids of rows without a requirement: effects that no row takes, and sizes beyond a file's bounds.
-NEGLIGIBLE, ACCEPTED = "negligible", "accepted"
+NEGLIGIBLE, LARGEST_ACCEPTED = "negligible", "accepted"
 _WARN_ONLY = ("autofocus_pull_in",)  # kinds of rows that warn and never fail
 _HAVE_THEIR_OWN_ROW = (Why.EFFECT_NOT_TAKEN, Why.AIR_STAYS)  # reasons of rows without a number; see `uses`
 _AS_COMBINED = (
@@ -81,8 +81,8 @@ class Near(NamedTuple):
     sizes: Floats
     part: Floats
     room: Floats
-    is_limit: Truths
-    is_free: Truths
+    is_limit: Booleans
+    is_free: Booleans
 
     def rows(self, of: str = "") -> Rows:
         """Rows of a geometric program: all rows that limit a size, or the row with the id `of`."""
@@ -201,7 +201,7 @@ class SpecifiedMission:
         for name, effect in untaken:
             use = np.broadcast_to(effect.total, sizes.shape[1:]) / level
             rows.append((f"{NEGLIGIBLE}.{name}", None, 1.0 if self.combine == "sum" else 2.0, use))
-        for name, limits in ((END_OF_IMAGE, self.ends), (ACCEPTED, self.most)):
+        for name, limits in ((END_OF_IMAGE, self.ends), (LARGEST_ACCEPTED, self.most)):
             for index in np.flatnonzero(np.isfinite(limits)).tolist():
                 rows.append((f"{name}.{self.specified[index].key}", None, 2.0, sizes[index] / limits[index]))
         ids, requirements, powers, uses = zip(*rows, strict=True)
@@ -215,29 +215,29 @@ class SpecifiedMission:
     def allowed(self, ids: Sequence[str]) -> Floats:
         """Allowed utilization of each row; it is less than 1 without a requirement, and at the end of the image."""
         usual = (1 - self.reserve) * _SURE_FRACTION
-        most = {NEGLIGIBLE: _SURE_FRACTION, END_OF_IMAGE: min(usual, _END_FRACTION), ACCEPTED: _SURE_FRACTION}
+        most = {NEGLIGIBLE: _SURE_FRACTION, END_OF_IMAGE: min(usual, _END_FRACTION), LARGEST_ACCEPTED: _SURE_FRACTION}
         return np.array([most.get(row.partition(".")[0], usual) for row in ids])
 
     def near(self, sizes: Floats) -> Near | None:
         """Utilizations of rows near sizes; None if they are far beyond the allowed utilizations."""
         count = sizes.size
         cases = np.repeat(sizes[:, None], 2 * count + 1, axis=1)
-        for number, factor in enumerate(NEIGHBOUR_FACTORS):
+        for number, factor in enumerate(PROBE_FACTORS):
             cases[np.arange(count), 1 + number * count + np.arange(count)] *= factor
-        found = self.uses(cases)
-        allowed, power = self.allowed(found.ids), found.powers[:, None]
-        if not (found.uses[:, 0] <= _MAX_STEP_RATIO * allowed).all():
+        row_uses = self.uses(cases)
+        allowed, power = self.allowed(row_uses.ids), row_uses.powers[:, None]
+        if not (row_uses.uses[:, 0] <= _MAX_STEP_RATIO * allowed).all():
             return None
-        powers = found.uses**power
+        powers = row_uses.uses**power
         base, (less, more) = powers[:, :1], np.split(powers[:, 1:], 2, axis=1)
         is_lost = ~np.isfinite(more)
-        low, high = (factor**power for factor in NEIGHBOUR_FACTORS)
+        low, high = (factor**power for factor in PROBE_FACTORS)
         with np.errstate(invalid="ignore"):
-            part: Floats = np.where(is_lost, (base - less) / (1 - low), (more - less) / (high - low))
-        part = np.where(part > _ROUNDING_FRACTION * base, part, 0.0)
-        room = allowed**found.powers - (base[:, 0] - part.sum(axis=1))
-        is_limit: Truths = np.any(part > 0, axis=1)
+            share: Floats = np.where(is_lost, (base - less) / (1 - low), (more - less) / (high - low))
+        share = np.where(share > _ROW_ROUNDING_FRACTION * base, share, 0.0)
+        room = allowed**row_uses.powers - (base[:, 0] - share.sum(axis=1))
+        is_limit: Booleans = np.any(share > 0, axis=1)
         if (room[is_limit] <= 0).any():
             return None
-        is_free: Truths = ~np.any(part > 0, axis=0)
-        return Near(found, allowed, sizes, part, room, is_limit, is_free)
+        is_free: Booleans = ~np.any(share > 0, axis=0)
+        return Near(row_uses, allowed, sizes, share, room, is_limit, is_free)

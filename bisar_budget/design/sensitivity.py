@@ -9,7 +9,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from bisar_budget.design.varied import scaled
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.requirement import Override
+from bisar_budget.json_types import JsonObject
 from bisar_budget.mission.model import MISSION, SHARES, Mission
 from bisar_budget.mission.propagation import DELAYS
 from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, as_number, form_of, tree_of
@@ -40,17 +41,18 @@ from bisar_budget.mission.readers import (
     Version,
     Whole,
 )
+from bisar_budget.mission.tree import Content
 from bisar_budget.workers import Progress, unseen
 
-LITTLE = 1e-4  # of a utilization; a smaller change is not shown
-EVEN = 0.01  # fraction of every number for which effects are compared
+MIN_SHOWN_CHANGE_FRACTION = 1e-4  # of a utilization; a smaller change is not shown
+COMPARED_CHANGE_FRACTION = 0.01  # of every number, for which effects are compared
 _MAX_LOG_RATIO = math.log(1e6)  # a number that would have to change by a larger ratio decides nothing
-_ROUNDING_FRACTION = 1e-9  # of a utilization; a smaller difference of checks is a rounding error
+_UTILIZATION_ROUNDING_FRACTION = 1e-9  # of a utilization; a smaller difference of checks is a rounding error
 _RELAXED_FACTOR = 2.0  # of an error that is relaxed
 _EQUAL_FRACTION = 1e-9  # of a declared value; a smaller difference is none
 # Half of a difference. A power law of exponent p is wrong by (p - 1)(p - 2)/6 of its square, 2e-4 for the inverse
 # square; allowables by exact ranges end their search within 1e-5 of a limit, which is 1e-3 of a hundredth.
-RELATIVE_STEP = 0.01
+DIFFERENCE_STEP_FRACTION = 0.01
 # Sines and decibels bend faster than powers: 3e-6 of a slope, and 1.4e-4.
 DIRECTION_STEP = math.radians(0.25)
 LEVEL_STEP = 0.25  # dB
@@ -123,7 +125,7 @@ class Slope(NamedTuple):
     @property
     def even_effect(self) -> float:
         """Effect of the same small change in the common measure of all numbers."""
-        return self.effect * EVEN / self.measure
+        return self.effect * COMPARED_CHANGE_FRACTION / self.measure
 
     @property
     def is_proportional(self) -> bool:
@@ -148,7 +150,7 @@ class Relaxed(NamedTuple):
     @property
     def moves_shares(self) -> bool:
         """Whether doubling the error changes the shares."""
-        return abs(self.shares_after[0] - self.shares_before[0]) > LITTLE
+        return abs(self.shares_after[0] - self.shares_before[0]) > MIN_SHOWN_CHANGE_FRACTION
 
 
 class Sensitivity(NamedTuple):
@@ -191,7 +193,7 @@ class Sensitivity(NamedTuple):
             return None
         change = -math.log(self.asked) * self.asked / slope.effect  # in `per`s, of the logarithm of the utilization
         if slope.is_proportional:
-            power = EVEN * change
+            power = COMPARED_CHANGE_FRACTION * change
             return slope.value * math.expm1(power) if abs(power) <= _MAX_LOG_RATIO else None
         is_near = (
             abs(change * slope.per) <= math.pi
@@ -202,8 +204,10 @@ class Sensitivity(NamedTuple):
 
     @property
     def shown(self) -> tuple[Slope, ...]:
-        """Numbers with an effect of at least `LITTLE` of the utilization."""
-        return tuple(slope for slope in self.slopes if abs(slope.even_effect) >= LITTLE * self.asked)
+        """Numbers with an effect of at least `MIN_SHOWN_CHANGE_FRACTION` of the utilization."""
+        return tuple(
+            slope for slope in self.slopes if abs(slope.even_effect) >= MIN_SHOWN_CHANGE_FRACTION * self.asked
+        )
 
 
 # ---------------------------------------------------------------- differences
@@ -268,7 +272,7 @@ def sensitivity(
     hold_to_decisions([judged], row)
     mission_standing = standing(judged, None, frozenset())
     nearest = min(path.slant_range for path in judged.analysis.geometry.both)
-    numbers, skipped = stated_numbers(tree_of(variation.mission), nearest)
+    numbers, skipped = stated_numbers(tree_of(variation.mission), float(nearest))
     neighbours = _Neighbours(variation, numbers, mission_standing.row, row, today)
     at_file = neighbours.uses([(None, 0)])[0] if mission_standing.row else ""
     if isinstance(at_file, str):
@@ -277,13 +281,13 @@ def sensitivity(
     for slope in neighbours.slopes(at_file, progress):
         if isinstance(slope, Skipped):
             skipped.append(slope)
-        elif max(abs(slope.change), abs(slope.row_change or 0.0)) <= _ROUNDING_FRACTION * max(
+        elif max(abs(slope.change), abs(slope.row_change or 0.0)) <= _UTILIZATION_ROUNDING_FRACTION * max(
             at_file.worst, at_file.row or 0.0
         ):
             unchanging.append(slope.key)
         else:
-            parts = (figure.part for figure in taken if f"{slope.key}.".startswith(f"{figure.key}."))
-            slopes.append(slope._replace(part=next(parts, "")))
+            part_names = (figure.part for figure in taken if f"{slope.key}.".startswith(f"{figure.key}."))
+            slopes.append(slope._replace(part=next(part_names, "")))
     slopes.sort(key=lambda slope: -abs(slope.even_effect))
     balanced = is_balanced(base)
     return Sensitivity(
@@ -320,7 +324,7 @@ class _Uses(NamedTuple):
     @property
     def is_passed(self) -> bool:
         """Whether another row exceeds the file's worst row, by more than rounding."""
-        return self.worst - self.of_worst > _ROUNDING_FRACTION * self.worst
+        return self.worst - self.of_worst > _UTILIZATION_ROUNDING_FRACTION * self.worst
 
 
 class _Neighbours:
@@ -381,7 +385,7 @@ class _Neighbours:
                 yield Skipped(number.number.key, number.text, f"no mission beside it: {why}")
                 continue
             ordered, weights = [here, near, far], (-1.5, 2.0, -0.5)
-            yield self._slope(number, here, kind, ordered[::side], tuple(side * one for one in weights[::side]))
+            yield self._slope(number, here, kind, ordered[::side], tuple(side * weight for weight in weights[::side]))
 
     def _slope(
         self, number: Stated, here: _Uses, kind: str, uses: Sequence[_Uses], weights: Sequence[float]
@@ -410,7 +414,7 @@ class _Neighbours:
 
 
 # ---------------------------------------------------------------- numbers of the file
-def stated_numbers(tree: dict[str, Any], nearest_m: float) -> tuple[list[Stated], list[Skipped]]:
+def stated_numbers(tree: JsonObject, nearest_m: float) -> tuple[list[Stated], list[Skipped]]:
     """All numbers of a mission file in its order, and the skipped keys; `tree` is its content as text.
 
     A position on the Earth changes by a fraction of `nearest_m`, the slant range of the nearer platform. [m]
@@ -422,7 +426,7 @@ def stated_numbers(tree: dict[str, Any], nearest_m: float) -> tuple[list[Stated]
             reader = reader.component
         if key.endswith(".covariance"):  # the elements of a matrix do not change alone
             factor = Number(key, FACTOR, 1.0, "")
-            numbers.append(Stated(factor, "its sigmas", 1.0, RELATIVE_STEP, 0.01, "1 %"))
+            numbers.append(Stated(factor, "its sigmas", 1.0, DIFFERENCE_STEP_FRACTION, 0.01, "1 %"))
         elif isinstance(reader, Quantity) and isinstance(value, str):
             stated = _stated(as_number(key, reader, value), value, nearest_m, above)
             (numbers if isinstance(stated, Stated) else skipped).append(stated)  # type: ignore[arg-type]
@@ -431,13 +435,13 @@ def stated_numbers(tree: dict[str, Any], nearest_m: float) -> tuple[list[Stated]
     return numbers, skipped
 
 
-Leaf = tuple[str, Reader, Any, Mapping[str, Any] | None]
+Leaf = tuple[str, Reader[object], Content, Mapping[str, object] | None]
 
 
-def _leaves(reader: Reader, value: Any, path: tuple[str, ...], above: Mapping[str, Any] | None) -> Iterator[Leaf]:
+def _leaves(reader: Reader[object], value: object, path: tuple[str, ...], above: JsonObject | None) -> Iterator[Leaf]:
     """Key, reader and value of every leaf of a file; for shares also the section of all shares."""
     reader = form_of(reader, value)
-    children: Sequence[tuple[str, Any]] = ()
+    children: Sequence[tuple[str, object]] = ()
     if isinstance(value, dict):
         children = list(value.items())
     elif isinstance(value, list) and isinstance(reader, ListOf | Triple):
@@ -449,14 +453,15 @@ def _leaves(reader: Reader, value: Any, path: tuple[str, ...], above: Mapping[st
         return
     for name, inner, item in below:
         if inner is not None:
-            yield from _leaves(inner, item, (*path, name), value if reader is SHARES else None)
+            shares = value if reader is SHARES and isinstance(value, dict) else None
+            yield from _leaves(inner, item, (*path, name), shares)
 
 
-def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, Any] | None) -> Stated | Skipped:
+def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, object] | None) -> Stated | Skipped:
     """A number with its step, or why it has none; `shares` are all shares of its section."""
     value = number.value or 0.0
     if number.reader is LATITUDE or number.key.endswith("longitude"):
-        step = RELATIVE_STEP * nearest_m / _EARTH_RADIUS_M
+        step = DIFFERENCE_STEP_FRACTION * nearest_m / _EARTH_RADIUS_M
         return Stated(number, text, value, step, step, f"{math.degrees(step):.2g} deg")
     if number.reader in (DIRECTION, ELEVATION):
         return Stated(number, text, value, DIRECTION_STEP, math.radians(1), "1 deg", part=math.radians(1))
@@ -464,7 +469,7 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, An
         return Stated(number, text, value, LEVEL_STEP, 1.0, "1 dB", part=math.log(10) / 10)
     if value == 0:
         return Skipped(number.key, text, "is 0: there is no part of it")
-    step = RELATIVE_STEP * value
+    step = DIFFERENCE_STEP_FRACTION * value
     further_shares: tuple[Number, ...] = ()
     if shares is not None:
         section, _, share_name = number.key.rpartition(".")
@@ -478,7 +483,7 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, An
     return Stated(number, text, value, step, 0.01 * value, "1 %", others=further_shares)
 
 
-def _no_number(key: str, reader: Reader) -> str:
+def _no_number(key: str, reader: Reader[object]) -> str:
     """Words for the content of a key without a number; empty for names and remarks, which have no effect."""
     kinds = (
         ("is a whole number", isinstance(reader, Whole | Version)),
@@ -510,7 +515,7 @@ def relaxed_errors(mission: Mission, judged: JudgedMission, today: date) -> Iter
 
 def _declared_errors(mission: Mission) -> Iterator[str]:
     """Keys of the declared errors: for each platform by kind, with figures of parts of the catalogue."""
-    sections: list[tuple[str, Any, Sequence[str], int]] = []  # key, section, its keys, and the length of a list
+    sections: list[tuple[str, object, Sequence[str], int]] = []  # key, section, its keys, and the length of a list
     for name in PLATFORMS:
         error, key = getattr(mission.platforms, name).motion_error, f"platforms.{name}.motion_error"
         sections.append((key, error, ("covariance", *MOTION, "vibration"), 0))

@@ -8,10 +8,11 @@ and back. Each step checks many values at once in the case table. Values in SI a
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from datetime import date
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -39,17 +40,42 @@ from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, Range
 from bisar_budget.workers import Progress, unseen
 
 _OF_ALL = ", or --scale for all of them"
-PLACES = 65  # samples of a range
-PLACES_OF_CIRCLE = 181  # samples of a circle, every 2 degrees: geometry changes fast near parallel gradients
-_NARROW_FRACTION = 2e-7  # of the value, between the two sides of a crossing before they are rounded
 _GOLDEN = (math.sqrt(5) - 1) / 2
-_TURN_STEPS = 20  # of a golden section, which end at 7e-5 of the distance between samples
-_MAX_TURNS = 16  # that are searched
-# Steps that a search looks ahead: usually, and if each case is read, which takes longer.
-_LOOK_AHEAD_STEPS, _LOOK_AHEAD_STEPS_OF_READING = 5, 2
+
+
+@dataclass(frozen=True)
+class SolveSettings:
+    """Tunings of the search for the borders of compliance.
+
+    Attributes
+    ----------
+    range_samples, circle_samples : int
+        Number of samples of a range, and of a circle: every 2 degrees, because geometry changes fast near parallel
+        gradients.
+    border_fraction : float
+        Distance between the two sides of a border before they are rounded, as a fraction of the value.
+    max_turns_count : int
+        Largest number of maxima and minima of the utilization that are searched.
+    turn_steps : int
+        Number of steps of a golden section, which then ends at 7e-5 of the distance between samples.
+    ahead_steps, read_ahead_steps : int
+        Number of steps that a search looks ahead: usually, and if each case is read, which takes longer.
+    """
+
+    range_samples: int = 65
+    circle_samples: int = 181
+    border_fraction: float = 2e-7
+    max_turns_count: int = 16
+    turn_steps: int = 20
+    ahead_steps: int = 5
+    read_ahead_steps: int = 2
+
+
+SOLVE_SETTINGS = SolveSettings()
 
 # A function of the known states by value; it returns its result, or the set of values whose states it needs.
-Search = Callable[[Mapping[float, "State"]], Any]
+SearchT = TypeVar("SearchT")
+Search = Callable[[Mapping[float, "State"]], SearchT | set[float]]
 
 
 class State(NamedTuple):
@@ -204,7 +230,7 @@ def solve(
         The mission cannot answer the question; the message says why.
     """
     search = _Search(mission, key, between, row, target, model, is_scale, today)
-    scanned, given = search.scanned(progress)
+    scanned, file_state = search.scanned(progress)
     borders = [(low, high) for low, high in pairwise(scanned) if low.complies != high.complies]
     crossings = search.crossings(borders)
     missions = [state for state in scanned if not state.reason]
@@ -223,7 +249,7 @@ def solve(
         low=search.range.low,
         high=search.range.high,
         is_circle=search.range.is_circle,
-        given=given,
+        given=file_state,
         crossings=crossings,
         nearest=nearest,
         is_constant=missions[0].status != "not_evaluated"
@@ -300,20 +326,24 @@ class _Search:
         self.table = Table(
             Question.of(mission, [key], model, today, row=row, breaks=self.breaks), mission, [of_table]
         )
-        self.levels = _LOOK_AHEAD_STEPS_OF_READING if self.table.to_read else _LOOK_AHEAD_STEPS
+        self.levels = SOLVE_SETTINGS.read_ahead_steps if self.table.to_read else SOLVE_SETTINGS.ahead_steps
 
     def scanned(self, progress: Progress) -> tuple[list[State], State | None]:
         """States at the samples of the range and at turns of the utilization, and the state of the file."""
-        values = self.range.places(PLACES_OF_CIRCLE if self.range.is_circle else PLACES)
+        values = self.range.places(
+            SOLVE_SETTINGS.circle_samples if self.range.is_circle else SOLVE_SETTINGS.range_samples
+        )
         value = self.number.value
         if value is not None and self.range.low < value < self.range.high:
             values = sorted({*values, value})
         states = self.states(values if value is None else [*values, value], progress)
-        given = None if value is None else states.pop()
+        file_state = None if value is None else states.pop()
         # Between samples with equal compliance it may change there and back, at a turn of the utilization.
-        searches = [partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[:_MAX_TURNS]]
+        searches = [
+            partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[: SOLVE_SETTINGS.max_turns_count]
+        ]
         turned = [state for state in self._searched(searches) if state is not None]
-        return sorted([*states, *turned], key=lambda state: state.value), given
+        return sorted([*states, *turned], key=lambda state: state.value), file_state
 
     def states(self, values: Sequence[float], progress: Progress = unseen) -> list[State]:
         """States of the mission at values."""
@@ -354,16 +384,18 @@ class _Search:
         rounded = iter(self.states([self.number.read(text) for text in texts]) if texts else ())
         return tuple(_crossing(low, high, next(rounded), next(rounded)) for low, high in narrow)
 
-    def _searched(self, searches: Sequence[Search]) -> list[Any]:
+    def _searched(self, searches: Sequence[Search[SearchT]]) -> list[SearchT]:
         """Results of searches that take their steps together."""
-        known: dict[float, State] = {}
+        states_by_value: dict[float, State] = {}
         while True:
-            results = [search(known) for search in searches]
-            needed = {value for result in results if isinstance(result, set) for value in result} - known.keys()
+            results = [search(states_by_value) for search in searches]
+            needed = {
+                value for result in results if isinstance(result, set) for value in result
+            } - states_by_value.keys()
             if not needed:
-                return results
+                return [result for result in results if not isinstance(result, set)]
             values = sorted(needed)
-            known.update(zip(values, self.states(values), strict=True))
+            states_by_value.update(zip(values, self.states(values), strict=True))
 
     def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[float, str]:
         """Texts of all values of the answer, as the file would write them."""
@@ -374,16 +406,16 @@ class _Search:
 
 
 def _bracketed(
-    low: State, high: State, least: float, levels: int, known: Mapping[float, State]
+    low: State, high: State, least: float, levels: int, states_by_value: Mapping[float, State]
 ) -> tuple[State, State] | set[float]:
     """Bisect an interval with a border until it is narrow, or return the values of the next steps."""
-    while high.value - low.value > _NARROW_FRACTION * max(abs(low.value), abs(high.value), least):
+    while high.value - low.value > SOLVE_SETTINGS.border_fraction * max(abs(low.value), abs(high.value), least):
         middle = (low.value + high.value) / 2
         if not low.value < middle < high.value:
             break
-        if middle not in known:
+        if middle not in states_by_value:
             return _ahead(_middle, low.value, high.value, levels)
-        state = known[middle]
+        state = states_by_value[middle]
         low, high = (state, high) if state.complies == low.complies else (low, state)
     return low, high
 
@@ -419,21 +451,21 @@ def _turns(states: Sequence[State]) -> list[tuple[float, float, State]]:
 
 
 def _turn(
-    low: float, high: float, here: State, levels: int, known: Mapping[float, State]
+    low: float, high: float, here: State, levels: int, states_by_value: Mapping[float, State]
 ) -> State | set[float] | None:
     """A state near a turn with another compliance, None if there is none, or the values of the next steps."""
-    for _ in range(_TURN_STEPS):
+    for _ in range(SOLVE_SETTINGS.turn_steps):
         values = _golden(low, high)
-        if not known.keys() >= set(values):
+        if not states_by_value.keys() >= set(values):
             return _ahead(_golden, low, high, levels)
-        left, right = (known[value] for value in values)
+        left, right = (states_by_value[value] for value in values)
         for state in (left, right):
             if state.complies != here.complies and not state.reason:
                 return state
         if left.utilization is None or right.utilization is None:
             return None
-        is_left = _sign(here) * left.utilization > _sign(here) * right.utilization
-        low, high = (low, right.value) if is_left else (left.value, high)
+        is_before = _sign(here) * left.utilization > _sign(here) * right.utilization
+        low, high = (low, right.value) if is_before else (left.value, high)
     return None
 
 

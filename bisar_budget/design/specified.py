@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget import units
-from bisar_budget.constants import FASTEST_FLIGHT
+from bisar_budget.arrays import Floats
+from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.spectra import PowerLawPiece, density
@@ -19,10 +20,9 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import Entry, OscillatorPart, PartError, entries, folders
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.quantities import Number, QuestionError, as_number, number_of
-from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
-DIGITS = 2  # of an ordered number
+ORDERED_DIGITS = 2  # of an ordered number
 _SILENT_DB = -400.0  # level without an error
 # Units of ordered sizes, if the file states no number: the first in which the number is at least 1.
 _ORDERED_IN: Mapping[Dimension, tuple[str, ...]] = {
@@ -36,7 +36,7 @@ _ORDERED_IN: Mapping[Dimension, tuple[str, ...]] = {
     units.ANGLE_RANDOM_WALK: ("deg/sqrt(h)",),
 }
 # First sizes of the search, in SI: small enough that effects are proportional to them.
-_TINY: Mapping[Dimension, float] = {
+_TINY_BY_DIMENSION: Mapping[Dimension, float] = {
     units.LENGTH: 1e-4,
     units.SPEED: 1e-6,
     units.ACCELERATION: 1e-8,
@@ -48,12 +48,12 @@ _TINY: Mapping[Dimension, float] = {
     units.PHASE_NOISE: 1e-10,
     units.TONE: 1e-9,
 }
-_TINY_OF_OTHER_UNITS = 1e-18
-_CURVES = ("phase_noise", "power_law", "allan_deviation", "spurs")  # forms of noise that a level shifts
+_TINY_SIZE = 1e-18
+_LEVELLED_FORMS = ("phase_noise", "power_law", "allan_deviation", "spurs")  # forms of noise that a level shifts
 _OFFSETS_HZ = (1.0, 10.0, 100.0, 1e3)  # of the remark with the phase noise of an ordered level
 _OFFSETS_PER_DECADE = 20  # at which spectra are compared
 _LEAST_CYCLES = 0.1  # per aperture, of phase noise that counts
-_ROUNDING_FACTOR = 1 + 1e-9
+_DENSITY_ROUNDING_FACTOR = 1 + 1e-9
 
 
 class Specified(NamedTuple):
@@ -81,7 +81,7 @@ class Specified(NamedTuple):
     @property
     def tiny(self) -> float:
         """A size so small that effects are proportional to it."""
-        return _TINY.get(self.number.dimension, _TINY_OF_OTHER_UNITS)
+        return _TINY_BY_DIMENSION.get(self.number.dimension, _TINY_SIZE)
 
     def numbers(self, sizes: Floats) -> Floats:
         """Numbers of the file for sizes: the sizes, or for levels the decibels of amplitudes."""
@@ -114,8 +114,8 @@ class Specified(NamedTuple):
         unit = self.unit_of(value)
         factor, divisor = self.number.dimension.scales[unit]
         number = value / factor * divisor
-        power = 10.0 ** (math.floor(math.log10(abs(number))) - DIGITS + 1) if number else 1.0
-        number = float(f"{math.floor(number / power * (1 + 1e-12)) * power:.{DIGITS}g}")
+        power = 10.0 ** (math.floor(math.log10(abs(number))) - ORDERED_DIGITS + 1) if number else 1.0
+        number = float(f"{math.floor(number / power * (1 + 1e-12)) * power:.{ORDERED_DIGITS}g}")
         text = f"{number:.12g} {unit}".rstrip()
         return parse_quantity(text, self.number.dimension), text
 
@@ -191,7 +191,7 @@ def multiplied(keys: Sequence[str]) -> tuple[str, str] | None:
             continue
         for second_key in keys:
             within = parts_of(second_key)[: len(section)] == tuple(section) and second_key != key
-            if within and (name == "spectrum_level" or parts_of(second_key)[len(section)] in _CURVES):
+            if within and (name == "spectrum_level" or parts_of(second_key)[len(section)] in _LEVELLED_FORMS):
                 return key, second_key
     return None
 
@@ -227,7 +227,7 @@ def suitable_parts(mission: Mission, specified: Specified, most: float, candidat
 
 def _is_satellite(platform: Platform) -> bool:
     """Whether a platform has an orbit, or is faster than any aircraft."""
-    return platform.orbit is not None or bool(norm(platform.state.velocity) > FASTEST_FLIGHT)
+    return platform.orbit is not None or bool(norm(platform.state.velocity) > MAX_FLIGHT_SPEED_MPS)
 
 
 def _quiet_oscillators(mission: Mission, name: str, level: float, candidates: Sequence[Entry]) -> Iterator[str]:
@@ -237,7 +237,7 @@ def _quiet_oscillators(mission: Mission, name: str, level: float, candidates: Se
     last = max(piece.high for piece in pieces)
     first = min([_LEAST_CYCLES / aperture, *(piece.low for piece in pieces if piece.low)])
     offsets = np.geomspace(first, last * (1 - 1e-9), 1 + math.ceil(_OFFSETS_PER_DECADE * math.log10(last / first)))
-    most = density(pieces, offsets) * 10 ** (level / 10) * _ROUNDING_FACTOR
+    most = density(pieces, offsets) * 10 ** (level / 10) * _DENSITY_ROUNDING_FACTOR
     for entry in candidates:
         part = entry.part
         if not isinstance(part, OscillatorPart):

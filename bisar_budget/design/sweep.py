@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from datetime import date
 from functools import cached_property, lru_cache
 from hashlib import sha256
-from typing import Any
 
 import numpy as np
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.judged_rows import IN_UNIT
-from bisar_budget.design.cases import Cases, words_of
+from bisar_budget.design.cases import Cases, Values, words_of
 from bisar_budget.design.table import (
     GEOMETRY,
     REASON,
@@ -36,11 +35,11 @@ from bisar_budget.mission.tree import read_tree
 from bisar_budget.workers import MapBlocks, in_processes
 
 _SLOW_FRACTION = 1 / 8  # of cases that are read one by one, from which processes share the cases
-_MANY = 8  # parts, from which it is worth to start processes
+_MIN_SHARED_PART_COUNT = 8  # from which it is worth to start processes
 _PART_CASES = 8192  # of a part; their arrays stay in a processor's cache
-_FEW = 64  # cases of a part if each case is read
+_READ_PART_CASES = 64  # of a part if each case is read
 
-Block = tuple[int, int, Mapping[str, Any]]  # first case, the one after the last, values of each key
+Block = tuple[int, int, Mapping[str, Values]]  # first case, the one after the last, values of each key
 
 # Fields of a row that a column may have, with descriptions.
 _FIELDS = {
@@ -59,7 +58,7 @@ _FIELDS = {
     "equal_loss_qpe_rad": "Quadratic phase of as much loss of the peak as {0} by the full model.",
     "rest_rad": "Rms phase of {0} beyond the cubic.",
 }
-_UNITS = {"rad": "rad", "db": "dB"}  # by the last word of a field's name
+_UNIT_BY_SUFFIX = {"rad": "rad", "db": "dB"}  # by the last word of a field's name
 
 
 class Asked:
@@ -149,7 +148,7 @@ class Asked:
                 )
             if row not in rows:
                 raise QuestionError(f"--column {name}: {unknown_id(row, rows, self.question.file)}")
-            unit = rows[row].unit if field in IN_UNIT else _UNITS.get(field.rpartition("_")[2], "")
+            unit = rows[row].unit if field in IN_UNIT else _UNIT_BY_SUFFIX.get(field.rpartition("_")[2], "")
             yield Column(name, unit, _FIELDS[field].format(row), is_text=is_status(name))
 
     def swept(self, parts: Iterator[Part]) -> Swept:
@@ -177,12 +176,12 @@ class Asked:
     def chunks(self) -> "Chunks":
         """Division of the cases into chunks, smaller if many cases are read one by one; a sample of cases decides."""
         cases, is_slow = self.cases, False
-        if cases.count > _FEW:
-            indices = np.linspace(0, cases.count - 1, _FEW).astype(int)
+        if cases.count > _READ_PART_CASES:
+            indices = np.linspace(0, cases.count - 1, _READ_PART_CASES).astype(int)
             sample = [cases.values(index, index + 1) for index in indices.tolist()]
             values = {varied.key: np.concatenate([each[varied.key] for each in sample]) for varied in cases.varied}
-            is_slow = self.table.reads(values) > _SLOW_FRACTION * _FEW
-        return Chunks(cases.count, _FEW if is_slow else _PART_CASES, is_slow)
+            is_slow = self.table.reads(values) > _SLOW_FRACTION * _READ_PART_CASES
+        return Chunks(cases.count, _READ_PART_CASES if is_slow else _PART_CASES, is_slow)
 
     @cached_property
     def travelling(self) -> Question:
@@ -198,7 +197,7 @@ class Asked:
         """
         stops = ((start, self.chunks.stop(start)) for start in starts)
         blocks = ((start, stop, self.cases.values(start, stop)) for start, stop in stops)
-        if mapped is None and self.chunks.is_slow and jobs > 1 and len(starts) >= _MANY:
+        if mapped is None and self.chunks.is_slow and jobs > 1 and len(starts) >= _MIN_SHARED_PART_COUNT:
             mapped = in_processes(jobs)
         if mapped is None:
             yield from (self.table.part(*block) for block in blocks)

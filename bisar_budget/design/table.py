@@ -14,11 +14,13 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bisar_budget.analysis.analysis import Analysis, by_nodes
+from bisar_budget.arrays import Booleans, Indices
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import first_highest
-from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged, statuses
+from bisar_budget.budget.judged_rows import COMPLETE_FIELDS, REQUIREMENTS, Judged, statuses
 from bisar_budget.design.cases import Values
 from bisar_budget.design.varied import is_held, is_image, scaled
 from bisar_budget.faults import MissionError, SetNumber, SetValue
@@ -31,7 +33,6 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, number_of, tree_of, with_number
 from bisar_budget.mission.stacked import picked, stacked
 from bisar_budget.mission.tree import Tree, read_tree
-from bisar_budget.ranges.exact_ranges import Indices, Truths
 from bisar_budget.workers import Progress, unseen
 
 # Numbers of cases after which progress is reported: the first ones, and then the interval.
@@ -104,7 +105,7 @@ def breaking(target: str) -> frozenset[str]:
 
 def _verdict(
     judged: JudgedMission, by_id: Mapping[str, Judged], row_id: str | None, breaks: Container[str]
-) -> dict[str, Any]:
+) -> dict[str, ArrayLike]:
     """Columns of the verdict in each case: status of the mission or of a row, and the binding row.
 
     The binding row is the judged row with the highest utilization, and the first of several rows that are equal but
@@ -146,17 +147,17 @@ def _verdict(
         for required in reversed(judged.requirements):
             unmet = np.where((required.status == status) & does_break[status], required.key, unmet)
     is_unjudged = (status == RANK["not_evaluated"]) & does_break[status]
-    is_known = has_binding & ~is_unjudged & is_numbered[binding_at]
+    is_decided = has_binding & ~is_unjudged & is_numbered[binding_at]
     return {
         "status": statuses(status),
         "worst_row": np.where(has_binding, ids, ""),
-        "utilization": np.where(is_known, uses[binding_at], math.nan),
+        "utilization": np.where(is_decided, uses[binding_at], math.nan),
         "binding_requirement": np.where(has_binding, requirement, unmet),
         "waived_by": _waived_by(judged, row_id, status == RANK["waived"]),
     }
 
 
-def _waived_by(judged: JudgedMission, row_id: str | None, is_waived: Truths) -> Values:
+def _waived_by(judged: JudgedMission, row_id: str | None, is_waived: Booleans) -> Values:
     """Ids of the waivers of waived cases (cases,), as the file writes them; empty for cases that are not waived."""
     ids = np.full(is_waived.shape, "", dtype=object)
     for waiver_id, covers in judged.covering(row_id) if is_waived.any() else ():
@@ -288,7 +289,7 @@ class Table:
         row_ids = {row for row, _ in self.fields.values()} | ({question.row} if question.row else set())
         rows = judged_mission(Analysis(self.mission), question.today).rows if row_ids else ()
         self.subjects = {row.subject.id: row.subject for row in rows if row.subject.id in row_ids}
-        self.is_complete = any(field in WHOLE for _, field in self.fields.values())
+        self.is_complete = any(field in COMPLETE_FIELDS for _, field in self.fields.values())
         # Numbers that decide more than their own value: a case with another value has to be read.
         self.to_read = {
             number.key
@@ -297,7 +298,7 @@ class Table:
             and not is_held(self.mission, number.key, is_stated=number.value is not None)
         }
 
-    def watched(self, values: Mapping[str, Any], progress: Progress = unseen) -> dict[str, Values]:
+    def watched(self, values: Mapping[str, Values], progress: Progress = unseen) -> dict[str, Values]:
         """Check cases, and report progress: early, and then seldom, because each report costs time."""
         cases = len(next(iter(values.values())))
         ends = (
@@ -309,13 +310,13 @@ class Table:
                 if end < cases
             ]
         )
-        parts = []
+        blocks = []
         for start, stop in pairwise(dict.fromkeys((0, *ends, cases))):
-            parts.append(self.part(start, stop, {key: column[start:stop] for key, column in values.items()}).values)
+            blocks.append(self.part(start, stop, {key: column[start:stop] for key, column in values.items()}).values)
             progress(stop, cases)
-        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
-    def part(self, start: int, stop: int, values: Mapping[str, Any]) -> Part:
+    def part(self, start: int, stop: int, values: Mapping[str, Values]) -> Part:
         """Check cases `start` to `stop`, with values (stop - start,)."""
         columns = self._columns(values, stop - start)
         if self.question.choices:
@@ -327,7 +328,7 @@ class Table:
             self._fill(columns)
         return Part(start, stop, columns)
 
-    def reads(self, values: Mapping[str, Any]) -> int:
+    def reads(self, values: Mapping[str, Values]) -> int:
         """Number of cases that have to be read one by one."""
         cases = len(next(iter(values.values())))
         columns = self._columns(values, cases)
@@ -339,7 +340,7 @@ class Table:
             )
         return cases - int(self._arrays(columns, cases)[0].size)
 
-    def _columns(self, values: Mapping[str, Any], cases: int) -> dict[str, Values]:
+    def _columns(self, values: Mapping[str, Values], cases: int) -> dict[str, Values]:
         """Columns of some cases: their values, and empty columns for the results."""
         columns: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
         columns |= {number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers}
@@ -349,10 +350,10 @@ class Table:
         return columns
 
     # ---------------------------------------------------------------- one mission for the same words
-    def _by_words(self, found: Mapping[str, Values]) -> Iterator[tuple["Table", Indices]]:
-        """Tables for cases with the same words, with the indices of the cases; `found` gets the errors of cases."""
+    def _by_words(self, columns: Mapping[str, Values]) -> Iterator[tuple["Table", Indices]]:
+        """Tables for cases with the same words, with the indices of the cases; `columns` gets the errors of cases."""
         indices_by_words: dict[tuple[str, ...], list[int]] = {}
-        for index, words in enumerate(zip(*(found[key].tolist() for key in self.question.choices), strict=True)):
+        for index, words in enumerate(zip(*(columns[key].tolist() for key in self.question.choices), strict=True)):
             indices_by_words.setdefault(words, []).append(index)
         for words, indices in indices_by_words.items():
             if words not in self.chosen:
@@ -362,16 +363,16 @@ class Table:
                     mission = self.variation.read(changes)
                 except MissionError:  # with the numbers of the first case that makes a mission
                     for index in indices:
-                        mission = mission or self._read(found, index)
+                        mission = mission or self._read(columns, index)
                 if mission is None:
                     continue
                 self.chosen[words] = Table(self.question._replace(changes=mission.changes, choices=()), mission)
             yield self.chosen[words], np.array(indices)
 
-    def _read(self, found: Mapping[str, Values], index: int) -> Mission | None:
-        """Read the mission of a case; None if there is none, with the reason in `found`."""
-        words = [SetValue(key, found[key][index]) for key in self.question.choices]
-        values = {number: float(found[number.key][index]) for number in self.numbers}
+    def _read(self, columns: Mapping[str, Values], index: int) -> Mission | None:
+        """Read the mission of a case; None if there is none, with the reason in `columns`."""
+        words = [SetValue(key, columns[key][index]) for key in self.question.choices]
+        values = {number: float(columns[number.key][index]) for number in self.numbers}
         changed = {
             number: value
             for number, value in values.items()
@@ -381,7 +382,7 @@ class Table:
             mission = self.variation.at(changed, words)
         except MissionError as error:
             fault = error.faults[0]
-            found["status"][index], found["reason"][index] = "error", f"{fault.key}: {fault.problem}"
+            columns["status"][index], columns["reason"][index] = "error", f"{fault.key}: {fault.problem}"
             return None
         for number, value in values.items():
             if number.reader is FACTOR:
@@ -389,38 +390,38 @@ class Table:
         return mission
 
     # ---------------------------------------------------------------- all together
-    def _fill(self, found: dict[str, Values]) -> None:
+    def _fill(self, columns: dict[str, Values]) -> None:
         """Check every case."""
-        cases = found["utilization"].size
-        indices, mission_of_arrays, geometries = self._arrays(found, cases)
+        cases = columns["utilization"].size
+        indices, mission_of_arrays, geometries = self._arrays(columns, cases)
         if indices.size:
-            self._check(found, indices, mission_of_arrays, geometries)
+            self._check(columns, indices, mission_of_arrays, geometries)
         read_indices: list[int] = []
 
         def read() -> Iterator[Mission]:
             """Missions of the remaining cases, one after the other; their indices go into `read_indices`."""
             for index in np.delete(np.arange(cases), indices).tolist():
-                mission = self._read(found, index)
+                mission = self._read(columns, index)
                 if mission is not None:
                     read_indices.append(index)
                     yield mission
 
         for mission, cases_of_shape in stacked(read()):
-            self._check(found, np.array(read_indices)[cases_of_shape], mission, mission.geometry)
+            self._check(columns, np.array(read_indices)[cases_of_shape], mission, mission.geometry)
 
-    def _arrays(self, found: Mapping[str, Values], cases: int) -> tuple[Indices, Mission, BistaticGeometry]:
+    def _arrays(self, columns: Mapping[str, Values], cases: int) -> tuple[Indices, Mission, BistaticGeometry]:
         """Indices of the cases whose numbers can become arrays, the mission with the arrays, and its geometry."""
         is_direct = np.ones(cases, dtype=bool)
         for number in self.numbers:
-            values, (gt, ge, lt, le) = found[number.key], number.reader.bounds
+            values, (gt, ge, lt, le) = columns[number.key], number.reader.bounds
             is_accepted = (values > gt) & (values >= ge) & (values < lt) & (values <= le)
             is_direct &= values == number.value if number.key in self.to_read else is_accepted
         indices, mission = np.flatnonzero(is_direct), self.mission
         for number in self.numbers:
             if number.reader is FACTOR:
-                mission = scaled(mission, number.key, found[number.key][indices])
+                mission = scaled(mission, number.key, np.asarray(columns[number.key], dtype=float)[indices])
             elif number.key not in self.to_read:
-                mission = with_number(mission, number.key, found[number.key][indices])
+                mission = with_number(mission, number.key, columns[number.key][indices])
         geometries = mission.geometry
         is_sure = is_image(mission, geometries, indices.size)
         if is_sure.all():
@@ -429,7 +430,7 @@ class Table:
         return indices[is_sure], mission, mission.geometry
 
     def _check(
-        self, found: dict[str, Values], indices: Indices, mission: Mission, geometries: BistaticGeometry
+        self, all_columns: dict[str, Values], indices: Indices, mission: Mission, geometries: BistaticGeometry
     ) -> None:
         """Judge the cases of a mission together, in groups that need equally many nodes."""
         for nodes, group, mission_of_group, geometry_of_group in by_nodes(mission, indices.size, geometries):
@@ -459,7 +460,7 @@ class Table:
                     elif is_status(name):
                         columns[name] = "not_declared"
             for name, column in columns.items():
-                found[name][indices[group]] = np.broadcast_to(column, group.shape)
+                all_columns[name][indices[group]] = np.broadcast_to(column, group.shape)
 
 
 def is_status(name: str) -> bool:

@@ -6,22 +6,23 @@ How they come into it, where they cannot, which cases then are missions, and how
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import units
+from bisar_budget.arrays import PerCase, PerCaseFlag
 from bisar_budget.effects.effect import MOTION, PLATFORMS
-from bisar_budget.geometry import STILL, BistaticGeometry, norm
+from bisar_budget.geometry import STILL_SPEED_MPS, BistaticGeometry, norm
 from bisar_budget.image_plane import MIN_SINE, spans_ground
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE
+from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE_FRACTION
 from bisar_budget.mission.instruments import MAX_FALL_DB_PER_DECADE, MAX_RISE_DB_PER_DECADE
 from bisar_budget.mission.model import (
     MISSION,
     PLACE_KEYS,
-    WHOLE,
+    SHARE_SUM_TOLERANCE_FRACTION,
     MetricSplits,
     Mission,
     Shares,
@@ -30,8 +31,8 @@ from bisar_budget.mission.model import (
     least_bandwidth,
 )
 from bisar_budget.mission.platforms import (
-    FARTHEST_BY,
-    LEAST_BASELINE,
+    MAX_TRAVEL_RATIO,
+    MIN_BASELINE_M,
     MotionError,
     Platform,
     has_body_axes,
@@ -39,11 +40,11 @@ from bisar_budget.mission.platforms import (
 )
 from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, least_elevations
 from bisar_budget.mission.quantities import QuestionError
-from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
+from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, SectionValue, Triple
 from bisar_budget.mission.vibrations import Spectrum
 
 # ---------------------------------------------------------------- keys for arrays, and cases that are missions
-SAFE = 1 + 1e-6  # factor around a limit of image formation within which a case is checked alone
+SAFETY_FACTOR = 1 + 1e-6  # around a limit of image formation within which a case is checked alone
 
 
 def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
@@ -52,32 +53,32 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
     An array cannot replace a number that decides more than its own value: a number of an orbit or a log, the position
     of the scene on the Earth, the orientation of the Earth, an element of a covariance matrix.
     """
-    section, *parts = parts_of(key)
+    section, *steps = parts_of(key)
     if section == "platforms":
-        platform: Platform = getattr(mission.platforms, parts[0])
-        if parts[1] == "motion_error":
-            return _is_held_of_error(platform.motion_error, parts[2:], is_stated)
-        if parts[1] == "oscillator":
-            if platform.oscillator is None or (parts[2] == "frequency" and platform.oscillator.sensor is not None):
+        platform: Platform = getattr(mission.platforms, steps[0])
+        if steps[1] == "motion_error":
+            return _is_held_of_error(platform.motion_error, steps[2:], is_stated)
+        if steps[1] == "oscillator":
+            if platform.oscillator is None or (steps[2] == "frequency" and platform.oscillator.sensor is not None):
                 return False  # the noise of a part holds at the part's frequency
-            return is_stated or parts[2] in ("frequency", "bandwidth", "level")
-        return not flies_on_earth(mission) and _is_held_of_path(platform, parts[1], is_stated)
+            return is_stated or steps[2] in ("frequency", "bandwidth", "level")
+        return not flies_on_earth(mission) and _is_held_of_path(platform, steps[1], is_stated)
     if section == "earth_orientation":
         return False
-    if key == "collection.aperture_time" or (section == "scene" and parts[0] in PLACE_KEYS):
+    if key == "collection.aperture_time" or (section == "scene" and steps[0] in PLACE_KEYS):
         return not flies_on_earth(mission)
     return is_stated or section in _FREE or key in _FREE
 
 
-def _is_held_of_error(error: MotionError, parts: Sequence[str], is_stated: bool) -> bool:
+def _is_held_of_error(error: MotionError, steps: Sequence[str], is_stated: bool) -> bool:
     """Whether an array can replace a number of a motion error."""
-    if parts[0] in MOTION:
-        return parts[0] == "acceleration" or error.covariance is None  # a covariance replaces position and velocity
-    if parts[0] == "covariance" and error.covariance is not None:
+    if steps[0] in MOTION:
+        return steps[0] == "acceleration" or error.covariance is None  # a covariance replaces position and velocity
+    if steps[0] == "covariance" and error.covariance is not None:
         return is_stated and not error.covariance.is_matrix  # an element of a matrix has a twin
-    if parts == ["vibration", "spectrum_level"]:
+    if steps == ["vibration", "spectrum_level"]:
         return error.vibration.spectrum is not None  # the level shifts the spectrum
-    return is_stated or parts[0] == "imu" or tuple(parts) in (("time_tag",), ("lever_arm", "uncertainty"))
+    return is_stated or steps[0] == "imu" or tuple(steps) in (("time_tag",), ("lever_arm", "uncertainty"))
 
 
 def _is_held_of_path(platform: Platform, name: str, is_stated: bool) -> bool:
@@ -102,30 +103,32 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
     """
     is_safe = _has_possible_figures(mission, cases)
     half = np.asarray(mission.collection.aperture_time) / 2
-    still: Any = True
+    still: PerCaseFlag = True
     for name, paths in zip(PLATFORMS, geometries.both, strict=True):
         platform = getattr(mission.platforms, name)
-        is_safe &= (paths.slant_range > SAFE) & (np.asarray(paths.position[2]) - paths.sinks(half) >= 0)
-        is_safe &= paths.has_frame(platform.motion_error.frame, SAFE)
+        is_safe &= (paths.slant_range > SAFETY_FACTOR) & (np.asarray(paths.position[2]) - paths.sinks(half) >= 0)
+        is_safe &= paths.has_frame(platform.motion_error.frame, SAFETY_FACTOR)
         if mission.common_motion_error is not None:
-            is_safe &= paths.has_frame(mission.common_motion_error.frame, SAFE)
+            is_safe &= paths.has_frame(mission.common_motion_error.frame, SAFETY_FACTOR)
         if platform.motion_error.lever_arm is not None:
-            is_safe &= has_body_axes(paths, np.broadcast_to(half, (cases,)), SAFE)
-        still = still & (norm(paths.velocity) < STILL * SAFE)
+            is_safe &= has_body_axes(paths, np.broadcast_to(half, (cases,)), SAFETY_FACTOR)
+        still = still & (norm(paths.velocity) < STILL_SPEED_MPS * SAFETY_FACTOR)
         if np.ndim(platform.speed):
             is_safe &= np.asarray(platform.speed) != 0
     is_safe &= ~np.asarray(still)
     turns, sine = spans_ground(geometries, mission.radar, 2 * half, cases)
-    is_safe &= turns & (sine >= SAFE * MIN_SINE)
+    is_safe &= turns & (sine >= SAFETY_FACTOR * MIN_SINE)
     if mission.propagation is not None:
         legs = dict(zip(PLATFORMS, geometries.both, strict=True))
         for _, _, degrees in least_elevations(mission.propagation, legs, mission.collection.aperture_time):
-            is_safe &= degrees > LEAST_ELEVATION_DEG * SAFE
+            is_safe &= degrees > LEAST_ELEVATION_DEG * SAFETY_FACTOR
     if mission.has_direct_path:
         halves = np.broadcast_to(half, (cases,))
-        least = np.maximum(LEAST_BASELINE, geometries.apart.travelled(halves) / FARTHEST_BY)
-        is_safe &= least_baseline(geometries.apart, halves) > SAFE * least
-    return is_safe & (np.asarray(mission.radar.bandwidth) * SAFE < 2 * np.asarray(mission.radar.center_frequency))
+        least = np.maximum(MIN_BASELINE_M, geometries.apart.travelled(halves) / MAX_TRAVEL_RATIO)
+        is_safe &= least_baseline(geometries.apart, halves) > SAFETY_FACTOR * least
+    return is_safe & (
+        np.asarray(mission.radar.bandwidth) * SAFETY_FACTOR < 2 * np.asarray(mission.radar.center_frequency)
+    )
 
 
 def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
@@ -133,26 +136,29 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
     is_safe = np.ones(cases, dtype=bool)
     sync = mission.synchronization
     if sync is not None and sync.is_holdover:
-        is_safe &= np.asarray(sync.age) > SAFE * least_age(sync.averaging, mission.collection.aperture_time)
+        averaging = 0.0 if sync.averaging is None else sync.averaging
+        is_safe &= np.asarray(sync.age) > SAFETY_FACTOR * least_age(averaging, mission.collection.aperture_time)
     split = mission.allocation.split
     for shares in split if isinstance(split, MetricSplits) else (split,):
         if isinstance(shares, Shares):
             total = sum(0.0 if share is None else share for share in shares)
-            is_safe &= np.abs(np.asarray(total) - 1) * SAFE < WHOLE
+            is_safe &= np.abs(np.asarray(total) - 1) * SAFETY_FACTOR < SHARE_SUM_TOLERANCE_FRACTION
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         if platform.oscillator is not None:
             if platform.oscillator.bandwidth is not None:
                 least = least_bandwidth(np.asarray(mission.collection.aperture_time))
-                is_safe &= np.asarray(platform.oscillator.bandwidth) > SAFE * least
+                is_safe &= np.asarray(platform.oscillator.bandwidth) > SAFETY_FACTOR * least
             for (f, level), (g, next_level) in pairwise(platform.oscillator.phase_noise or ()):
                 slope = (np.asarray(next_level) - level) / math.log10(g / f)
-                is_safe &= (slope * SAFE > -MAX_FALL_DB_PER_DECADE) & (slope * SAFE < MAX_RISE_DB_PER_DECADE)
+                is_safe &= (slope * SAFETY_FACTOR > -MAX_FALL_DB_PER_DECADE) & (
+                    slope * SAFETY_FACTOR < MAX_RISE_DB_PER_DECADE
+                )
         covariance = platform.motion_error.covariance
         if covariance is not None:
             rows = [[np.broadcast_to(rho, (cases,)) for rho in row] for row in covariance.correlation]
             least = np.linalg.eigvalsh(np.array(rows).transpose(2, 0, 1)).min(axis=1)
-            is_safe &= least > -EIGENVALUE_TOLERANCE / 2
+            is_safe &= least > -EIGENVALUE_TOLERANCE_FRACTION / 2
     return is_safe
 
 
@@ -161,14 +167,14 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
 _UNSCALED_DIMENSIONS = (units.FREQUENCY, units.TIME, units.RATIO, units.MEMORY)
 # Exceptions by key: a time and a ratio that are errors, and a length that is no error.
 _OF_ERRORS, _MEASURES = ("time_tag", "accelerometer_scale_factor"), ("arm",)
-_ERRORS = ("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors")
-_ACCEPTED = (
+_ERROR_SECTIONS = ("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors")
+_ACCEPTED_KEYS = (
     "accepted: platforms.transmitter.motion_error, platforms.receiver.motion_error, common_motion_error, "
     "timing_error, propagation, other_errors, or a key below one of them"
 )
 
 
-def scaled(mission: Mission, key: str, factor: Any) -> Mission:
+def scaled(mission: Mission, key: str, factor: PerCase) -> Mission:
     """The mission with every error below a key multiplied: amplitudes and sigmas, also of parts of the catalogue.
 
     Frequencies, correlation times and correlations stay. The factor may be an array (cases,).
@@ -178,24 +184,26 @@ def scaled(mission: Mission, key: str, factor: Any) -> Mission:
     QuestionError
         The key has no errors, or the mission states none below it.
     """
-    parts = parts_of(key)
-    if not any(part in _ERRORS for part in parts[:3]):
-        raise QuestionError(f"{key}: holds no errors that --scale could multiply; {_ACCEPTED}")
-    changed, count = _below(mission, MISSION, parts, factor, key)
+    steps = parts_of(key)
+    if not any(step in _ERROR_SECTIONS for step in steps[:3]):
+        raise QuestionError(f"{key}: holds no errors that --scale could multiply; {_ACCEPTED_KEYS}")
+    changed, count = _below(mission, MISSION, steps, factor, key)
     if not count:
         raise QuestionError(f"{key}: the mission states no error there that --scale could multiply")
     return cast(Mission, changed)
 
 
-def _below(value: Any, reader: Reader, parts: Sequence[str], factor: Any, key: str) -> tuple[Any, int]:
+def _below(
+    value: SectionValue, reader: Reader[object], steps: Sequence[str], factor: PerCase, key: str
+) -> tuple[SectionValue, int]:
     """A value with the errors at a path below it scaled, and the number of errors that are not zero."""
-    if not parts:
+    if not steps:
         name = parts_of(key)[-1]
         if name in _MEASURES:
             return value, 0
         is_clock = parts_of(key)[0] == "timing_error" or name in _OF_ERRORS
         return _scaled(value, reader, factor, is_clock=is_clock)
-    child, *remaining = parts
+    child, *remaining = steps
     reader = _form(reader, value)
     if isinstance(reader, Section) and child in reader.keys and value is not None:
         inner, count = _below(getattr(value, child), reader.keys[child].reader, remaining, factor, key)
@@ -204,10 +212,10 @@ def _below(value: Any, reader: Reader, parts: Sequence[str], factor: Any, key: s
         below = reader.section if isinstance(reader, ListOf) else reader.component
         inner, count = _below(value[int(child)], below, remaining, factor, key)
         return (*value[: int(child)], inner, *value[int(child) + 1 :]), count
-    raise QuestionError(f"{key}: the mission has no {child}; {_ACCEPTED}")
+    raise QuestionError(f"{key}: the mission has no {child}; {_ACCEPTED_KEYS}")
 
 
-def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[Any, int]:
+def _scaled(value: SectionValue, reader: Reader[object], factor: PerCase, is_clock: bool) -> tuple[SectionValue, int]:
     """A value with all errors below it scaled, and the number of errors that are not zero."""
     reader = _form(reader, value)
     if value is None:
@@ -237,7 +245,7 @@ def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[An
     return value, 0
 
 
-def _form(reader: Reader, value: Any) -> Reader:
+def _form(reader: Reader[object], value: object) -> Reader[object]:
     """The form of a reader that read a value."""
     if isinstance(reader, OneOf):
         kind = Triple if isinstance(value, tuple) and not hasattr(value, "_fields") else Quantity

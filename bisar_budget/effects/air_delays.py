@@ -16,11 +16,11 @@ the parts of such a process along the line of sight of mid-aperture. The full mo
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
-from bisar_budget.constants import EARTH_RADIUS
+from bisar_budget.arrays import Floats, PerCase
+from bisar_budget.constants import EARTH_RADIUS_M
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases, factor
@@ -29,22 +29,21 @@ from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vectors, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.propagation import (
-    ABOVE_THE_AIR,
+    AIR_TOP_M,
     DELAYS,
     LEAST_ELEVATION_DEG,
     elevation_deg,
     height_of,
 )
-from bisar_budget.ranges.exact_ranges import Floats
 
 ELECTRON_DELAY_M3_PER_S2 = 40.308  # m³/s²: e²/(8π²ε₀mₑ); the group delay of 1/m² is this over f² (CODATA 2018)
 TROPOSPHERE_HEIGHT_M = 7e3  # m, height of a thin shell in place of a spherical troposphere
 IONOSPHERE_HEIGHT_M = 350e3  # m, height of the shell of free electrons, unless the platform is lower
 DELAY, CONTENT = DELAYS
-UNITS = dict(zip(DELAYS, ("m", "1/m^2"), strict=True))
+DELAY_UNITS = dict(zip(DELAYS, ("m", "1/m^2"), strict=True))
 
 
-def obliquity(position: Vectors, shell: Any) -> Any:
+def obliquity(position: Vectors, shell: PerCase) -> PerCase:
     """Length of a leg through a thin shell of the air over the length at the zenith, exact for a sphere.
 
     Parameters
@@ -56,17 +55,17 @@ def obliquity(position: Vectors, shell: Any) -> Any:
     """
     x, y, _ = position
     level = np.square(np.hypot(x, y) / norm(position))  # cos² of the elevation
-    return 1 / np.sqrt(1 - level / np.square(1 + np.asarray(shell) / EARTH_RADIUS))
+    return 1 / np.sqrt(1 - level / np.square(1 + np.asarray(shell) / EARTH_RADIUS_M))
 
 
-def leg_factor(delay: str, position: Vectors, middle: Vectors) -> Any:
+def leg_factor(delay: str, position: Vectors, middle: Vectors) -> PerCase:
     """Delay of a leg over the zenith delay, for positions (…) of a platform that is at `middle` at mid-aperture.
 
     A platform within the air has a flat Earth below it, and no free electrons on its leg. A leg along the ground, for
     which the file may not state a delay, has factor 0.
     """
     height = np.asarray(height_of(middle))
-    is_above = height >= ABOVE_THE_AIR
+    is_above = height >= AIR_TOP_M
     if delay == DELAY:
         is_low = elevation_deg(middle) < LEAST_ELEVATION_DEG
         with np.errstate(divide="ignore"):
@@ -74,22 +73,22 @@ def leg_factor(delay: str, position: Vectors, middle: Vectors) -> Any:
     return np.where(is_above, obliquity(position, np.minimum(IONOSPHERE_HEIGHT_M, np.maximum(height, 0.0))), 0.0)
 
 
-def metres_per_unit(mission: Mission, delay: str) -> Any:
+def metres_per_unit(mission: Mission, delay: str) -> PerCase:
     """Group delay at the zenith by a unit of a figure, at the centre frequency. [m/unit]"""
     return 1.0 if delay == DELAY else ELECTRON_DELAY_M3_PER_S2 / np.square(mission.radar.center_frequency)
 
 
-def group_delay(mission: Mission, path: PlatformState, delay: str, times: Any) -> Any:
+def group_delay(mission: Mission, path: PlatformState, delay: str, times: PerCase) -> PerCase:
     """Group delay of the leg of a platform by a unit of a figure, at slow times. [m/unit]"""
     return metres_per_unit(mission, delay) * leg_factor(delay, path.place(times), path.position)
 
 
-def seen_course(group: Any, mean: Any, delay: str) -> Any:
+def seen_course(group: Floats, mean: Floats, delay: str) -> Floats:
     """Range error that an image shows by a group delay whose constant part is `mean`. [m]"""
     return group if delay == DELAY else 2 * mean - group
 
 
-def group_at_nodes(delay: str, track: Vectors, middle: Vectors, scale: Any) -> Floats:
+def group_at_nodes(delay: str, track: Vectors, middle: Vectors, scale: PerCase) -> Floats:
     """Group delay of the leg to a track by a constant zenith delay of `scale` m/unit, (nodes, cases).
 
     Parameters
@@ -106,7 +105,7 @@ def group_at_nodes(delay: str, track: Vectors, middle: Vectors, scale: Any) -> F
     return np.asarray(scale * leg_factor(delay, track, middle) + np.zeros_like(track[0]))
 
 
-def dispersion_per_unit(mission: Mission, path: PlatformState) -> Any:
+def dispersion_per_unit(mission: Mission, path: PlatformState) -> PerCase:
     """Quadratic phase at the edges of the band by a unit of electron content at the zenith. [rad/unit]
 
     The phase exp(2πi·K/(c·f)), K = g·f₀², has the second order (2π/λ)·g·(B/2f₀)² in f − f₀.
@@ -116,13 +115,13 @@ def dispersion_per_unit(mission: Mission, path: PlatformState) -> Any:
     return 2 * math.pi / np.asarray(radar.wavelength) * g * (radar.bandwidth / radar.center_frequency / 2) ** 2
 
 
-def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, Any]:
+def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, PerCase]:
     """Quadratic phase at the edges of the band by the declared electron content of each leg. [rad]
 
     The phases include the coverage factor. Legs without a declared content are left out.
     """
     propagation, factor = mission.propagation, mission.allocation.coverage_factor
-    phases: dict[str, Any] = {}
+    phases: dict[str, PerCase] = {}
     for name, path in zip(PLATFORMS, geometry.both, strict=True):
         content = None if propagation is None else propagation.content(name)
         if content is not None:
@@ -130,7 +129,7 @@ def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, An
     return phases
 
 
-def dispersed(mission: Mission, geometry: BistaticGeometry) -> Any:
+def dispersed(mission: Mission, geometry: BistaticGeometry) -> PerCase:
     """Quadratic phase at the edges of the band by both legs. One air adds the phases; two airs combine them. [rad]"""
     legs = list(dispersed_legs(mission, geometry).values())
     is_one_air = mission.propagation is not None and mission.propagation.is_one_air
@@ -190,7 +189,7 @@ def _delay_error(
         published, full = _changing(seen, delay, moving, at_mid_aperture[0], correlation_time)
     return RandomError(
         subject=subject(owner, "propagation", delay),
-        unit=UNITS[delay],
+        unit=DELAY_UNITS[delay],
         declared=None if value is None else value * seen.factor,
         path=("propagation", delay) if propagation is None else propagation.path(name, delay),
         published=published,
@@ -200,14 +199,14 @@ def _delay_error(
     )
 
 
-def correlation_time_of(mission: Mission, owner: str) -> Any:
+def correlation_time_of(mission: Mission, owner: str) -> PerCase | None:
     """Time in which the delays of a leg, or of one air over both, change; None if they are constant. [s]"""
     leg = None if mission.propagation is None else mission.propagation.leg(legs_of(owner)[0])
     return None if leg is None else leg.correlation_time
 
 
 def _changing(
-    seen: SensorCases, delay: str, group: Floats, at_mid_aperture: Floats, correlation_time: Any
+    seen: SensorCases, delay: str, group: Floats, at_mid_aperture: Floats, correlation_time: PerCase
 ) -> tuple[RandomEffect, RandomEffect]:
     """Effects by both models of a unit that changes, for group delays of a leg that turns and held. [m/unit]"""
     k, half = seen.exact.k, seen.exact.half

@@ -9,21 +9,23 @@ Phases and displacements are arrays over cases, (cases,). For one case they may 
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget import phrases
+from bisar_budget.arrays import Floats, Indices, PerCase
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import Floats
 
-Phases = Sequence[tuple[str, Any]]  # by row id, signed [rad]
-Moves = Sequence[tuple[str, tuple[Any, Any]]]  # by row id, east and north [m]
+Phases = Sequence[tuple[str, PerCase]]  # by row id, signed [rad]
+Moves = Sequence[tuple[str, tuple[PerCase, PerCase]]]  # by row id, east and north [m]
+
+
+Size = TypeVar("Size")  # of an error: a phase, or a displacement
 
 
 class Correlated(NamedTuple):
@@ -31,25 +33,28 @@ class Correlated(NamedTuple):
 
     platform: str
     ids: tuple[str, ...]
-    correlation: Sequence[Sequence[Any]]
+    correlation: Sequence[Sequence[PerCase]]
 
     @property
     def id(self) -> str:
         """Name of the six errors together."""
         return f"{self.platform}.covariance"
 
-    def of(self, cases: NDArray[Any]) -> "Correlated":
+    def of(self, cases: Indices) -> "Correlated":
         """The same covariance in some of the cases."""
-        rows = [[rho[cases] if np.ndim(rho) else rho for rho in row] for row in self.correlation]
+        rows = [
+            [rho[cases] if isinstance(rho, np.ndarray) and rho.ndim else rho for rho in row]
+            for row in self.correlation
+        ]
         return self._replace(correlation=rows)
 
-    def phase(self, phases: Sequence[Any] | Floats) -> Any:
+    def phase(self, phases: Sequence[PerCase] | Floats) -> PerCase:
         """√(gᵀCg) of the six phases gᵢσᵢ; infinite if any phase is infinite. [rad]"""
         with np.errstate(invalid="ignore"):
             size = np.sqrt(squared(self.correlation, phases))
         return np.where(np.isnan(size), math.inf, size)[()]
 
-    def displacement(self, moves: Sequence[tuple[Any, Any]]) -> tuple[Any, Any]:
+    def displacement(self, moves: Sequence[tuple[PerCase, PerCase]]) -> tuple[PerCase, PerCase]:
         """The rms length of the displacement, the root of its covariance's trace, and 0: it has no direction. [m]"""
         length = np.sqrt(sum(squared(self.correlation, along) for along in zip(*moves, strict=True)))
         return length, 0.0 * length
@@ -70,29 +75,36 @@ def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
     return tuple(groups)
 
 
-def squared(correlation: Sequence[Sequence[Any]], parts: Sequence[Any] | Floats) -> Any:
+def squared(correlation: Sequence[Sequence[PerCase]], parts: Sequence[PerCase] | Floats) -> PerCase:
     """Square of the sum of correlated parts, Σ ρᵢⱼvᵢvⱼ; a negative rounding error becomes zero."""
     values = np.array(np.broadcast_arrays(*parts))
     if any(np.ndim(rho) for row in correlation for rho in row):  # the correlations differ between cases
-        correlation = [np.broadcast_arrays(*row, values[0])[:-1] for row in correlation]
-        return np.maximum(0.0, np.einsum("ijc,ic,jc->c", correlation, values, values))
-    return np.maximum(0.0, np.einsum("ij,i...,j...->...", correlation, values, values))
+        of_cases = np.array([np.broadcast_arrays(*row, values[0])[:-1] for row in correlation])
+        square: PerCase = np.maximum(0.0, np.einsum("ijc,ic,jc->c", of_cases, values, values))
+    else:
+        square = np.maximum(0.0, np.einsum("ij,i...,j...->...", np.array(correlation), values, values))
+    return square
 
 
 # ---------------------------------------------------------------------- terms of a combination
-def phase_parts(phases: Phases, rule: str, groups: Sequence[Correlated]) -> list[tuple[str, Any]]:
+def phase_parts(phases: Phases, rule: str, groups: Sequence[Correlated]) -> list[tuple[str, PerCase]]:
     """List the phases to combine. Under `rss` the six errors of a covariance are one part, else six. [rad]"""
     return _parts(phases, rule, groups, Correlated.phase)
 
 
-def displacement_parts(moves: Moves, rule: str, groups: Sequence[Correlated]) -> list[tuple[str, Any]]:
+def displacement_parts(
+    moves: Moves, rule: str, groups: Sequence[Correlated]
+) -> list[tuple[str, tuple[PerCase, PerCase]]]:
     """List the displacements to combine: id, and (east, north). A covariance counts as in `phase_parts`. [m]"""
     return _parts(moves, rule, groups, Correlated.displacement)
 
 
 def _parts(
-    named_sizes: Sequence[tuple[str, Any]], rule: str, groups: Sequence[Correlated], combine: Callable[..., Any]
-) -> list[tuple[str, Any]]:
+    named_sizes: Sequence[tuple[str, Size]],
+    rule: str,
+    groups: Sequence[Correlated],
+    combine: Callable[[Correlated, list[Size]], Size],
+) -> list[tuple[str, Size]]:
     if rule != "rss" or not groups:  # few missions have a covariance
         return list(named_sizes)
     singles, combined_parts = dict(named_sizes), []
@@ -103,12 +115,12 @@ def _parts(
 
 
 # ---------------------------------------------------------------------- combined sizes
-def combined_phase(phases: Phases, rule: str, groups: Sequence[Correlated] = ()) -> Any:
+def combined_phase(phases: Phases, rule: str, groups: Sequence[Correlated] = ()) -> PerCase:
     """Combine the phases of errors by a rule, the phases of a covariance with their correlations. [rad]"""
     return combined([phase for _, phase in phase_parts(phases, rule, groups)], rule)
 
 
-def combined_displacement(moves: Moves, rule: str, groups: Sequence[Correlated] = ()) -> Any:
+def combined_displacement(moves: Moves, rule: str, groups: Sequence[Correlated] = ()) -> PerCase:
     """Combine displacements by a rule: the longest of all signs for `sum`, the rms of a covariance for `rss`. [m]"""
     vectors = np.array([move for _, move in displacement_parts(moves, rule, groups)])
     if not vectors.size:
@@ -116,17 +128,22 @@ def combined_displacement(moves: Moves, rule: str, groups: Sequence[Correlated] 
     return largest_signed_sum(vectors) if rule == "sum" else combined(np.hypot(vectors[:, 0], vectors[:, 1]), rule)
 
 
-def combined(sizes: Any, rule: str) -> Any:
+def combined(sizes: Sequence[PerCase] | Floats, rule: str) -> PerCase:
     """Combine phases or lengths, (n, ...): `each` is the largest, `sum` the worst case, `rss` the root-sum-square."""
     if not len(sizes):
         return 0.0
-    sizes = np.abs(np.array(sizes))
+    magnitudes: Floats = np.abs(np.array(sizes))
+    total: PerCase
     if rule == "each":
-        return sizes.max(axis=0)
-    return sizes.sum(axis=0) if rule == "sum" else np.sqrt((sizes**2).sum(axis=0))
+        total = magnitudes.max(axis=0)
+    elif rule == "sum":
+        total = magnitudes.sum(axis=0)
+    else:
+        total = np.sqrt((magnitudes**2).sum(axis=0))
+    return total
 
 
-def largest_signed_sum(vectors: Floats) -> Any:
+def largest_signed_sum(vectors: Floats) -> PerCase:
     """Length of the longest of the sums ±v₁ ± v₂ … of plane vectors (n, 2, ...), exactly.
 
     All sums lie in a polygon with two sides along each vector, and the longest sum is one of its corners. With every
@@ -139,7 +156,8 @@ def largest_signed_sum(vectors: Floats) -> Any:
     order = np.argsort(np.arctan2(y, x), axis=0)
     x, y = np.take_along_axis(x, order, axis=0), np.take_along_axis(y, order, axis=0)
     corners_x, corners_y = (component.sum(axis=0) - 2 * np.cumsum(component, axis=0) for component in (x, y))
-    return np.hypot(corners_x, corners_y).max(axis=0, initial=0.0)
+    longest: PerCase = np.hypot(corners_x, corners_y).max(axis=0, initial=0.0)
+    return longest
 
 
 # ---------------------------------------------------------------------- notes

@@ -11,17 +11,19 @@ cases, each error is a block, so that the arrays at work stay in a processor's c
 
 import math
 import weakref
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase, PerCaseFlag
+from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT_RATIO
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, plain
 from bisar_budget.effects.sources import ErrorListing
-from bisar_budget.geometry import BistaticGeometry, GroundVector, angle_between_lines, norm
+from bisar_budget.geometry import BistaticGeometry, GroundVector, Vectors, angle_between_lines, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges import point_paths
@@ -30,18 +32,15 @@ from bisar_budget.ranges.exact_ranges import (
     Effect,
     ExactEffect,
     ExactRanges,
-    Floats,
     FullEffect,
-    Indices,
     Lanes,
     TimeTags,
-    Truths,
 )
 from bisar_budget.ranges.limit_search import LimitSearches, find_first_sizes
 from bisar_budget.ranges.point_paths import ROWS, PointPaths, tries_several_sizes
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
-HELD = (QUADRATIC, CUBIC, LOCATION)  # requirements that limit an error
+LIMITING_REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION)  # requirements that limit an error
 END_OF_IMAGE = "end_of_image"  # no requirement: no ground point has the range history of a larger error
 MODELS = ("published", "full")
 OTHER_MODEL = {"published": "full", "full": "published"}
@@ -74,18 +73,20 @@ class Declared(NamedTuple):
     hidden: Any = 0.0
     rest: Any = 0.0
 
-    def judged(self, gain: Any) -> Any:
+    def judged(self, gain: PerCase) -> PerCase:
         """Magnitude of the phase that counts against a limit raised by the gain of autofocus. [rad]
 
         Autofocus corrects the quadratic phase and no hidden phase: √(φ² − φ₂² + (φ₂/gain)²)·gain, with φ the phase of
         equal loss and φ₂ the quadratic phase.
         """
-        return np.hypot(self.qpe, gain * self.hidden)
+        phase: PerCase = np.hypot(self.qpe, gain * self.hidden)
+        return phase
 
     @property
-    def equal_loss(self) -> Any:
+    def equal_loss(self) -> PerCase:
         """Quadratic phase with the same loss of the peak as quadratic and hidden phase together. [rad]"""
-        return np.hypot(self.qpe, self.hidden)
+        phase: PerCase = np.hypot(self.qpe, self.hidden)
+        return phase
 
     @property
     def farthest(self) -> Any:
@@ -97,7 +98,7 @@ class Declared(NamedTuple):
         east, north = (np.where(is_ahead, a, -b) for a, b in ((x, u), (y, v)))
         return np.where(is_gone, math.nan, east), np.where(is_gone, math.nan, north)
 
-    def of(self, errors: Any) -> "Declared":
+    def of(self, errors: int | Indices | slice) -> "Declared":
         """The effects of some of the errors."""
         (x, y), (u, v) = self.displacement, self.opposite
         phases = self.qpe[errors], self.cubic[errors]
@@ -114,7 +115,7 @@ class Declared(NamedTuple):
         return Declared(qpe, cubic, moved, opposite, hidden, beyond_cubic)
 
 
-def point(displacement: tuple[Any, Any], case: int = 0) -> GroundVector | None:
+def point(displacement: tuple[PerCase, PerCase], case: int = 0) -> GroundVector | None:
     """A ground point in one case; None where no point exists. [m]"""
     east, north = (plain(component, case) for component in displacement)
     return None if math.isnan(east) else (east, north)
@@ -123,23 +124,23 @@ def point(displacement: tuple[Any, Any], case: int = 0) -> GroundVector | None:
 class Allowed(NamedTuple):
     """Allowable sizes of errors by one model, for all requirements and for the quadratic phase alone; NaN: no limit.
 
-    `binding` is the index in `HELD` of the requirement that sets the smallest size, `len(HELD)` where the image ends
-    at that size, and -1 where no limit exists.
+    `binding` is the index in `LIMITING_REQUIREMENTS` of the requirement that sets the smallest size, their number
+    where the image ends at that size, and -1 where no limit exists.
     """
 
     smallest: Floats
     quadratic: Floats
-    binding: Any
+    binding: NDArray[np.int8]
 
 
 class ImagePlane(NamedTuple):
     """Q⁻¹ of each case: takes constant and linear range error to the displacement of the image."""
 
-    adjugate: tuple[Any, Any]
-    determinant: Any
-    is_singular: Any = False
+    adjugate: tuple[tuple[PerCase, ...], tuple[PerCase, ...]]
+    determinant: PerCase
+    is_singular: PerCaseFlag = False
 
-    def displacement(self, effect: Effect, size: Any) -> tuple[Floats, Floats]:
+    def displacement(self, effect: Effect, size: PerCase) -> tuple[PerCase, PerCase]:
         """Displacement on the ground by (25), with the Q of a model; NaN where Q has no inverse. [m]"""
         (a, b), (c, d) = self.adjugate
         scale = size / np.where(self.is_singular, math.nan, self.determinant)
@@ -150,29 +151,33 @@ class ImagePlane(NamedTuple):
         )
 
 
-def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, Any]:
+# The evaluators take and give numbers, or arrays of cases.
+_published_ground_inverse: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.published_ground_inverse
+
+
+def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, PerCase]:
     """Invert Q with the range held constant, (19) and (30); and the angle between its gradients. [deg]
 
     This Q can be singular where the true gradients are not: its second row is v/R, the true second row is v⊥/R. It
     also has no inverse where the look vectors all but cancel on the ground; it knows only the look vectors of
     mid-aperture.
     """
-    ground: list[Any] = []
+    ground: list[PerCase] = []
     for path in geometry.both:
         ground += [*path.position[:2], *path.velocity[:2], path.slant_range]
-    first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
+    first, second, (determinant,) = _published_ground_inverse(*ground)
     # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
     degrees = np.degrees(angle_between_lines((-second[1], first[1]), (second[0], -first[0])))
-    is_short = np.hypot(second[0], second[1]) < MIN_GROUND_GRADIENT
+    is_short = np.hypot(second[0], second[1]) < MIN_GROUND_GRADIENT_RATIO
     return ImagePlane((first, second), determinant, is_short | (degrees < MIN_GRADIENT_ANGLE_DEG)), degrees
 
 
 class OwnPlane(NamedTuple):
     """Displacement by effects that hold their own displacement, as the effects of the full model do."""
 
-    is_singular: Any = False
+    is_singular: PerCaseFlag = False
 
-    def displacement(self, effect: FullEffect, size: Any) -> tuple[Floats, Floats]:
+    def displacement(self, effect: FullEffect, size: PerCase) -> tuple[PerCase, PerCase]:
         """Displacement on the ground, east and north. [m]"""
         return effect.east * size + 0.0, effect.north * size + 0.0
 
@@ -233,11 +238,13 @@ class ErrorBlock:
 
     def left_per_unit(self, indices: Sequence[int]) -> Floats:
         """Range error at the nodes that a small unit of some errors leaves, (errors, nodes, cases). [m]"""
-        table, full, sources = self.table, self.effects["full"], [self.sources[index] for index in indices]
+        full = self.effects["full"]
         if self.cases == 1:
-            range_error = self.exact.range_error(table.lanes(*sources)).T[..., None]
+            lanes = self.paths.lanes.of(self._lane[indices, 0])
+            range_error = self.exact.range_error(lanes).T[..., None]
         else:
-            range_error = np.stack([self.exact.range_error(table.lanes(source)) for source in sources])
+            sources = [self.sources[index] for index in indices]
+            range_error = np.stack([self.exact.range_error(self.table.lanes(source)) for source in sources])
         return self.exact.left_of_small(range_error, (full.east[indices], full.north[indices]))
 
     def adds(self, size: Floats) -> Floats:
@@ -258,7 +265,7 @@ class ErrorBlock:
         remaining_m = np.abs(size) * remaining_rad / exact.k + bent
         return np.asarray(turns * remaining_m * (1 + exact.band) / exact.matrix.least)
 
-    def _bent(self, size: Floats) -> Any:
+    def _bent(self, size: Floats) -> PerCase:
         """Distance by which errors take platforms from where small errors take them, (errors, cases). [m]
 
         Only a time tag is not proportional to its size. Where the direct path is the clock, each metre counts twice.
@@ -293,7 +300,7 @@ class ErrorBlock:
                     growth[index] = np.maximum(of_ranges, shift[index] ** 2 / apart) / 2
         return np.asarray(growth + bent)
 
-    def is_large(self, size: Floats) -> Truths:
+    def is_large(self, size: Floats) -> Booleans:
         """Whether effects of errors may not be proportional to their size, by the bounds of the second order."""
         size = np.abs(size)
         large = np.zeros(size.shape, dtype=bool)
@@ -302,12 +309,12 @@ class ErrorBlock:
         return large & (size > 0) & self._is_moving
 
     @cached_property
-    def is_declared_large(self) -> Truths:
+    def is_declared_large(self) -> Booleans:
         """Whether effects of the declared errors may not be proportional to their size."""
         return self.is_large(self.declared)
 
     @cached_property
-    def _is_moving(self) -> Truths:
+    def _is_moving(self) -> Booleans:
         moving = np.zeros((len(self.sources), 1), dtype=bool)
         moving[self.moves] = True
         return moving
@@ -329,7 +336,7 @@ class ErrorBlock:
                 self._exactly(effects, size, is_large)
         return effects
 
-    def _exactly(self, effects: Declared, size: Floats, is_large: Truths) -> None:
+    def _exactly(self, effects: Declared, size: Floats, is_large: Booleans) -> None:
         """Replace the effects of errors too large for a first order by the effects of exact ranges."""
         sizes = size[is_large]
         points = self.followed(is_large, np.abs(sizes))
@@ -352,7 +359,7 @@ class ErrorBlock:
         for (east, north), each in ((effects.displacement, ahead), (effects.opposite, back)):
             east[is_large], north[is_large] = each[point_paths.EAST], each[point_paths.NORTH]
 
-    def followed(self, errors: Truths, sizes: Floats) -> Floats:
+    def followed(self, errors: Booleans, sizes: Floats) -> Floats:
         """Rows of known points of some errors at sizes, by the positive and the negative sign, (2, rows, some)."""
         lanes = np.concatenate(self._lanes_of(errors))
         both = np.tile(sizes, 2)
@@ -366,7 +373,7 @@ class ErrorBlock:
         first_lane[self.moves, 0] = 2 * self.cases * np.arange(len(self.moves))
         return first_lane + np.arange(self.cases)
 
-    def _lanes_of(self, errors: Truths) -> tuple[Indices, Indices]:
+    def _lanes_of(self, errors: Booleans) -> tuple[Indices, Indices]:
         lanes = self._lane[errors]
         return lanes, lanes + self.cases
 
@@ -412,16 +419,16 @@ class ErrorBlock:
             source = self.sources[index]
             reached = [slant[platform] for platform in source.platforms]
             if reached:
-                nearer = np.minimum(*reached) if len(reached) > 1 else reached[0]
+                nearer = np.minimum(reached[0], reached[-1]) if len(reached) > 1 else reached[0]
                 size[index] = FARTHEST_RANGE_FRACTION * nearer / self.edge[index]
             else:
                 # A clock takes no platform anywhere. No range sum is shorter than the distance of the platforms, and
                 # this distance is at least the sum less twice the nearer range: by then an image has ended.
                 course = self.exact.clock_course(source.clock or ())
-                size[index] = 2 * np.minimum(*slant) / np.abs(course).max(axis=0)
+                size[index] = 2 * np.minimum(slant[0], slant[1]) / np.abs(course).max(axis=0)
         return size
 
-    def allowed(self, model: str, limits: Sequence[Any], *, is_complete: bool) -> Allowed:
+    def allowed(self, model: str, limits: Sequence[PerCase | None], *, is_complete: bool) -> Allowed:
         """Allowable sizes of errors by a model.
 
         Parameters
@@ -446,13 +453,13 @@ class ErrorBlock:
         smallest = smallest_by_requirement.min(axis=0)
         binding = np.where(np.isfinite(smallest), smallest_by_requirement.argmin(axis=0), -1).astype(np.int8)
         if model == "full":
-            binding = np.where(self.ends_image(smallest), len(HELD), binding)
+            binding = np.where(self.ends_image(smallest), len(LIMITING_REQUIREMENTS), binding)
         smallest, quadratic = (
             np.where(np.isfinite(sizes), sizes, math.nan) for sizes in (smallest, smallest_by_requirement[0])
         )
         return Allowed(smallest, quadratic if is_complete else smallest, binding)
 
-    def ends_image(self, size: Floats) -> Truths:
+    def ends_image(self, size: Floats) -> Booleans:
         """Whether the image ends at the allowables that were found."""
         ends_there = np.zeros(size.shape, dtype=bool)
         if self._follows is not None:
@@ -461,7 +468,7 @@ class ErrorBlock:
             ends_there[self.moves] = (ends == sizes[:, None]).any(axis=1) & np.isfinite(sizes)
         return ends_there
 
-    def _limit(self, requirement: int, limit: Any) -> Floats:
+    def _limit(self, requirement: int, limit: PerCase | None) -> Floats:
         """A limit of each error; NaN: no limit. A pure phase error has the limit of the quadratic phase alone."""
         limit = math.nan if limit is None else limit
         limits = np.broadcast_to(limit, self.declared.shape)
@@ -509,6 +516,12 @@ class ErrorBlock:
         return smallest
 
 
+def _less(shift: Vectors, velocity: Vectors, tag_s: Floats) -> Vectors:
+    """A time tag's shift, less a shift along the velocity. [m]"""
+    (x, y, z), (u, v, w) = shift, velocity
+    return (x - tag_s * u, y - tag_s * v, z - tag_s * w)
+
+
 class DeclaredErrors:
     """The errors of cases that need the same number of nodes.
 
@@ -543,7 +556,7 @@ class DeclaredErrors:
         exact: ExactRanges,
         shown: Container[str] | None = None,
         *,
-        gain: Any = 1.0,
+        gain: PerCase = 1.0,
         is_complete: bool = False,
     ) -> None:
         self.mission, self.cases, self.geometries, self.exact = mission, cases, geometries, exact
@@ -553,7 +566,7 @@ class DeclaredErrors:
         published, self.published_angle_deg = published_planes(geometries)
         self.planes: dict[str, Any] = {"published": published, "full": OwnPlane()}
         half = exact.half
-        self.edge: dict[str, Any] = {"m": 1.0, "m/s": half, "m/s^2": half**2 / 2}
+        self.edge: dict[str, PerCase] = {"m": 1.0, "m/s": half, "m/s^2": half**2 / 2}
         quadratic, cubic, hidden, moved = exact.most_per_metre
         self.per_metre = np.array((quadratic + self.gain * hidden, cubic, moved))[:, None]
         quadratic, cubic = exact.k * np.hypot(*(np.abs(gradient[2:]) for gradient in exact.gradient))
@@ -567,34 +580,37 @@ class DeclaredErrors:
         self._place = {error.id: divmod(place, size) for place, error in enumerate(self.listed)}
         self._does: dict[tuple[str, int], Declared] = {}
 
-    def array(self, value: Any) -> Floats:
+    def array(self, value: PerCase | PerCaseFlag | None) -> Floats:
         """One number for each case, (cases,)."""
         return np.full(self.cases, value, dtype=float)
 
     def lanes(self, *errors: ErrorSource, signs: Sequence[float] = (1.0,)) -> Lanes:
         """Lanes of unit errors, ordered by error, then sign, then case."""
-        moved = [error.platforms for error in errors]
         orders = [self._order(error) for error in errors]
         courses = np.array([self._course(error, order) for error, order in zip(errors, orders, strict=True)])
         at_nodes = np.moveaxis(courses[:, None] * np.array(signs)[:, None, None], 2, 0)
-        moves: list[list[Any]] = [[float(platform in platforms) for platforms in moved] for platform in (0, 1)]
-        u, v, order = (self._of_each(values, len(signs)) for values in (*moves, orders))
-        x, y, z = (self._of_each([error.direction[axis] for error in errors], len(signs)) for axis in (0, 1, 2))
-        of_receiver = None
-        if any(error.of_receiver is not None for error in errors):
-            ways = [[error.direction_of(1)[axis] for error in errors] for axis in (0, 1, 2)]
-            of_receiver = tuple(self._of_each(along, len(signs)) for along in ways)
+        order, moves, directions = (
+            self._of_lanes(values, len(signs)) for values in (np.array(orders)[:, None], *_motions(errors))
+        )
         case, tags = np.tile(self.each, len(errors) * len(signs)), None
         if any(error.is_time_tag for error in errors):
             is_tag = np.repeat([error.is_time_tag for error in errors], self.cases * len(signs))
             tags = TimeTags(self.geometries.both, self.exact.times, np.where(is_tag, case, -1))
-        return Lanes(case, at_nodes.reshape(len(at_nodes), -1), (u, v), (x, y, z), order, of_receiver, tags)
+        return Lanes(case, at_nodes.reshape(len(at_nodes), -1), moves, directions, order, tags)
 
-    def edge_of(self, error: ErrorSource) -> Any:
+    def _of_lanes(self, values: Any, signs: int) -> Any:
+        """Values of errors (..., errors, cases) for their lanes, (..., lanes); one lane if all lanes share them."""
+        *more, errors, cases = values.shape
+        if errors == cases == 1:
+            return values[..., 0]
+        return np.broadcast_to(values[..., None, :], (*more, errors, signs, self.cases)).reshape(*more, -1)
+
+    def edge_of(self, error: ErrorSource) -> PerCase:
         """Position error at the aperture's edge by a unit of an error, the larger of both platforms; 0 by a clock."""
-        if not error.is_time_tag:
+        if not error.is_time_tag and error.shifts is None:
             return self.edge.get(error.unit, 0.0)
-        return np.max([norm(error.direction_of(platform)).max(axis=0) for platform in error.platforms], axis=0)
+        farthest: Floats = np.max([norm(error.way_of(platform)).max(axis=0) for platform in error.platforms], axis=0)
+        return farthest
 
     def bent(self, error: ErrorSource, size: Floats) -> Floats:
         """Distance of a time tag's shift, of either sign, from a shift along the velocity, platforms added. [m]"""
@@ -602,24 +618,16 @@ class DeclaredErrors:
         for platform in error.platforms:
             path, straight = self.geometries.both[platform], error.direction_of(platform)
             bend += np.max(
-                [
-                    norm(
-                        tuple(
-                            component - tag * way
-                            for component, way in zip(path.later(times, tag), straight, strict=True)
-                        )
-                    )
-                    for tag in (size, -size)
-                ],
+                [np.asarray(norm(_less(path.later(times, tag), straight, tag))) for tag in (size, -size)],
                 axis=(0, 1),
             )
         return bend
 
     def _order(self, error: ErrorSource) -> int:
-        """Power of slow time with which a position error grows: -1 for a clock, 0 for a time tag, which may turn."""
+        """Power of slow time with which a position error grows: -1 for a clock, 0 for motions at the nodes."""
         if not error.platforms:
             return -1
-        return 0 if error.is_time_tag else list(self.edge).index(error.unit)
+        return 0 if error.is_time_tag or error.shifts is not None else list(self.edge).index(error.unit)
 
     def _course(self, error: ErrorSource, order: int) -> Floats:
         """Position error at the nodes by a unit of an error, or its range error where it moves no platform."""
@@ -630,16 +638,6 @@ class DeclaredErrors:
             return exact.clock_course(error.clock)
         # A pure phase error: a quadratic that displaces nothing.
         return np.asarray(((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
-
-    def _of_each(self, values: Sequence[Any], signs: int) -> Any:
-        """One value of each error for its lanes, or the value that all share; turning directions at each node."""
-        if any(np.ndim(value) > 1 for value in values):
-            count = self.exact.fit.shape[1]
-            turning = np.stack([np.broadcast_to(value, (count, self.cases)) for value in values], axis=1)
-            return np.repeat(turning[:, :, None], signs, axis=2).reshape(count, -1)
-        if any(isinstance(value, np.ndarray) for value in values):
-            return np.repeat([self.array(value) for value in values], signs, axis=0).reshape(-1)
-        return values[0] if len(set(values)) == 1 else np.repeat(values, signs * self.cases)
 
     def block_of(self, error: ErrorSource) -> tuple[ErrorBlock, int]:
         """The block that contains an error, and the error's index in the block."""
@@ -658,7 +656,7 @@ class DeclaredErrors:
             self._does[key] = self.blocks[block].does(model, self.blocks[block].declared)
         return self._does[key]
 
-    def is_large(self, error: ErrorSource) -> Truths:
+    def is_large(self, error: ErrorSource) -> Booleans:
         """Cases in which effects of a declared error are not proportional to its size."""
         block, index = self.block_of(error)
         return np.asarray(block.is_declared_large[index])
@@ -671,7 +669,7 @@ class DeclaredErrors:
         block, index = self.block_of(error)
         return block.quadratic_by_sign[:, index]
 
-    def doubts(self, model: str, is_over: Any) -> Any:
+    def doubts(self, model: str, is_over: PerCaseFlag) -> PerCaseFlag:
         """Cases in which a model that does not gate raises a doubt. The published model knows no direct path."""
         return False if model == "published" and self.has_direct_path else is_over
 
@@ -683,6 +681,27 @@ class DeclaredErrors:
         if degrees < MIN_GRADIENT_ANGLE_DEG:
             return phrases.note("no-displacement", degrees=degrees)
         return phrases.note("no-displacement-across", gradient=plain(np.hypot(*self.geometries.range_gradient), case))
+
+
+def _motions(errors: Sequence[ErrorSource]) -> tuple[Floats, Floats]:
+    """Whether units of errors move each platform, (2, errors, 1), and directions, as in `Lanes`.
+
+    Directions are (2, 3, nodes, errors, cases).
+    """
+    ways = [
+        (platform, index, error.way_of(platform))
+        for index, error in enumerate(errors)
+        for platform in error.platforms
+    ]
+    arrays = [component for _, _, way in ways for component in way if isinstance(component, np.ndarray)]
+    shapes = [(1, *array.shape)[-2:] for array in arrays if array.ndim]
+    count, cases = (max(lengths) for lengths in zip((1, 1), *shapes, strict=True))
+    moves, directions = np.zeros((2, len(errors), 1)), np.zeros((2, 3, count, len(errors), cases))
+    for platform, index, way in ways:
+        moves[platform, index] = 1.0
+        for axis, component in enumerate(way):
+            directions[platform, axis, :, index] = component
+    return moves, directions
 
 
 class Model:
@@ -720,28 +739,28 @@ class Model:
         return block.does(self.name, sizes).of(index).in_one_case()
 
     def allowed(self, source: ErrorSource, limits: Sequence[float | None]) -> tuple[float | None, str | None]:
-        """Smallest size, of either sign, at which an error reaches a limit, and which of `HELD` it reaches; or None.
+        """Smallest size, of either sign, at which an error reaches a limit, and the requirement it reaches; or None.
 
         `limits` are the limits of quadratic and cubic phase [rad], and of the displacement. [m]
         """
         block, index = self.errors.block_of(source)
-        limits_of_block: list[Any] = []
+        limits_of_block: list[PerCase | None] = []
         for limit in limits:
             of_all = np.full(block.declared.shape, math.nan)
             of_all[index] = math.nan if limit is None else limit
             limits_of_block.append(None if limit is None else of_all)
         allowed_of_block = block.allowed(self.name, limits_of_block, is_complete=False)
         size, binding = plain(allowed_of_block.smallest[index]), int(allowed_of_block.binding[index, 0])
-        return (None, None) if math.isnan(size) else (size, (*HELD, END_OF_IMAGE)[binding])
+        return (None, None) if math.isnan(size) else (size, (*LIMITING_REQUIREMENTS, END_OF_IMAGE)[binding])
 
     def allowable(self, source: ErrorSource, requirement: str, limit: float) -> float | None:
         """Smallest size, of either sign, at which an error reaches one limit; or None."""
-        return self.allowed(source, [limit if name == requirement else None for name in HELD])[0]
+        return self.allowed(source, [limit if name == requirement else None for name in LIMITING_REQUIREMENTS])[0]
 
     def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
         """Size at which an error would reach a limit if its effects were proportional to it; infinite: never."""
         block, index = self.errors.block_of(source)
-        per_unit = float(block.per_unit(self.name)[HELD.index(requirement), index, 0])
+        per_unit = float(block.per_unit(self.name)[LIMITING_REQUIREMENTS.index(requirement), index, 0])
         return limit / per_unit if per_unit else math.inf
 
     def hidden_per_unit(self, source: ErrorSource) -> float:
@@ -757,7 +776,7 @@ class Model:
     def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
         """Whether effects of an error are proportional to its size up to a limit."""
         block, index = self.errors.block_of(source)
-        requirement_index = HELD.index(requirement)
+        requirement_index = LIMITING_REQUIREMENTS.index(requirement)
         per_unit = block.per_unit(self.name)[requirement_index]
         with np.errstate(all="ignore"):
             first = np.minimum(np.where(per_unit > 0, limit / per_unit, math.inf), block.farthest)

@@ -12,8 +12,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators, phrases
+from bisar_budget.arrays import PerCase, PerCaseFlag
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
+from bisar_budget.geometry import (
+    BistaticGeometry,
+    GroundVector,
+    PlatformState,
+    Vector,
+    VectorArrays,
+    Vectors,
+    plain_vector,
+)
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Effect, FullEffect
 
@@ -74,16 +83,21 @@ def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: 
     )
 
 
-def plain(column: Any, case: int = 0) -> float:
+def plain(column: PerCase | PerCaseFlag, case: int = 0) -> float:
     """The number of a case, by its index. A single number counts for every case."""
     if not isinstance(column, np.ndarray):
         return float(column)
     return float(column.item(case if column.size > 1 else 0))
 
 
-def _plain_way(component: Any) -> Any:
+def _plain_way(component: PerCase) -> PerCase:
     """A component of a direction in one case. A component that turns keeps all its nodes."""
     return component if np.ndim(component) > 1 else plain(component)
+
+
+def _plain_ways(direction: Vectors) -> Vectors:
+    x, y, z = direction
+    return (_plain_way(x), _plain_way(y), _plain_way(z))
 
 
 class ErrorSource(NamedTuple):
@@ -100,6 +114,10 @@ class ErrorSource(NamedTuple):
 
     `clock` holds t̃₀ … t̃₃ of a unit of a clock error, zeros where synchronisation removes the error. It is None for
     any other error.
+
+    `shifts` are the motions of both platforms over the aperture by a unit of an error, (nodes, cases) for each axis,
+    where a platform is in free fall: its error follows the dynamics of the orbit. [m] `rates` are then the velocities
+    at mid-aperture of position errors in `ric`, which are at rest against the stars. [m/s] Both are None otherwise.
     """
 
     subject: Subject
@@ -108,14 +126,16 @@ class ErrorSource(NamedTuple):
     path: KeyPath
     effect: Effect
     full: FullEffect
-    direction: Any
+    direction: Vectors
     equation: str
     no_limit: Note
     evidence: str | None = None
     is_independent: bool = True
     notes: tuple[Note, ...] = ()
-    clock: tuple[Any, ...] | None = None
-    of_receiver: Any = None
+    clock: tuple[PerCase, ...] | None = None
+    of_receiver: Vectors | None = None
+    shifts: tuple[VectorArrays, VectorArrays] | None = None
+    rates: tuple[Vectors, Vectors] | None = None
 
     @property
     def id(self) -> str:
@@ -127,14 +147,32 @@ class ErrorSource(NamedTuple):
         effect, full = Effect._make(map(plain, self.effect)), FullEffect._make(map(plain, self.full))
         declared = None if self.declared is None else plain(self.declared)
         clock = self.clock and tuple(map(plain, self.clock))
-        direction, of_receiver = (way and tuple(map(_plain_way, way)) for way in (self.direction, self.of_receiver))
+        of_receiver = None if self.of_receiver is None else _plain_ways(self.of_receiver)
         return self._replace(
-            declared=declared, effect=effect, full=full, direction=direction, of_receiver=of_receiver, clock=clock
+            declared=declared,
+            effect=effect,
+            full=full,
+            direction=_plain_ways(self.direction),
+            of_receiver=of_receiver,
+            clock=clock,
+            rates=self.rates and (plain_vector(self.rates[0]), plain_vector(self.rates[1])),
         )
 
-    def direction_of(self, platform_index: int) -> Any:
+    def direction_of(self, platform_index: int) -> Vectors:
         """Direction in which the error moves a platform."""
         return self.of_receiver if platform_index == 1 and self.of_receiver is not None else self.direction
+
+    def way_of(self, platform_index: int) -> Any:
+        """Motion of a platform by a unit at each node, if it follows an orbit or a path; else its direction."""
+        return self.direction_of(platform_index) if self.shifts is None else self.shifts[platform_index]
+
+    def state_of(self, platform_index: int) -> tuple[Any, Any, Any]:
+        """Error of position, velocity and acceleration of a platform at mid-aperture by a unit. [m, m/s, m/s²]"""
+        vectors: list[Any] = [NOWHERE, NOWHERE, NOWHERE]
+        if self.rates is not None:
+            vectors[1] = self.rates[platform_index]
+        vectors[tuple(MOTION_UNITS.values()).index(self.unit)] = self.direction_of(platform_index)
+        return vectors[0], vectors[1], vectors[2]
 
     @property
     def owner(self) -> str:
@@ -213,7 +251,7 @@ def indicated_point(
         Piece of the range error, without the range history of the scatterer itself.
     model : str
         `published`: Q_i of (30) as printed, with the platforms at their positions at τ_i and speeds over ranges held
-        constant. Any other name: the true gradients of the lines of sight at τ_i.
+        constant. PerCase other name: the true gradients of the lines of sight at τ_i.
     seen_from : (2,)
         Position of the scatterer, east and north. [m]
 
@@ -230,13 +268,14 @@ def indicated_point(
     east, north = seen_from
     state_numbers, look, rate = [], [0.0, 0.0], [0.0, 0.0]
     for state in (geometry.transmitter, geometry.receiver):
-        (x, y, z), velocity = state.at(piece.time)
+        position, velocity = map(plain_vector, state.at(piece.time))
+        x, y, z = position
         then = PlatformState(position=(x - east, y - north, z), velocity=velocity)
         slant_range = math.dist(state.position, (east, north, 0.0))
         state_numbers += [x - east, y - north, *velocity[:2], slant_range]
         for axis in range(2):
-            look[axis] += then.look[axis]
-            rate[axis] += then.look_rate[axis]
+            look[axis] += float(then.look[axis])
+            rate[axis] += float(then.look_rate[axis])
     if model == "published":
         (a, b), (c, d), (determinant,) = evaluators.published_ground_inverse(*state_numbers)
     else:

@@ -16,14 +16,15 @@ its own row. The effect of attitude through the arm alone has a row that counts 
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bisar_budget import evaluators
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import (
     Moves,
@@ -35,15 +36,14 @@ from bisar_budget.effects.random_effect import (
 )
 from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import PlatformState, Vector, cross, unit, without_rounding
+from bisar_budget.geometry import PlatformState, Vectors, cross, unit, without_rounding
 from bisar_budget.image_plane import nodes
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, LeverArm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import RAW, CommonMotionError, FlownPath, LogNoise, MotionError
-from bisar_budget.ranges.exact_ranges import Floats
 
 _IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
-NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
+SPREADING_NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
 TILTS = ("attitude", "gyro_bias", "angle_random_walk")
 # The covariance of a position error over the aperture grows as this power of the aperture time.
 _GROWS = {
@@ -95,7 +95,7 @@ def _log_process(mission: Mission, name: str, figure: str) -> tuple[GaussMarkov,
     return GaussMarkov(figure, (x, y, z), float(np.ravel(correlation_time)[0])), axes[:, :, 0]
 
 
-def specific_force(mission: Mission, state: PlatformState) -> Vector:
+def specific_force(mission: Mission, state: PlatformState) -> Vectors:
     """Specific force of a platform, f = a − g, which accelerometers measure, in the axes of the scene. [m/s²]
 
     It is zero where the platform falls freely. On the Earth g includes the terms of the Earth's rotation
@@ -151,7 +151,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             path=("platforms", name, "motion_error", *(("imu", kind) if key == kind else (key,))),
             published=published,
             full=full,
-            spreads=kind in NOISE,
+            spreads=kind in SPREADING_NOISE,
             moves=_moves_by_imu(seen, platform_index, kind, directions, about, arm) if seen.has_edge else (),
         )
 
@@ -175,16 +175,20 @@ def _moves_by_imu(
     )
 
 
-def _at_mid_aperture(mission: Mission, index: int, along: Any) -> tuple[Any, ...]:
+# The evaluators take and give numbers, or arrays of cases.
+_inertial_phases: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.inertial_phases
+
+
+def _at_mid_aperture(mission: Mission, index: int, along: PerCase) -> tuple[PerCase, ...]:
     """Quadratic phase, cubic phase and rest by a unit with the component `along` the line of sight. [rad]"""
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
-    return evaluators.inertial_phases(along, along, along, wavelength, T)[index]
+    return _inertial_phases(along, along, along, wavelength, T)[index]
 
 
-def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> list[Any]:
+def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> tuple[PerCase, PerCase]:
     """Sigmas of the displacement by a unit with the component `along` the line of sight of mid-aperture. [m]"""
     fit = seen.exact.fit[:2]
-    if kind in NOISE:
+    if kind in SPREADING_NOISE:
         orders = fit @ _walk_of(kind, len(seen.exact.times)).at_nodes @ fit.T
         constant, linear = np.diagonal(orders)
     else:
@@ -200,7 +204,7 @@ def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions
     """
     count, along = len(seen.exact.times), seen.range_errors(platform_index, directions[:, :, None])
     scale = seen.exact.half ** _GROWS[kind]
-    if kind not in NOISE:
+    if kind not in SPREADING_NOISE:
         courses = along * (_courses(kind, count)[0, :, None] * np.sqrt(scale))
         return seen.of_courses(courses, courses)[1]
     walk = _walk_of(kind, count)
@@ -221,7 +225,7 @@ def _courses(kind: str, count: int) -> Floats:
 
     They are zero at mid-aperture.
     """
-    if kind in NOISE:
+    if kind in SPREADING_NOISE:
         return factor(_walk_of(kind, count).at_nodes).T
     order = 3 if kind == "gyro_bias" else 2
     return nodes(count).places[None] ** order / math.factorial(order)
@@ -235,11 +239,11 @@ def body_axes(state: PlatformState, times: Floats) -> Floats:
         u, v, w = (np.where(state.is_still, *both) for both in ((1.0, u), (0.0, v), (0.0, w)))
     with np.errstate(all="ignore"):
         along = without_rounding(unit((u, v, w)))
-        to_left = without_rounding(unit((-v, u, 0.0 * w)))
-    return np.array((along, to_left, cross(along, to_left)))
+        leftward = without_rounding(unit((-v, u, 0.0 * w)))
+    return np.array((along, leftward, cross(along, leftward)))
 
 
-def arm_at(state: PlatformState, arm: Any, times: Floats) -> Floats:
+def arm_at(state: PlatformState, arm: Vectors, times: Floats) -> Floats:
     """The arm at slow times [s] along the axes of the scene, (3, *times.shape). [m]"""
     return np.asarray(sum(length * axis for length, axis in zip(arm, body_axes(state, times), strict=True)))
 
@@ -301,6 +305,7 @@ def _with_arm(
     along = [seen.range_errors(platform_index, way) for way in (directions[:, :, None], swings)]
     stated = seen.error(PLATFORMS[platform_index]).lever_arm
     assert stated is not None
+    assert stated.arm is not None
     at_middle = swung(about, arm_at(state, stated.arm, np.zeros((1, seen.cases))))[:, :, 0]
     at_mid_aperture = [np.einsum("ac,eac->ec", seen.vector(state.look), way) for way in (directions, at_middle)]
     fit, half, k, count = seen.exact.fit, seen.exact.half, seen.exact.k, len(times)
@@ -338,8 +343,8 @@ class _Walks(NamedTuple):
 @cache
 def _walks(first: int, second: int, count: int) -> _Walks:
     """The noise integrated `first` + 1 and `second` + 1 times, at `count` nodes; 0 is a walk."""
-    places, weights = np.polynomial.legendre.leggauss(2 * count)
-    start, weight = (1 + places) / 2, weights / 2  # on one side of the middle
+    gauss_nodes, weights = np.polynomial.legendre.leggauss(2 * count)
+    start, weight = (1 + gauss_nodes) / 2, weights / 2  # on one side of the middle
     number = np.arange(count)
 
     def order_of(times: int) -> Floats:
@@ -368,8 +373,8 @@ def _courses_of_both_walks(count: int) -> tuple[Floats, Floats]:
     return twice, once
 
 
-def _legendre(places: Floats, count: int) -> Floats:
-    return np.asarray(np.polynomial.legendre.legvander(places, count - 1))
+def _legendre(abscissas: Floats, count: int) -> Floats:
+    return np.asarray(np.polynomial.legendre.legvander(abscissas, count - 1))
 
 
 # ---------------------------------------------------------------------- position noise
@@ -410,7 +415,7 @@ def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
         yield _noise(seen, process, {name: axes}, key)
 
 
-def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, Any]]:
+def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, PerCase]]:
     """Sigmas (3, cases) [m], axes (3, 3, cases) and correlation time [s] of the residual, and of the grid."""
     residual, grid = (
         np.moveaxis(
@@ -443,8 +448,8 @@ class _Process(NamedTuple):
     """A Gauss-Markov process, its subject, and its sigmas [m]; numbers may be arrays (cases,)."""
 
     subject: Subject
-    sigma: Sequence[Any]
-    correlation_time: Any
+    sigma: Sequence[PerCase]
+    correlation_time: PerCase
     spreads: bool = True
 
     @classmethod
@@ -456,16 +461,16 @@ def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], pat
     """Noise along axes of the platforms that it moves, (axes, 3, cases) each."""
     k = 2 * math.pi / seen.mission.radar.wavelength
     largest, sizes = parts_of_largest(seen.vector(process.sigma))
-    found = gauss_markov(seen.aperture_time, process.correlation_time)
-    courses = seen.courses(found.covariance) if seen.has_edge else np.zeros((0, len(seen.exact.times), 1))
+    moments = gauss_markov(seen.aperture_time, process.correlation_time)
+    courses = seen.courses(moments.covariance) if seen.has_edge else np.zeros((0, len(seen.exact.times), 1))
     sighted, moved, moves = list[Floats](), list[Floats](), list[Moves]()
     for name, of_platform in axes.items():
-        place, directions = PLATFORMS.index(name), of_platform * sizes[:, None]
-        sighted.append((directions * seen.vector(seen.geometry.both[place].look)).sum(axis=1))
-        moved.append(seen.range_errors(place, directions[:, :, None]))
-        moves.append(Moves(place, directions[:, :, None], courses))
+        platform_index, directions = PLATFORMS.index(name), of_platform * sizes[:, None]
+        sighted.append((directions * seen.vector(seen.geometry.both[platform_index].look)).sum(axis=1))
+        moved.append(seen.range_errors(platform_index, directions[:, :, None]))
+        moves.append(Moves(platform_index, directions[:, :, None], courses))
     along = np.sqrt(np.square(sum(sighted)).sum(axis=0))
-    quadratic, cubic, left = (np.sqrt(one) for one in found[:3])
+    quadratic, cubic, left = (np.sqrt(square) for square in moments[:3])
     return RandomError(
         subject=process.subject,
         unit="m",
@@ -475,7 +480,7 @@ def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], pat
             k * along * quadratic,
             k * along * cubic,
             k * along * left / seen.factor,
-            *seen.moved(found.constant * along**2, found.linear * along**2),
+            *seen.moved(moments.constant * along**2, moments.linear * along**2),
         ),
         full=seen.of_gauss_markov(np.asarray(sum(moved)), process.correlation_time),
         spreads=process.spreads,

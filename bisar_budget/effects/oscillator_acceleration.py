@@ -14,11 +14,12 @@ direction is unknown. The worst direction counts, that is, the length of Γ time
 
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import specific_force
 from bisar_budget.effects.oscillator_tones import LeftTone, left_of_tone
@@ -29,9 +30,8 @@ from bisar_budget.geometry import BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.vibrations import FeltVibration, Vibration
-from bisar_budget.ranges.exact_ranges import Floats
 
-PHASE = (1.0, 2.0)  # S_φ = (Γ·f₀)²·S_a/f²
+PHASE_LAW = (1.0, 2.0)  # S_φ = (Γ·f₀)²·S_a/f²
 _FELT_ACCELERATION_MPS2 = 1e-6  # m/s²; a smaller acceleration of a path counts as none
 _EXCHANGE_START_COUNT = 8  # beginnings of the exchanges within an interval, over which the rest of a turn is averaged
 
@@ -40,7 +40,7 @@ class Felt(NamedTuple):
     """The vibration that an oscillator feels, stated for it or for its platform, and its sensitivity. [s²/m]"""
 
     vibration: Vibration | FeltVibration
-    sensitivity: Any
+    sensitivity: PerCase
     is_own: bool
 
 
@@ -55,7 +55,7 @@ def felt(mission: Mission, name: str) -> Felt | None:
     return Felt(vibration, oscillator.acceleration_sensitivity, felt_vibration is not None)
 
 
-def lacks_a_spectrum(mission: Mission, name: str) -> Any:
+def lacks_a_spectrum(mission: Mission, name: str) -> PerCaseFlag:
     """Cases in which an oscillator feels a wideband vibration: its phase f₀Γ·4π²·f·σ/g needs a frequency."""
     felt_vibration = felt(mission, name)
     if (
@@ -93,12 +93,12 @@ class AcceleratedTone(NamedTuple):
 
     name: str
     entry: int
-    frequency: Any
-    acceleration: Any
-    free: Any
-    sensitivity: Any
+    frequency: PerCase
+    acceleration: PerCase
+    free: PerCase
+    sensitivity: PerCase
     left: LeftTone
-    echo: Any
+    echo: PerCase
     in_quadrature: str | None
 
     @property
@@ -107,12 +107,12 @@ class AcceleratedTone(NamedTuple):
         return subject(self.name, "oscillator", "acceleration", entry=self.entry)
 
     @property
-    def per_unit(self) -> Any:
+    def per_unit(self) -> PerCase:
         """Peak phase of the tone's echo at the centre frequency by a unit of Γ. [rad/(s²/m)]"""
         return self.free * self.echo
 
     @property
-    def phase(self) -> Any:
+    def phase(self) -> PerCase:
         """Peak phase of the tone's echo at the centre frequency. [rad]"""
         return self.per_unit * self.sensitivity
 
@@ -173,7 +173,7 @@ def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
     if vibration.spectrum is not None:
         interval = None if sync is None else sync.interval
         delay = seen.geometry.echo_delay if mission.has_direct_path else None
-        random = spectrum_parts(seen, vibration.spectrum, PHASE, interval, delay)
+        random = spectrum_parts(seen, vibration.spectrum, PHASE_LAW, interval, delay)
         total += random.rows * (power_of(vibration) * np.square(mission.radar.center_frequency))
     for line in accelerated_tones(mission, seen.geometry):
         if line.name == name:
@@ -191,18 +191,18 @@ def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] 
         return None
     sync = seen.mission.synchronization
     interval = None if sync is None else sync.interval
-    courses = SPEED_OF_LIGHT * felt_part * turn_courses(state, seen.exact.times, interval)
+    courses = SPEED_OF_LIGHT_MPS * felt_part * turn_courses(state, seen.exact.times, interval)
     return seen.of_courses(courses, courses)
 
 
-def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) -> Floats:
+def turn_courses(state: PlatformState, moments: Floats, interval: PerCase | None = None) -> Floats:
     """Time error by a unit of Γ along each axis, v(τ) − v(0), or its rest after exchanges, (n, moments, …).
 
     The axes are the axes of the scene. The exchanges begin anywhere in their interval. Each of several beginnings has
     an equal part of the mean square.
     """
 
-    def gained(tau: Any) -> Floats:
+    def gained(tau: PerCase) -> Floats:
         now, middle = state.at(tau)[1], state.velocity
         return np.array([np.broadcast_to(a - b, np.shape(tau)) for a, b in zip(now, middle, strict=True)])
 
@@ -216,13 +216,13 @@ def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) ->
         exact_gain, joined = gained(moments), gained(before) * (1 - fraction) + gained(before + interval) * fraction
         remaining = exact_gain - joined  # for a constant acceleration only rounding
         courses.append(
-            np.where(np.abs(remaining) > ROUNDING * np.abs(exact_gain).max(), remaining, 0.0)
+            np.where(np.abs(remaining) > VECTOR_ROUNDING_FRACTION * np.abs(exact_gain).max(), remaining, 0.0)
             / math.sqrt(_EXCHANGE_START_COUNT)
         )
     return np.concatenate(courses)
 
 
-def _falls(mission: Mission, state: PlatformState) -> Any:
+def _falls(mission: Mission, state: PlatformState) -> PerCaseFlag:
     """Whether a platform falls freely: accelerometers measure less than the acceleration of its path."""
     return norm(specific_force(mission, state)) < norm(state.acceleration)
 
@@ -237,8 +237,9 @@ def flies_a_turn(mission: Mission, name: str) -> bool:
 def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
     """Effect of two independent errors that grow with the same unit."""
     quadratic, cubic, spread, east, north = (np.hypot(*both) for both in zip(first[:5], second[:5], strict=True))
-    has_covariance = first.covariance is not None and second.covariance is not None
-    covariance = first.covariance + second.covariance if has_covariance else None
+    covariance = None
+    if first.covariance is not None and second.covariance is not None:
+        covariance = first.covariance + second.covariance
     hidden, higher_orders = np.hypot(first.hidden, second.hidden), np.hypot(first.rest, second.rest)
     return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, higher_orders)
 
@@ -250,4 +251,4 @@ def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, 
     if felt_vibration is None or felt_vibration.vibration.spectrum is None or not is_heard:
         return ()
     factor = mission.radar.center_frequency**2 * float(power_of(felt_vibration.vibration))
-    return spectrum_pieces(felt_vibration.vibration.spectrum, (factor, PHASE[1]))
+    return spectrum_pieces(felt_vibration.vibration.spectrum, (factor, PHASE_LAW[1]))

@@ -7,10 +7,11 @@ unknown instant of the exchange within its interval. Derived here.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.spectra import Parts, tone
 from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES
@@ -29,15 +30,15 @@ class LeftTone(NamedTuple):
     `shares` are amplitudes, 0 for a frequency that does not occur.
     """
 
-    frequencies: tuple[Any, ...]
-    shares: tuple[Any, ...]
+    frequencies: tuple[PerCase, ...]
+    shares: tuple[PerCase, ...]
 
     @property
     def is_folded(self) -> bool:
         """Whether exchanged pulses fold the tone."""
         return len(self.shares) > 1
 
-    def echoes(self, aperture_time: Any) -> list[Any]:
+    def echoes(self, aperture_time: PerCase) -> list[PerCase]:
         """Amplitudes of the tones that make echoes, from one cycle per aperture on; the tone's own if not folded."""
         if not self.is_folded:
             return [self.shares[0]]
@@ -46,34 +47,38 @@ class LeftTone(NamedTuple):
             for frequency, share in zip(self.frequencies, self.shares, strict=True)
         ]
 
-    def echo(self, mission: Mission) -> Any:
+    def echo(self, mission: Mission) -> PerCase:
         """Amplitude of the largest echo; without a PSLR requirement for tones, the root of the summed powers."""
         echoes = self.echoes(mission.collection.aperture_time)
         if mission.requirements.pslr is None:
-            return np.sqrt(sum(np.square(amplitude) for amplitude in echoes))
-        return np.max(np.broadcast_arrays(*echoes), axis=0)[()]
+            together: PerCase = np.sqrt(sum(np.square(amplitude) for amplitude in echoes))
+            return together
+        largest: PerCase = np.max(np.broadcast_arrays(*echoes), axis=0)[()]
+        return largest
 
-    def slowest_echo(self, aperture_time: Any) -> Any:
+    def slowest_echo(self, aperture_time: PerCase) -> PerCase:
         """Lowest frequency of an echo of at least 1 % of the amplitude; the tone's own if not folded. [Hz]"""
         if not self.is_folded:
             return self.frequencies[0]
         seen = zip(self.frequencies, self.echoes(aperture_time), strict=True)
-        return np.min(
+        slowest: PerCase = np.min(
             [np.where(share > _SEEN_AMPLITUDE_FRACTION, frequency, math.inf) for frequency, share in seen], axis=0
         )[()]
+        return slowest
 
-    def place(self, aperture_time: Any) -> Any:
+    def place(self, aperture_time: PerCase) -> PerCase:
         """Frequency of the largest echo. [Hz]"""
         both = np.array(np.broadcast_arrays(*self.echoes(aperture_time), *self.frequencies))
         echoes, frequencies = np.split(both, 2)
-        return np.take_along_axis(frequencies, echoes.argmax(axis=0)[None], axis=0)[0]
+        of_largest: PerCase = np.take_along_axis(frequencies, echoes.argmax(axis=0)[None], axis=0)[0]
+        return of_largest
 
-    def slow_parts(self, aperture_time: Any) -> Parts:
+    def slow_parts(self, aperture_time: PerCase) -> Parts:
         """Parts over the aperture of the tones below one cycle per aperture, each in its worst phase. [rad²]
 
         The folded tones of one tone depend on each other, so their amplitudes add.
         """
-        total: Any = np.zeros((5, *np.broadcast_shapes(*map(np.shape, (aperture_time, *self.frequencies)))))
+        total: Floats = np.zeros((5, *np.broadcast_shapes(*map(np.shape, (aperture_time, *self.frequencies)))))
         for frequency, share in zip(self.frequencies, self.shares, strict=True):
             cycles = frequency * aperture_time
             if not np.any(cycles < SLOWEST_ECHO_CYCLES):
@@ -86,7 +91,7 @@ class LeftTone(NamedTuple):
         return Parts(quadratic**2, cubic**2, spread**2, constant**2, linear**2, *products)
 
 
-def left_of_tone(frequency: Any, mission: Mission, geometry: BistaticGeometry) -> LeftTone:
+def left_of_tone(frequency: PerCase, mission: Mission, geometry: BistaticGeometry) -> LeftTone:
     """Tone that the synchronization leaves. A direct path leaves 2|sin(πfΔt)| of the receiver's tone."""
     sync = mission.synchronization
     if mission.has_direct_path:
@@ -114,9 +119,9 @@ class Spur(NamedTuple):
     name: str
     entry: int
     frequency: float
-    free: Any
+    free: PerCase
     left: LeftTone
-    echo: Any
+    echo: PerCase
 
     @property
     def subject(self) -> Subject:
@@ -124,11 +129,11 @@ class Spur(NamedTuple):
         return subject(self.name, "oscillator", "spur", entry=self.entry)
 
     @property
-    def phase(self) -> Any:
+    def phase(self) -> PerCase:
         """Peak phase of the spur's echo. [rad]"""
         return self.free * self.echo
 
-    def slow_parts(self, aperture_time: Any) -> Parts | None:
+    def slow_parts(self, aperture_time: PerCase) -> Parts | None:
         """Parts over the aperture of the folded tones below one cycle per aperture; None without folding. [rad²]"""
         if not self.left.is_folded:
             return None

@@ -8,11 +8,12 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import combinations, pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bisar_budget import evaluators, phrases
+from bisar_budget.arrays import Booleans, Floats, PerCase
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
@@ -21,7 +22,6 @@ from bisar_budget.mission.instruments import Oscillator, PowerLaw
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import Points, SortedPoints
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 DEFAULT_BANDWIDTH_HZ = 1e3  # Hz, upper end of noise for which the file states no end
 POOR_FIT_FRACTION = 0.2  # of an Allan deviation; a power law with a larger misfit does not describe it
@@ -29,6 +29,7 @@ _EXACT_FIT_FRACTION, _GOOD_FIT_OF_TERMS_FRACTION = (
     1e-6,
     0.01,
 )  # misfits of an Allan deviation: rounding, and a fit so good that no term is added
+_RANK_FRACTION = 1e-7  # of the largest singular value; smaller ones leave coefficients undetermined
 _BELOW_MASK_EXPONENT = 3.0  # flicker of frequency; by the first points' slope, a higher point could lower a phase
 COVERED_CYCLES = 0.1  # per aperture, down to which a mask should reach: slower noise is hardly in any order
 
@@ -141,54 +142,40 @@ def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
 @lru_cache(maxsize=64)
 def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
     """Fit every choice of one term, of two terms and so on, none of them negative."""
-    terms = 4  # white and flicker phase noise have nearly the same Allan variance
-    basis = [allan_variances(tau, bandwidth) for tau, _ in points]
-    scaled = [
-        [variance / deviation**2 for variance in row[:terms]]
-        for row, (_, deviation) in zip(basis, points, strict=True)
-    ]
+    # White and flicker phase noise have nearly the same Allan variance: the fifth term is left out.
+    term_count = 4
+    variances = np.array([allan_variances(tau, bandwidth)[:term_count] for tau, _ in points])
+    relative = variances / np.array([deviation for _, deviation in points])[:, None] ** 2
     fits = []
-    for count in range(1, min(terms, len(points)) + 1):
-        fits_of_count = []
-        for chosen in combinations(range(terms), count):
-            if any(row[index] <= 0 for row in scaled for index in chosen):  # a narrow band makes it negative
-                continue
-            solved = _least_squares([[row[index] for index in chosen] for row in scaled])
-            if solved is None or min(solved) <= 0:
-                continue
-            h = [0.0] * 5
-            for index, value in zip(chosen, solved, strict=True):
-                h[index] = value
-            worst = max(
-                abs(math.sqrt(math.fsum(a * b for a, b in zip(row, h[:terms], strict=True))) - 1) for row in scaled
-            )
-            fits_of_count.append(Fit(max(worst, _EXACT_FIT_FRACTION), PowerLaw(*h)))
+    for count in range(1, min(term_count, len(points)) + 1):
+        laws = (_least_squares(relative, terms) for terms in combinations(range(term_count), count))
+        fits_of_count = [Fit(_misfit(relative, law), PowerLaw(*law)) for law in laws if law is not None]
         if fits_of_count:
             fits.append(tuple(fits_of_count))
     return tuple(fits)
 
 
-def _least_squares(rows: Sequence[Sequence[float]]) -> list[float] | None:
-    """Solve rows·x = 1 for a few unknowns by scaled least squares; None without a unique solution."""
-    count = len(rows[0])
-    sizes = [max(abs(row[index]) for row in rows) for index in range(count)]
-    if not all(sizes):
+def _least_squares(relative: Floats, terms: Sequence[int]) -> list[float] | None:
+    """Coefficients of all terms whose relative variances (points, terms) come nearest to 1, with some terms alone.
+
+    None if a coefficient is not positive or not unique, or if a variance is not positive, which a narrow band causes.
+    """
+    columns = relative[:, terms]
+    if (columns <= 0).any():
         return None
-    scaled = [[value / size for value, size in zip(row, sizes, strict=True)] for row in rows]
-    matrix = [[math.fsum(row[i] * row[j] for row in scaled) for j in range(count)] for i in range(count)]
-    right = [math.fsum(row[i] for row in scaled) for i in range(count)]
-    for i in range(count):
-        pivot = max(range(i, count), key=lambda row: abs(matrix[row][i]))
-        if abs(matrix[pivot][i]) < 1e-13:
-            return None
-        matrix[i], matrix[pivot], right[i], right[pivot] = matrix[pivot], matrix[i], right[pivot], right[i]
-        for j in range(i + 1, count):
-            factor = matrix[j][i] / matrix[i][i]
-            matrix[j] = [a - factor * b for a, b in zip(matrix[j], matrix[i], strict=True)]
-            right[j] -= factor * right[i]
-    for i in reversed(range(count)):
-        right[i] = (right[i] - math.fsum(matrix[i][j] * right[j] for j in range(i + 1, count))) / matrix[i][i]
-    return [value / size for value, size in zip(right, sizes, strict=True)]
+    sizes = columns.max(axis=0)
+    scaled, _, rank, _ = np.linalg.lstsq(columns / sizes, np.ones(len(columns)), rcond=_RANK_FRACTION)
+    if rank < len(terms) or scaled.min() <= 0:
+        return None
+    law = np.zeros(relative.shape[1])
+    law[list(terms)] = scaled / sizes
+    coefficients: list[float] = law.tolist()
+    return coefficients
+
+
+def _misfit(relative: Floats, law: Sequence[float]) -> float:
+    """Largest misfit of the deviations of a law, as a fraction of the stated ones."""
+    return max(float(np.abs(np.sqrt(relative @ law) - 1).max()), _EXACT_FIT_FRACTION)
 
 
 # ---------------------------------------------------------------------- errors of clocks
@@ -227,7 +214,7 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     )
 
 
-def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: Any) -> RandomEffect | None:
+def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: PerCase) -> RandomEffect | None:
     """Effect of the assumed noise below the first point of a mask; None where that noise hardly counts."""
     mask = oscillator.phase_noise
     if mask is None or np.all(mask[0][0] * seen.aperture_time <= COVERED_CYCLES):
@@ -237,7 +224,7 @@ def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: Any)
     return full.times(seen.factor)
 
 
-def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Truths:
+def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Booleans:
     """Cases in which the spectrum differs from the stated one: by another frequency of the mask, or by a poor fit."""
     in_doubt = np.full(seen.cases, bool(oscillator.mask_at_frequency_of_part))
     if oscillator.allan_deviation is None:
@@ -295,7 +282,7 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_be
         return remaining
     interval = None if sync is None else sync.interval
     for (alike, exchanged), cases in seen.alike((oscillator, interval)):
-        spectra: dict[Any, list[int]] = {}
+        spectra: dict[tuple[PowerLawPiece, ...], list[int]] = {}
         for case in cases.tolist():  # the fit to an Allan deviation depends on the aperture
             pieces = noise_of(alike, 1.0, float(times[case])).pieces
             spectra.setdefault(pieces[:1] if is_below_mask else pieces, []).append(case)
@@ -312,7 +299,7 @@ def _left_of(
     if sync is None or interval is not None:
         return left_parts(pieces, aperture_time, interval)
 
-    def of_cases(value: Any) -> Floats:
+    def of_cases(value: PerCase | None) -> Floats:
         return np.broadcast_to(np.asarray(value), (seen.cases,))[cases_of_spectrum]
 
     if sync.is_holdover:

@@ -10,12 +10,12 @@ Numbers of a mission may be arrays (cases,). The geometry then holds the same ca
 import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bisar_budget.constants import ROUNDING
+from bisar_budget.arrays import Floats, Indices, PerCase, PerCaseFlag
+from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.declared import ImagePlane, published_planes
 from bisar_budget.effects.effect import Subject, plain
 from bisar_budget.effects.range_processes import (
@@ -29,19 +29,22 @@ from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.spectra import Parts
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
-from bisar_budget.image_plane import LEADING, nodes_for
+from bisar_budget.image_plane import LEGENDRE_LEADING, nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges, Floats
+from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges
 
 if TYPE_CHECKING:
     from bisar_budget.effects.oscillators import Noise
 
 # Nodes at which random errors are sampled: fewer tell too few orders of a process apart. More cost seconds, and
 # these follow nine circles; on a race track of 70 pieces 16 give every effect to 1e-3.
-FEWEST_NODES, MOST_NODES = 16, 64
-_CANCELLED_SQUARE_FRACTION = ROUNDING * 1e-2  # of a square of magnitudes; the root of a smaller square is rounding
+FEWEST_EFFECT_NODES, MOST_EFFECT_NODES = 16, 64
+_CANCELLED_SQUARE_FRACTION = VECTOR_ROUNDING_FRACTION * 1e-2  # the root of a smaller square is rounding
+
+
+Value = TypeVar("Value")  # a number, an array (cases,), or a tuple of them
 
 
 class RandomEffect(NamedTuple):
@@ -61,18 +64,20 @@ class RandomEffect(NamedTuple):
     spread: Any
     east: Any
     north: Any
-    covariance: Any = None
+    covariance: Floats | None = None
     hidden: Any = 0.0
     rest: Any = 0.0
 
-    def judged(self, gain: Any) -> Any:
+    def judged(self, gain: PerCase) -> PerCase:
         """Phase that counts against a limit raised by the gain of autofocus: `Declared.judged`. [rad/unit]"""
-        return np.hypot(self.quadratic, gain * self.hidden)
+        phase: PerCase = np.hypot(self.quadratic, gain * self.hidden)
+        return phase
 
     @property
-    def displacement(self) -> Any:
+    def displacement(self) -> PerCase:
         """Root-mean-square length of the displacement. [m/unit]"""
-        return np.hypot(self.east, self.north)
+        length: PerCase = np.hypot(self.east, self.north)
+        return length
 
     def of(self, case: int) -> "RandomEffect":
         """The effect of one case in plain numbers; the covariance as (4, 4)."""
@@ -83,7 +88,7 @@ class RandomEffect(NamedTuple):
         hidden, beyond_cubic = plain(self.hidden, case), plain(self.rest, case)
         return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, beyond_cubic)
 
-    def times(self, factor: Any) -> "RandomEffect":
+    def times(self, factor: PerCase) -> "RandomEffect":
         """The same effect with phases and displacement multiplied by a coverage factor."""
         return RandomEffect(
             self.quadratic * factor,
@@ -133,7 +138,7 @@ class RandomError(NamedTuple):
     counted_in: str = ""
     moves: tuple[Moves, ...] = ()
     continued: RandomEffect | None = None
-    is_in_doubt: Any = False
+    is_in_doubt: PerCaseFlag = False
 
     @property
     def id(self) -> str:
@@ -150,7 +155,7 @@ class RandomError(NamedTuple):
         """Whether the declared size or its effect includes the coverage factor: not for an effect from elsewhere."""
         return self.subject.kind != "other"
 
-    def coverage(self, mission: Mission) -> Any:
+    def coverage(self, mission: Mission) -> PerCase:
         """Coverage factor in the effect of the declared size."""
         return mission.allocation.coverage_factor if self.is_covered else 1.0
 
@@ -160,7 +165,7 @@ class RandomError(NamedTuple):
         return NOTHING if self.noise is None else self.noise.extrapolated
 
     @property
-    def displaces_unknown(self) -> Any:
+    def displaces_unknown(self) -> PerCaseFlag:
         """Cases in which the error displaces the image by an amount that the file leaves open."""
         return False if self.declared is None else (self.declared > 0) & np.isnan(self.full.displacement)
 
@@ -183,7 +188,7 @@ class SensorCases:
         """Whether effects at the edge of a scene are needed."""
         return self.mission.scene.radius is not None
 
-    def vector(self, values: Sequence[Any]) -> Floats:
+    def vector(self, values: Sequence[PerCase]) -> Floats:
         """Three numbers for each case, (3, cases)."""
         numbers = np.empty((3, self.cases))
         for row, value in zip(numbers, values, strict=True):
@@ -209,7 +214,7 @@ class SensorCases:
     def exact(self) -> ExactRanges:
         """Exact ranges at as many nodes as the paths and random errors need."""
         count = nodes_for(self.geometry, self.aperture_time, has_direct_path=self.mission.has_direct_path)
-        count = min(MOST_NODES, max(FEWEST_NODES, int(np.max(count))))
+        count = min(MOST_EFFECT_NODES, max(FEWEST_EFFECT_NODES, int(np.max(count))))
         return exact_ranges(self.mission, self.geometry, count, self.cases)
 
     @cached_property
@@ -233,7 +238,9 @@ class SensorCases:
             Range errors with the line of sight held at mid-aperture, for the published model.
         """
         k, orders = self.exact.k, np.einsum("fn,enc->fec", self.exact.fit, at_mid_aperture)
-        orders = np.where(np.abs(orders) > ROUNDING * np.abs(at_mid_aperture).max(axis=1), orders, 0.0)
+        orders = np.where(
+            np.abs(orders) > VECTOR_ROUNDING_FRACTION * np.abs(at_mid_aperture).max(axis=1), orders, 0.0
+        )
         quadratic, cubic = np.sqrt(np.square(orders[2:]).sum(axis=1))
         # Both orders of a course are one error: unlike the orders of noise they add with their signs.
         (a, b), (c, d) = self.plane.adjugate
@@ -250,7 +257,7 @@ class SensorCases:
         return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance, hidden, beyond_cubic)
 
     def of_gauss_markov(
-        self, courses: Floats, correlation_time: Any, *, is_phase_advanced: bool = False
+        self, courses: Floats, correlation_time: PerCase, *, is_phase_advanced: bool = False
     ) -> RandomEffect:
         """Effect by the full model of independent range errors of variance 1 that change as Gauss–Markov processes.
 
@@ -269,7 +276,7 @@ class SensorCases:
             effects_of_gauss_markov(self.exact, self.weights, courses, ratio, is_phase_advanced=is_phase_advanced)
         )
 
-    def of_process(self, covariance: Floats, beyond: Any) -> RandomEffect:
+    def of_process(self, covariance: Floats, beyond: PerCase) -> RandomEffect:
         """Effect by the full model of a process of the range error: see `effects_of_process`."""
         return self._of_noise(effects_of_process(self.exact, self.weights, covariance, beyond))
 
@@ -289,7 +296,7 @@ class SensorCases:
         x, y, z = np.moveaxis(moved, 1, 0)
         return self.exact.along(platform_index, (x, y, z))
 
-    def moved(self, constant: Any, linear: Any, both: Any = 0.0) -> list[Any]:
+    def moved(self, constant: PerCase, linear: PerCase, both: PerCase = 0.0) -> tuple[PerCase, PerCase]:
         """Sigmas of the displacement by (25). [m]
 
         `constant` and `linear` are mean squares of the two parts at the aperture edge; `both` is their mean product.
@@ -298,17 +305,18 @@ class SensorCases:
         half = self.aperture_time / 2
         slope, product = linear / half**2, 2 * both / half
         scale = np.abs(1 / np.where(self.plane.is_singular, math.nan, self.plane.determinant))
-        return [
+        east, north = (
             np.sqrt(np.maximum(a**2 * constant + a * b * product + b**2 * slope, 0.0)) * scale
             for a, b in self.plane.adjugate
-        ]
+        )
+        return east, north
 
     @cached_property
     def orders(self) -> Floats:
-        """Orders 0 to 3 at the nodes, scaled by their values at the aperture edge as in `LEADING`, (nodes, 4)."""
+        """Orders 0 to 3 at the nodes over their values at the aperture edge, as in `LEGENDRE_LEADING`, (nodes, 4)."""
         return orders_at(self.exact.sampling.places)
 
-    def of_orders(self, covariance: Floats, along: Any = 1.0) -> tuple[Sequence[Floats], Floats]:
+    def of_orders(self, covariance: Floats, along: PerCase = 1.0) -> tuple[Sequence[Floats], Floats]:
         """`sigmas` of phases and displacement by orders 0 to 3 of independent range errors.
 
         `covariance` (4, 4, ...) is the covariance of each error at the aperture edge [m²]. `along` (errors, nodes,
@@ -328,7 +336,7 @@ class SensorCases:
         of_orders = factor(np.moveaxis(covariance.reshape(4, 4, -1), 2, 0))
         return np.asarray(np.einsum("no,cof->fnc", self.orders, of_orders))
 
-    def of_parts(self, noise: Parts, along: Any = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
+    def of_parts(self, noise: Parts, along: PerCase = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
         """Effects by both models of a range error with these parts [m²], per metre of which the data have `along`.
 
         `along` is (nodes, cases). Orders 0 to 3 defocus and displace, and the part beyond them spreads. Up to a turn
@@ -344,7 +352,7 @@ class SensorCases:
         spread = spread * np.sqrt(self.exact.fit[0] @ np.square(along))
         return published, RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
-    def alike(self, value: Any) -> Iterator[tuple[Any, NDArray[np.intp]]]:
+    def alike(self, value: Value) -> Iterator[tuple[Value, Indices]]:
         """Group the cases by the numbers in a value: the value of each group, and the indices of its cases."""
         arrays = list(_arrays_in(value))
         if not arrays:
@@ -357,10 +365,10 @@ class SensorCases:
 
 def orders_at(slow_times: Floats) -> Floats:
     """Orders 0 to 3 at slow times in half apertures, (times, 4), of size 1 at the aperture edge as in `Parts`."""
-    return np.asarray(np.polynomial.legendre.legvander(slow_times, LEADING.size - 1) / LEADING)
+    return np.asarray(np.polynomial.legendre.legvander(slow_times, LEGENDRE_LEADING.size - 1) / LEGENDRE_LEADING)
 
 
-def _arrays_in(value: Any) -> Iterator[Floats]:
+def _arrays_in(value: object) -> Iterator[Floats]:
     if isinstance(value, tuple):
         for value_part in value:
             yield from _arrays_in(value_part)

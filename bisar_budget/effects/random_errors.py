@@ -28,9 +28,11 @@ from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 
 # Effect of a unit by either model: of 1 rad, and of 1 m.
-_CUBIC = RandomEffect(0.0, 1.0, 0.0, 0.0, 0.0, np.diag([0.0, 1.0, 0.0, 0.0])[..., None])
-_DISPLACEMENT = RandomEffect(0.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5), np.diag([0.0, 0.0, 0.5, 0.5])[..., None])
-_EFFECTS = {"cubic_phase_error": ("rad", _CUBIC), "location_error": ("m", _DISPLACEMENT)}
+_CUBIC_EFFECT = RandomEffect(0.0, 1.0, 0.0, 0.0, 0.0, np.diag([0.0, 1.0, 0.0, 0.0])[..., None])
+_DISPLACEMENT_EFFECT = RandomEffect(
+    0.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5), np.diag([0.0, 0.0, 0.5, 0.5])[..., None]
+)
+_UNIT_EFFECTS = {"cubic_phase_error": ("rad", _CUBIC_EFFECT), "location_error": ("m", _DISPLACEMENT_EFFECT)}
 
 
 def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, cases: int = 1) -> list[RandomError]:
@@ -57,7 +59,7 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
 def _stated_effects(mission: Mission) -> Iterator[RandomError]:
     """Cubic phases and displacements from elsewhere that the file states."""
     for index, stated in enumerate(mission.other_errors):
-        for key, (unit, effect) in _EFFECTS.items():
+        for key, (unit, effect) in _UNIT_EFFECTS.items():
             size = getattr(stated, key)
             if size is not None:
                 row_subject = subject("mission", "other", f"{stated.name}.{key}", entry=index)

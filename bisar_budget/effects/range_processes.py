@@ -16,12 +16,13 @@ Derived here. Time series check it in `tests/effects/test_changing_air.py`; draw
 """
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.image_plane import LEADING
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+from bisar_budget.arrays import Floats, PerCase
+from bisar_budget.image_plane import LEGENDRE_LEADING
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 _ORDER_COUNT = 4  # Legendre orders 0 to 3, which displace and defocus
 _LAG_OCTAVE_COUNT = 44  # octaves of lag: half an aperture over the shortest correlation time that a file can state
@@ -58,7 +59,7 @@ def effects_of_courses(exact: ExactRanges, weights: Floats, courses: Floats) -> 
     return RangeEffects(np.einsum("fec,gec->fgc", effects, effects), sizes, beyond.sum(axis=0))
 
 
-def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, beyond: Any) -> RangeEffects:
+def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, beyond: PerCase) -> RangeEffects:
     """Effects of a process.
 
     Parameters
@@ -72,7 +73,7 @@ def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, 
     beyond : (cases,)
         Mean square of the range error in higher orders, which spread. [m²]
     """
-    orders = np.polynomial.legendre.legvander(exact.sampling.places, _ORDER_COUNT - 1) / LEADING
+    orders = np.polynomial.legendre.legvander(exact.sampling.places, _ORDER_COUNT - 1) / LEGENDRE_LEADING
     higher = np.eye(len(orders)) - orders @ exact.fit  # leaves the part beyond the cubic
     bends = np.einsum("nm,amc->anc", higher, exact.slopes)
     weighted_bends = exact.mean * bends

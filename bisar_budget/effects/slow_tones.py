@@ -12,13 +12,14 @@ error. Derived here; exact ranges in 36 phases check it (`tests/effects/test_slo
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.effects.declared import FLOOR_RAD, SECOND_ORDER_FRACTION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.sources import exact_ranges
@@ -27,11 +28,18 @@ from bisar_budget.geometry import BistaticGeometry, Vectors
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
-from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, STILL, ExactRanges, Floats, Indices, Truths, followed
+from bisar_budget.ranges.exact_ranges import (
+    FINE_NODE_COUNT,
+    NO_SHIFTS,
+    ExactRanges,
+    followed,
+)
 
 TONE_PHASE_COUNT = 16  # phases in which exact ranges follow a large vibration
-ANGLES = 2 * math.pi * np.arange(TONE_PHASE_COUNT) / TONE_PHASE_COUNT
-TURNED = np.stack((np.cos(ANGLES), np.sin(ANGLES)), axis=1)  # weights of a cosine and a sine in each phase
+TONE_PHASES_RAD = 2 * math.pi * np.arange(TONE_PHASE_COUNT) / TONE_PHASE_COUNT
+TURNED = np.stack(
+    (np.cos(TONE_PHASES_RAD), np.sin(TONE_PHASES_RAD)), axis=1
+)  # weights of a cosine and a sine in each phase
 VALUES_PER_PHASE = 16  # values of the harmonics from each phase to the next
 MAX_LANE_COUNT = 1 << 12  # lanes in one search
 
@@ -69,11 +77,11 @@ class TonePhases:
         """Rms beyond the cubic in the worst phases, (cases,). [rad]"""
         return _worst(np.square(self.rests))
 
-    def judged(self, gain: Any) -> Floats:
+    def judged(self, gain: PerCase) -> Floats:
         """Phase that counts against a limit raised by the gain of autofocus: `Declared.judged`, (cases,). [rad]"""
         return _worst(np.square(self.quadratics) + np.square(gain * self.hiddens))
 
-    def hidden(self, gain: Any) -> Floats:
+    def hidden(self, gain: PerCase) -> Floats:
         """Hidden phase that, with the worst quadratic phase, gives the judged phase, (cases,). [rad]"""
         return np.asarray(np.sqrt(np.maximum(self.judged(gain) ** 2 - self.quadratic**2, 0.0)) / gain)
 
@@ -86,7 +94,7 @@ class SlowTone(NamedTuple):
     """
 
     subject: Subject
-    is_there: Truths
+    is_there: Booleans
     per_metre: TonePhases
     declared: TonePhases
     hears_part: bool
@@ -106,14 +114,14 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
                 count = nodes_for(geometry, T, has_direct_path=is_heard)
                 exact = exact_ranges(mission, geometry, max(FINE_NODE_COUNT, int(np.max(count))), cases)
             tone = _Tone(exact, platform_index, line.frequency)
-            value, hears_all = line.displacement, not (is_heard or isinstance(line.displacement, tuple))
-            if hears_all:  # the second order of its displacement is rounding
+            value = line.displacement
+            hears_all = not (is_heard or isinstance(value, tuple))
+            if not (is_heard or isinstance(value, tuple)):  # the second order of its displacement is rounding
                 of_axes = tone.of_range(value)[None]
             else:
                 x, y, z = (track / exact.ranges[platform_index] for track in exact.tracks[platform_index])
-                axes, sizes = [(x, y, z)], (value,)
-                if isinstance(value, tuple):
-                    axes, sizes = getattr(geometry, name).frame(error.frame), value
+                sizes: Sequence[float] = (value,) if not isinstance(value, tuple) else value
+                axes = [(x, y, z)] if not isinstance(value, tuple) else getattr(geometry, name).frame(error.frame)
                 of_axes = np.array([tone.of(axis, size) for axis, size in zip(axes, sizes, strict=True)])
             declared, of_metre = TonePhases(*np.moveaxis(of_axes, 1, 0)), TonePhases(*tone.of_range(1.0)[:, None])
             row_subject = subject(name, "vibration", "sinusoidal", entry=index)
@@ -121,7 +129,7 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
     return slow
 
 
-def slow_phases(mission: Mission, slow: Mapping[str, SlowTone], gain: Any) -> list[DeclaredPhase]:
+def slow_phases(mission: Mission, slow: Mapping[str, SlowTone], gain: PerCase) -> list[DeclaredPhase]:
     """Phases of the vibrations below one cycle per aperture, which count with the phases of other errors."""
     T, phases = mission.collection.aperture_time, []
     for row_id, tone in slow.items():
@@ -142,11 +150,11 @@ def slow_phases(mission: Mission, slow: Mapping[str, SlowTone], gain: Any) -> li
 class _Tone:
     """A frequency of a platform's motion in many cases."""
 
-    def __init__(self, exact: ExactRanges, platform_index: int, frequency: Any) -> None:
+    def __init__(self, exact: ExactRanges, platform_index: int, frequency: PerCase) -> None:
         self.exact, self.platform_index = exact, platform_index
         self.angle = 2 * math.pi * frequency * exact.times
 
-    def of_range(self, size: Any) -> Floats:
+    def of_range(self, size: PerCase) -> Floats:
         """Effects of a range error of an amplitude, a number or (nodes, cases), to first order. [m]
 
         The fields of `TonePhases` in all phases, (4, TONE_PHASE_COUNT, cases). [rad]
@@ -159,7 +167,7 @@ class _Tone:
         hidden, beyond_cubic = exact.unresolved(np.tensordot(TURNED, remaining, 1))
         return np.array((quadratic, cubic, hidden, beyond_cubic))
 
-    def of(self, way: Vectors, size: Any) -> Floats:
+    def of(self, way: Vectors, size: PerCase) -> Floats:
         """Effects, as `of_range`, of a motion of any size [m] along a way of floats, (cases,) or (nodes, cases)."""
         exact, cases = self.exact, self.exact.half.size
         small, size = (
@@ -184,19 +192,19 @@ class _Tone:
 
         Where no ground point has the range history of a phase, the phase of the whole motion replaces each effect.
         """
-        case, turned = np.repeat(cases, TONE_PHASE_COUNT), np.tile(ANGLES, cases.size)
+        case, turned = np.repeat(cases, TONE_PHASE_COUNT), np.tile(TONE_PHASES_RAD, cases.size)
         angle = self.angle[:, case] if self.angle.shape[1] > 1 else self.angle
         course = size[case] * np.cos(angle + turned)
         moved = [_of_case(component, case) * course for component in way]
-        shifts = [moved, STILL] if self.platform_index == 0 else [STILL, moved]
+        shifts = [moved, NO_SHIFTS] if self.platform_index == 0 else [NO_SHIFTS, moved]
         point = followed(self.exact, np.zeros_like(course), shifts, case)
         phases = np.array((point.quadratic, point.cubic, point.hidden, point.rest))
         phases = np.moveaxis(phases.reshape(4, cases.size, TONE_PHASE_COUNT), 2, 1)
         return np.where(np.isnan(phases), 2 * self.exact.k[cases] * size[cases], phases)
 
 
-def _of_case(component: Any, case: Indices) -> Any:
-    return component[..., case] if np.ndim(component) and np.shape(component)[-1] > 1 else component
+def _of_case(component: PerCase, case: Indices) -> PerCase:
+    return component[..., case] if isinstance(component, np.ndarray) and component.shape[-1] > 1 else component
 
 
 def _worst(squares: Floats) -> Floats:

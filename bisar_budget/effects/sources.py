@@ -4,14 +4,15 @@ A check lists all of them, with the errors that the file does not declare, becau
 sizes. A sweep lists the declared errors, and the errors whose rows are asked for.
 """
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.arrays import PerCase
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.combined import squared
 from bisar_budget.effects.effect import (
     CLOCK_UNITS,
@@ -24,7 +25,7 @@ from bisar_budget.effects.effect import (
     subject,
 )
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, Vectors
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, VectorArrays, Vectors
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
@@ -35,7 +36,8 @@ if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
 
 AnyEffect = TypeVar("AnyEffect", Effect, FullEffect)
-_AXES: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+AnyVector = TypeVar("AnyVector", VectorArrays, Vectors)
+_UNIT_VECTORS: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _PUBLISHED_UNIT = Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0)  # effect of a pure phase error
 _FULL_UNIT = FullEffect(east=0.0, north=0.0, qpe=1.0, cubic=0.0)
 
@@ -45,7 +47,7 @@ def exact_ranges(
 ) -> ExactRanges:
     """Exact ranges of a mission's cases at their scene centres, at `count` nodes or as many as the cases need."""
     T, is_heard = mission.collection.aperture_time, mission.has_direct_path
-    count = count or nodes_for(geometry, T, has_direct_path=is_heard)
+    count = count or int(nodes_for(geometry, T, has_direct_path=is_heard))
     return ExactRanges.of(geometry.both, mission.radar, T, count, cases, has_direct_path=is_heard)
 
 
@@ -59,6 +61,10 @@ def distribution_of(mission: Mission, source: ErrorSource) -> str:
     if source.is_common and mission.common_motion_error is not None:
         return mission.common_motion_error.distribution
     return "bound"
+
+
+# The evaluators take and give numbers, or arrays of cases.
+_published_motion: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.published_motion
 
 
 class ErrorListing:
@@ -82,14 +88,14 @@ class ErrorListing:
         yield from self._of_terrain()
         yield from self._stated_elsewhere()
 
-    def _is_listed(self, row_subject: Subject, declared: Any) -> bool:
+    def _is_listed(self, row_subject: Subject, declared: object) -> bool:
         return declared is not None or self.shown is None or row_subject.id in self.shown
 
     @cached_property
-    def _published(self) -> list[Any]:
+    def _published(self) -> list[tuple[tuple[PerCase, ...], ...]]:
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
         return [
-            evaluators.published_motion(*path.position, *path.velocity, path.slant_range, wavelength, T)
+            _published_motion(*path.position, *path.velocity, path.slant_range, wavelength, T)
             for path in self.geometry.both
         ]
 
@@ -98,11 +104,71 @@ class ErrorListing:
         if (platform_index, kind) not in self._legs:
             first = 3 * list(MOTION_UNITS).index(kind)
             published = [Effect._make(row) for row in self._published[platform_index][first : first + 3]]
-            along = np.stack([self.exact.along(platform_index, axis) for axis in _AXES])
+            along = np.stack([self.exact.along(platform_index, axis) for axis in _UNIT_VECTORS])
             effects = self.exact.effect(along * self.exact.powers[MOTION_UNITS[kind]])
-            full = [FullEffect._make(row) for row in zip(*effects, strict=True)]
+            full = [FullEffect._make(row) for row in zip(*map(np.asarray, effects), strict=True)]
             self._legs[platform_index, kind] = published, full
         return self._legs[platform_index, kind]
+
+    @cached_property
+    def _motions(self) -> list[Any]:
+        """Motion of each platform by unit errors of its state, (3, 3, 3, nodes, cases); None without free fall."""
+        exact = self.exact
+        return [
+            path.fall and path.fall.motions(path, exact.half, exact.sampling.places) for path in self.geometry.both
+        ]
+
+    def _flown(
+        self, kind: str, directions: Mapping[int, Vectors], frame: str
+    ) -> tuple[FullEffect, tuple[VectorArrays, VectorArrays], tuple[Vectors, Vectors] | None] | None:
+        """Effect of a unit of an error of platforms in free fall; None if no platform of the error is in free fall.
+
+        A platform in free fall follows the dynamics of its orbit. The velocity of `ric` is that against the stars: a
+        position error without a velocity error turns with nothing. In all other frames it turns with the Earth.
+
+        Parameters
+        ----------
+        kind : str
+            Position, velocity or acceleration.
+        directions : mapping of int to Vectors
+            Direction of the error of each platform that has it, by its index.
+        frame : str
+            Frame in which the file states the error.
+
+        Returns
+        -------
+        full : FullEffect
+            Effect of a small unit.
+        shifts : two of Vectors
+            Motions at the nodes, (nodes, cases). [m]
+        rates : two of Vectors, optional
+            Velocities at mid-aperture of position errors in `ric`. [m/s]
+        """
+        if all(self._motions[platform_index] is None for platform_index in directions):
+            return None
+        moved = np.zeros_like(self.exact.times)
+        shifts, rates = dict[int, VectorArrays](), dict[int, Vectors]()
+        for platform_index, direction in directions.items():
+            motions, fall = self._motions[platform_index], self.geometry.both[platform_index].fall
+            is_at_rest = kind == "position" and frame == "ric" and fall is not None
+            rates[platform_index] = fall.rate_against_stars(direction) if is_at_rest and fall else NOWHERE
+            if motions is None:
+                course = self.exact.powers[MOTION_UNITS[kind]]
+                x, y, z = (component * course for component in direction)
+            else:
+                state = motions[list(MOTION_UNITS).index(kind)]
+                x, y, z = sum(state[axis] * direction[axis] for axis in range(3))
+                if is_at_rest:
+                    turned = sum(motions[1][axis] * rates[platform_index][axis] for axis in range(3))
+                    x, y, z = x + turned[0], y + turned[1], z + turned[2]
+            shifts[platform_index] = (x, y, z)
+            moved = moved + self.exact.along(platform_index, shifts[platform_index])
+        has_rates = kind == "position" and frame == "ric"
+        return (
+            self.exact.effect(moved),
+            _of_both_platforms(shifts),
+            _of_both_platforms(rates) if has_rates else None,
+        )
 
     def _of_motion(self, platform_index: int, name: str, kind: str, unit: str) -> Iterator[ErrorSource]:
         error: MotionError = getattr(self.mission.platforms, name).motion_error
@@ -121,7 +187,7 @@ class ErrorListing:
             # Where the file states an error along other axes, its scene axes are listed only if all rows are.
             if self.shown is not None and row_subject.id not in self.shown and not (in_scene and values is not None):
                 continue
-            on_axis = None
+            on_axis: PerCase | None = None
             if values is not None:
                 if in_scene:
                     on_axis = values[axis] * self.factor
@@ -133,35 +199,40 @@ class ErrorListing:
                     )
             if covariance is not None:
                 row_path = (*path, *covariance.path(kind, axis))
+            flown = self._flown(kind, {platform_index: _UNIT_VECTORS[axis]}, "scene")
             yield ErrorSource(
                 subject=row_subject,
                 unit=unit,
                 declared=on_axis,
                 path=row_path if in_scene and values is not None and key != "sensor" else path,
                 effect=published[axis],
-                full=full[axis],
-                direction=_AXES[axis],
+                full=full[axis] if flown is None else flown[0],
+                direction=_UNIT_VECTORS[axis],
                 equation=equation,
                 no_limit=no_limit,
                 evidence=evidence,
                 is_independent=in_scene,
                 notes=notes,
+                shifts=flown and flown[1],
             )
         if in_scene or values is None:
             return
         for index, (axis_name, direction) in enumerate(zip(FRAME_AXES[error.frame], axes, strict=True)):
+            flown = self._flown(kind, {platform_index: direction}, error.frame)
             yield ErrorSource(
                 subject=subject(name, kind, axis_name, error.frame),
                 unit=unit,
                 declared=values[index] * self.factor,
                 path=(*path, *((index,) if covariance is None else covariance.path(kind, index))),
                 effect=_along(published, direction),
-                full=_along(full, direction),
+                full=_along(full, direction) if flown is None else flown[0],
                 direction=direction,
                 equation=_equation(kind, None),
                 no_limit=_no_limit(kind, _axis_of(error.frame, axis_name)),
                 evidence=evidence,
                 notes=notes,
+                shifts=flown and flown[1],
+                rates=flown and flown[2],
             )
 
     def _of_clock(self) -> Iterator[ErrorSource]:
@@ -188,9 +259,9 @@ class ErrorListing:
         self,
         row_subject: Subject,
         unit: str,
-        value: Any,
+        value: PerCase | None,
         path: KeyPath,
-        terms: tuple[Any, ...],
+        terms: tuple[PerCase, ...],
         no_limit: Note,
         equation: str = "Table I row 1",
         evidence: str | None = None,
@@ -199,7 +270,7 @@ class ErrorListing:
         """An error of the clock whose unit has these terms t̃₀ … t̃₃. The published model always hears it."""
         clock = terms if is_heard else (0.0,) * 4
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
-        rows = evaluators.published_clock(SPEED_OF_LIGHT, wavelength, T)
+        rows = evaluators.published_clock(SPEED_OF_LIGHT_MPS, wavelength, T)
         of_terms = (
             [term * per_term for per_term in row] for term, row in zip(terms, rows, strict=True) if np.any(term)
         )
@@ -222,7 +293,12 @@ class ErrorListing:
         sync = self.mission.synchronization
         if sync is None:
             return
-        frequency: tuple[Any, ...] = (sync.age if sync.is_holdover else 0.0, 1.0, 0.0, 0.0)
+        frequency: tuple[PerCase, ...] = (
+            sync.age if sync.is_holdover and sync.age is not None else 0.0,
+            1.0,
+            0.0,
+            0.0,
+        )
         if sync.is_direct_path:
             frequency = self._delay_of_the_echo
         for kind, unit, value, terms in (
@@ -238,10 +314,10 @@ class ErrorListing:
                 yield self._of_terms(row_subject, unit, value, path, terms, no_limit, evidence=sync.source)
 
     @property
-    def _delay_of_the_echo(self) -> tuple[Any, ...]:
+    def _delay_of_the_echo(self) -> tuple[PerCase, ...]:
         """Terms of the delay of the echo after the direct path, which a wrong clock measures wrong. [s]"""
         exact = self.exact
-        seconds = (sum(exact.ranges) - exact.baselines) / SPEED_OF_LIGHT
+        seconds = (sum(exact.ranges) - exact.baselines) / SPEED_OF_LIGHT_MPS
         powers = np.vander(exact.sampling.places, 4, increasing=True)
         return tuple(
             coefficient / exact.half**power
@@ -262,7 +338,7 @@ class ErrorListing:
         if value is None and not (is_set and self._is_listed(row_subject, value)):
             return
         path = ("platforms", name, "oscillator", "aging")
-        terms: tuple[Any, ...] = (0.0, 0.0, 0.5 * (sync is None), 0.0)
+        terms: tuple[PerCase, ...] = (0.0, 0.0, 0.5 * (sync is None), 0.0)
         if is_set:
             terms = (age**2 / 2, age, 0.5, 0.0)
         no_limit = (
@@ -303,7 +379,10 @@ class ErrorListing:
                 both = [self.legs(platform_index, kind) for platform_index in (0, 1)]
                 published = self._of_both([legs for legs, _ in both], axis, None if in_scene else ways)
                 full = self._of_both([legs for _, legs in both], axis, None if in_scene else ways)
-                if kind == "position" and name in ("x", "y"):
+                flown = self._flown(kind, dict(enumerate(ways)), error.frame)
+                if flown is not None:
+                    full = flown[0]
+                elif kind == "position" and name in ("x", "y"):
                     # A horizontal shift of both platforms is a shift of the scene: x̂ is the error itself, and β̃ₙ and
                     # ½s̈·x̂ cancel. The rest of a sum of rounded numbers would give a limit where none exists.
                     full = full._replace(qpe=0.0 * full.qpe, cubic=0.0 * full.cubic)
@@ -326,6 +405,8 @@ class ErrorListing:
                     evidence=error.source,
                     notes=(phrases.note("held-to-the-total", owners="both platforms"),),
                     of_receiver=None if in_scene else ways[1],
+                    shifts=flown and flown[1],
+                    rates=flown and flown[2],
                 )
 
     @staticmethod
@@ -353,7 +434,13 @@ class ErrorListing:
             yield self._of_time_tag("mission", (0, 1), common.time_tag, key, common.source, note)
 
     def _of_time_tag(
-        self, owner: str, platform_indices: Sequence[int], value: Any, key: KeyPath, source: str | None, *notes: Note
+        self,
+        owner: str,
+        platform_indices: Sequence[int],
+        value: PerCase,
+        key: KeyPath,
+        source: str | None,
+        *notes: Note,
     ) -> ErrorSource:
         ways = [self._velocities(path) for path in self.geometry.both]
         moved = np.sum(
@@ -399,7 +486,7 @@ class ErrorListing:
             path=("scene", "height_error"),
             effect=published,
             full=full,
-            direction=_AXES[2],
+            direction=_UNIT_VECTORS[2],
             equation="full model",
             no_limit=phrases.note("no-quadratic-term-of-height"),
             notes=(phrases.note("held-to-the-total", owners="no platform"),),
@@ -439,8 +526,8 @@ def _scene_axes(name: str, kind: str) -> tuple[tuple[Subject, KeyPath, str, Note
 
 
 def _along_scene_axis(
-    declared: Sequence[Any], axes: tuple[Vectors, Vectors, Vectors], axis: int, distribution: str
-) -> Any:
+    declared: Sequence[PerCase], axes: tuple[Vectors, Vectors, Vectors], axis: int, distribution: str
+) -> PerCase:
     """Size along one axis of the scene of errors stated along the axes of another frame.
 
     The three errors are independent, so one-sigma values add as squares and bounds add as magnitudes: a signed
@@ -451,7 +538,7 @@ def _along_scene_axis(
     return np.copysign(size, a + b + c)
 
 
-def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[Any]) -> Any:
+def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[PerCase]) -> PerCase:
     """Sigma of position or velocity error along a direction in the frame's axes: √(dᵀCd)."""
     parts = [sigma * along for sigma, along in zip(covariance.of(kind), direction, strict=True)]
     return np.sqrt(squared(covariance.block(kind), parts))
@@ -463,14 +550,20 @@ def _along(effects: Sequence[AnyEffect], direction: Vectors) -> AnyEffect:
     return type(effects[0])(*map(_total, terms))
 
 
+def _of_both_platforms(vectors: Mapping[int, AnyVector]) -> tuple[AnyVector, AnyVector]:
+    """Vectors of both platforms from the vectors of the platforms that have an error: the other's is not used."""
+    first = next(iter(vectors.values()))
+    return vectors.get(0, first), vectors.get(1, first)
+
+
 def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:
     return type(effects[0])(*map(_total, zip(*effects, strict=True)))
 
 
-def _total(terms: Sequence[Any]) -> Any:
+def _total(terms: Sequence[PerCase]) -> PerCase:
     """Sum of terms. Where terms cancel exactly, the rest is rounding and would give a false limit: it becomes 0."""
     total = sum(terms)
-    return np.where(np.abs(total) > ROUNDING * sum(np.abs(term) for term in terms), total, 0.0)
+    return np.where(np.abs(total) > VECTOR_ROUNDING_FRACTION * sum(np.abs(term) for term in terms), total, 0.0)
 
 
 def _equation(kind: str, axis: int | None) -> str:

@@ -11,14 +11,14 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache, partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.image_plane import nodes
-from bisar_budget.ranges.exact_ranges import Floats
 
 SERIES_ANGLE_RAD = 0.5  # angle, or ratio; below it terms cancel and a series is exact to 1e-8
 
@@ -32,16 +32,16 @@ class Parts(NamedTuple):
     other phase, even and odd orders are uncorrelated.
     """
 
-    quadratic: Any
-    cubic: Any
-    left: Any
-    constant: Any = math.inf
-    linear: Any = math.inf
-    constant_quadratic: Any = -math.inf
-    linear_cubic: Any = -math.inf
-    constant_linear: Any = 0.0
-    constant_cubic: Any = 0.0
-    linear_quadratic: Any = 0.0
+    quadratic: PerCase
+    cubic: PerCase
+    left: PerCase
+    constant: PerCase = math.inf
+    linear: PerCase = math.inf
+    constant_quadratic: PerCase = -math.inf
+    linear_cubic: PerCase = -math.inf
+    constant_linear: PerCase = 0.0
+    constant_cubic: PerCase = 0.0
+    linear_quadratic: PerCase = 0.0
 
     @property
     def covariance(self) -> Floats:
@@ -62,7 +62,7 @@ class Parts(NamedTuple):
         """All parts, (parts, ...)."""
         return np.array(np.broadcast_arrays(*self))
 
-    def times(self, power: Any) -> "Parts":
+    def times(self, power: PerCase) -> "Parts":
         """Parts of a phase with `power` times the power."""
         return Parts(*(mean_square * power for mean_square in self))
 
@@ -78,7 +78,7 @@ class Parts(NamedTuple):
         return self._replace(constant=nothing, constant_quadratic=nothing)
 
 
-def gauss_markov(aperture_time: Any, correlation_time: Any) -> Parts:
+def gauss_markov(aperture_time: PerCase, correlation_time: PerCase) -> Parts:
     """Parts of a stationary process of variance 1 and correlation exp(−|t|/τ_c)."""
     ratio = np.asarray(aperture_time / (2 * correlation_time))
     (slow,) = evaluators.gauss_markov_parts_slow(np.minimum(ratio, SERIES_ANGLE_RAD))
@@ -87,7 +87,7 @@ def gauss_markov(aperture_time: Any, correlation_time: Any) -> Parts:
     return Parts(*(np.where(ratio < SERIES_ANGLE_RAD, *both)[()] for both in zip(slow, exact, strict=True)))
 
 
-def tone(angle: Any) -> Floats:
+def tone(angle: PerCase) -> Floats:
     """Amplitudes of the parts of a tone of amplitude 1, each in its worst phase, and the power share of the rest.
 
     `angle` is πfT. The rows are quadratic phase, cubic phase, the share of the tone's power beyond the cubic,
@@ -100,7 +100,7 @@ def tone(angle: Any) -> Floats:
     return np.where(angle < SERIES_ANGLE_RAD, slow, exact)
 
 
-def held(step: Any) -> Any:
+def held(step: PerCase) -> PerCase:
     """Spectrum of samples joined by straight lines, over the spectrum of white noise of their variance: sinc⁴."""
     return np.sinc(step / (2 * math.pi)) ** 4
 
@@ -122,7 +122,7 @@ _STEEP_EXPONENT = 4.0  # slope beyond which straight lines do not flatten an ima
 _FALL_EXPONENT = 6.0  # powers of e by which a steep piece falls from edge to edge
 
 # Nodes and weights of Gauss and Legendre on 0 … 1.
-_NODES, _WEIGHTS = (
+_LEGENDRE_NODES, _LEGENDRE_WEIGHTS = (
     (0.5 + 0.5 * nodes(6).places)[:, None],
     nodes(6).fit[0][:, None],
 )
@@ -147,7 +147,7 @@ class PowerLawPiece(NamedTuple):
     density: float
     slope: float
 
-    def at(self, f: Any) -> Any:
+    def at(self, f: PerCase) -> PerCase:
         """Density of the power law at frequencies. [rad²/Hz]"""
         return self.density * f**-self.slope
 
@@ -168,7 +168,7 @@ def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
     return total
 
 
-def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, above: Any = 0.0) -> Parts:
+def parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, above: PerCase = 0.0) -> Parts:
     """Integrate a spectrum with the parts of a tone, to 1e-4.
 
     Parameters
@@ -196,7 +196,7 @@ def left_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval:
     return Parts(*parts_of_times.rows[:, time_index])
 
 
-def _like(total: Floats, aperture_time: Any) -> Parts:
+def _like(total: Floats, aperture_time: PerCase) -> Parts:
     """Parts as numbers or as arrays, like the aperture times."""
     return Parts(*total) if np.ndim(aperture_time) else Parts(*total[:, 0].tolist())
 
@@ -258,8 +258,8 @@ def _fast(slope: float, low: Floats, high: Floats) -> Floats:
 def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
     """Parts of x^(−slope) over panels (n,), by their nodes."""
     span = np.log(high / low)
-    x = low * np.exp(span * _NODES)
-    power = x**-slope * x * span * _WEIGHTS
+    x = low * np.exp(span * _LEGENDRE_NODES)
+    power = x**-slope * x * span * _LEGENDRE_WEIGHTS
     return np.asarray((power * squares(x)).sum(axis=1))
 
 
@@ -278,7 +278,7 @@ def squares(angle: Floats) -> Floats:
 _RESOLVED_AGE_CYCLES = (
     24.0  # cycles within the age of the setting up to which aperture and setting are followed together
 )
-_AGES = np.concatenate(
+_GRID_AGES_CYCLES = np.concatenate(
     (np.geomspace(1e-6, 0.125, 18), np.arange(0.25, _RESOLVED_AGE_CYCLES + 0.1, 0.25))
 )  # edges, in cycles
 
@@ -315,12 +315,17 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
     ]
     ends = np.array([edge for piece in pieces for edge in (piece.low, piece.high)])[:, None] * age
     edges = (
-        np.sort(np.concatenate((_AGES[:, None] + 0.0 * age, np.clip(ends, _AGES[0], _RESOLVED_AGE_CYCLES))), axis=0)
+        np.sort(
+            np.concatenate(
+                (_GRID_AGES_CYCLES[:, None] + 0.0 * age, np.clip(ends, _GRID_AGES_CYCLES[0], _RESOLVED_AGE_CYCLES))
+            ),
+            axis=0,
+        )
         / age
     )
     span = np.log(edges[1:] / edges[:-1])
-    f = edges[:-1] * np.exp(span * _NODES[:, None])  # (nodes, panels, cases)
-    weight = density(pieces, f) * f * span * _WEIGHTS[:, None]
+    f = edges[:-1] * np.exp(span * _LEGENDRE_NODES[:, None])  # (nodes, panels, cases)
+    weight = density(pieces, f) * f * span * _LEGENDRE_WEIGHTS[:, None]
     for order_index, square in enumerate(_squares_of_set(f, aperture_time, age, averaging)):
         together[order_index] = together[order_index] + (weight * square).sum(axis=(0, 1))
     constant, linear, both, even, to_cubic, to_quadratic, odd = together
@@ -346,7 +351,7 @@ def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Fl
 _FOLLOWED_DELAY_CYCLES = 12  # turns of a tone within the delay up to which panels resolve them
 
 
-def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, delay: Any) -> Parts:
+def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: PerCase) -> Parts:
     """Integrate the difference of a clock's phase between two times, `delay` apart: S·4 sin²(πfΔt).
 
     Parameters
@@ -374,7 +379,7 @@ def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, delay: Any)
 
 
 # ---------------------------------------------------------------------- synchronisation
-def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, interval: float) -> Parts:
+def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, interval: float) -> Parts:
     """Integrate the rest of a spectrum after synchronisation: the phase less the straight lines between its samples.
 
     Straight lines pass sinc²(f·T_s) of a tone, and fold every tone at a distance of m/T_s onto it. They leave of a
@@ -391,17 +396,17 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, inte
     edges = [[*_exchange_edges(T, rate), *images] for T in times.tolist()]
     total = _over_panels(lambda f, cases: _unjoined(pieces, f, rate), edges, last, scale)
     _add_fast(total, pieces, last, scale, 1.0)  # straight lines pass no fast noise
-    total += parts(_far_images(pieces, images, rate), times)[:_INTEGRAL_COUNT]
+    total += np.array(parts(_far_images(pieces, images, rate), times)[:_INTEGRAL_COUNT])
     return _like(total, aperture_time)
 
 
-def link_parts(aperture_time: Any, interval: float) -> Parts:
+def link_parts(aperture_time: PerCase, interval: float) -> Parts:
     """Parts of samples of variance 1 with straight lines between: one-sided 2·T_s·sinc⁴(f·T_s), ⅔ in all."""
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     edges = [_exchange_edges(T, rate) for T in times.tolist()]
     last = np.full(times.shape, _FOLLOWED_IMAGE_COUNT * rate)
     total = _over_panels(
-        lambda f, cases: 2 * interval * held(2 * math.pi * f * interval), edges, last, math.pi * times
+        lambda f, cases: np.asarray(2 * interval * held(2 * math.pi * f * interval)), edges, last, math.pi * times
     )
     return _like(total, aperture_time)
 
@@ -442,8 +447,8 @@ def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, s
     """Parts of panels (n,)."""
     is_first = low == 0
     span = np.log(high / np.where(is_first, high, low))
-    f = np.where(is_first, high * _NODES, low * np.exp(span * _NODES))
-    width = np.where(is_first, high, f * span) * _WEIGHTS
+    f = np.where(is_first, high * _LEGENDRE_NODES, low * np.exp(span * _LEGENDRE_NODES))
+    width = np.where(is_first, high, f * span) * _LEGENDRE_WEIGHTS
     angle, of_tone = f * scale, np.empty((_INTEGRAL_COUNT, *f.shape))
     is_mean = (low * scale >= _FAST / _SAME_EDGE_RATIO) & ((high - low) * scale > _RESOLVED_TURN_COUNT * math.pi)
     of_tone[..., ~is_mean] = squares(angle[:, ~is_mean])
@@ -493,10 +498,10 @@ def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: f
     begin. Beginnings half a rate before and half a rate behind replace that term.
     """
     low, high = np.array(list(_panels(rate / 2, [rate / 4, *edges]))).T
-    f = low + (high - low) * _NODES
+    f = low + (high - low) * _LEGENDRE_NODES
     aliases = density(pieces, f) + sum((_aliases(piece, f, rate) for piece in pieces), np.zeros_like(f))
     x = f / rate
-    powers = aliases * np.sin(math.pi * x) ** 4 * (high - low) * _WEIGHTS
+    powers = aliases * np.sin(math.pi * x) ** 4 * (high - low) * _LEGENDRE_WEIGHTS
     at_half = 2 * float((powers * (x**2 - x + 1 / 6)).sum())
     integral, last = float(powers.sum()), float(_FOLLOWED_IMAGE_COUNT)
     return [

@@ -30,24 +30,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import phrases
-from bisar_budget.constants import ROUNDING
+from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
+from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import Moves, RandomError, SensorCases
 from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, left_parts, tone
-from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vector, dot
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vector, Vectors, dot
 from bisar_budget.image_plane import nodes, nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.vibrations import AcceleratedSinusoid, FeltVibration, Spectrum, Vibration
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.units import format_quantity
 
 NEAR_CYCLES = 2.5  # per aperture; farther apart, two equal lines raise each other's echo by less than 1.1 dB
 SLOWEST_ECHO_CYCLES = 1.0  # cycles per aperture; a slower vibration makes no echoes
 ECHO_CYCLES = 3.0  # likewise; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
 
-_STEPS = (0.1, 0.02)  # of the search, in cells
+_SEARCH_STEPS_CELLS = (0.1, 0.02)  # coarse, then fine
 _REACH = np.arange(-6, 7)[:, None, None]
 _SEARCH_START_COUNT = 16  # positions around which the search looks
 _MAX_ECHO_COUNT = 200_000  # echoes in one array
@@ -61,8 +61,8 @@ _STEEP_PIECE_COUNT = 16  # flat pieces in place of a steep piece, which is narro
 class Worst(NamedTuple):
     """Lines in their worst phases: the amplitude of one line with an echo as high, and the position of that echo."""
 
-    amplitude: Any
-    cycles: Any
+    amplitude: PerCase
+    cycles: PerCase
 
 
 def near_groups(cycles: Floats) -> NDArray[np.intp]:
@@ -91,7 +91,9 @@ def near_lines(cycles: Sequence[float]) -> list[tuple[int, ...]]:
     return [tuple(np.flatnonzero(number == group).tolist()) for group in range(number.max() + 1)]
 
 
-def worst_phases(amplitudes: Any, cycles: Any, is_member: Truths | None = None) -> Worst:
+def worst_phases(
+    amplitudes: Sequence[PerCase] | Floats, cycles: Sequence[PerCase] | Floats, is_member: Booleans | None = None
+) -> Worst:
     """Find the height of the echoes of several lines together in their worst phases.
 
     Parameters
@@ -163,7 +165,7 @@ def _count(frequencies: Floats, starts: Floats, reach: int) -> NDArray[np.intp]:
 def _searched(sizes: Floats, frequencies: Floats, starts: Floats) -> tuple[Floats, Floats]:
     """Height and position of the highest echo at the starts and in steps around them."""
     best = starts
-    for step in _STEPS:
+    for step in _SEARCH_STEPS_CELLS:
         tried = best + step * _REACH
         highest = _heights(sizes, frequencies, tried).argmax(axis=0)
         best = best + step * (highest + _REACH[0, 0, 0])
@@ -185,21 +187,20 @@ class Line(NamedTuple):
     `per_metre` is the size of a metre of it in the unit of its row: (2πf)² where the file states its acceleration.
     """
 
-    amplitude: Any
+    amplitude: PerCase
     frequency: Any
-    per_metre: Any = 1.0
+    per_metre: PerCase = 1.0
 
 
-def sight_of(mission: Mission, name: str, geometry: Any = None) -> Vector:
+def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> Vectors:
     """Range, or range less the direct path, that a metre of a platform's motion removes. [-]"""
     sights = (geometry or mission.geometry).sights(has_direct_path=mission.has_direct_path)
-    sight: Vector = sights[PLATFORMS.index(name)]
-    return sight
+    return sights[PLATFORMS.index(name)]
 
 
 def seen_of_axes(
     mission: Mission, name: str, *, is_vector: bool, geometry: BistaticGeometry | None = None
-) -> list[Any]:
+) -> list[PerCase]:
     """Share of a metre along each axis of a platform's error that the range contains, rms over the aperture. [-]
 
     The line of sight turns. The rms bounds the height of every echo, and gives the spread. A vibration that is no
@@ -215,29 +216,38 @@ def seen_of_axes(
     error: MotionError = getattr(mission.platforms, name).motion_error
     ways = getattr(geometry, name).frame(error.frame) if is_vector else [turned.both[platform_index].look]
     mean = sampling.fit[0]
-    floor = ROUNDING * np.sqrt(mean @ sum(component * component for component in sight))
+    floor = VECTOR_ROUNDING_FRACTION * np.sqrt(mean @ sum(component * component for component in sight))
     along = [np.sqrt(mean @ np.square(dot(way, sight))) for way in ways]
     seen = [np.where(component > floor, component, 0.0) for component in along]
-    return seen if np.ndim(T) or seen[0].size > 1 else [component.item() for component in seen]
+    if np.ndim(T) or seen[0].size > 1:
+        return [*seen]
+    return [component.item() for component in seen]
 
 
-def counted(mission: Mission, name: str, value: Any, metric: str, geometry: BistaticGeometry | None = None) -> Any:
+def counted(
+    mission: Mission,
+    name: str,
+    value: PerCase | Vectors,
+    metric: str,
+    geometry: BistaticGeometry | None = None,
+) -> PerCase:
     """Amplitude (`pslr`) or rms (`islr`) of a platform's vibration along the line of sight, by `seen_of_axes`. [m]
 
     Projections of amplitudes add, because the axes may vibrate in any phase. Rms values count as independent and add
     as squares.
     """
-    is_vector = isinstance(value, tuple)
-    seen = seen_of_axes(mission, name, is_vector=is_vector, geometry=geometry)
-    projections = [along * size for along, size in zip(seen, value if is_vector else (value,), strict=True)]
-    return (
+    sizes = value if isinstance(value, tuple) else (value,)
+    seen = seen_of_axes(mission, name, is_vector=isinstance(value, tuple), geometry=geometry)
+    projections = [along * size for along, size in zip(seen, sizes, strict=True)]
+    total: PerCase = (
         sum(map(np.abs, projections))
         if metric == "pslr"
         else np.sqrt(sum(projection * projection for projection in projections))
     )
+    return total
 
 
-def lines_of(mission: Mission, name: str, geometry: Any = None) -> list[Line]:
+def lines_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> list[Line]:
     """Sinusoids of one platform, along the line of sight."""
     error: MotionError = getattr(mission.platforms, name).motion_error
     lines = error.vibration.sinusoidal
@@ -273,17 +283,19 @@ def projected(
 
 
 # ---------------------------------------------------------------------- below one cycle per aperture
-def quadratic_part(cycles: Any) -> Any:
+def quadratic_part(cycles: PerCase) -> PerCase:
     """Worst quadratic phase at the aperture edge of a sinusoid, over its peak phase: 7.5·j₂(π·cycles).
 
     It is the least-squares quadratic of cos(πnx) over the aperture. Where n is small it is the Taylor term (πn)²/2.
     """
-    return np.abs(tone(math.pi * cycles)[0])
+    phase: PerCase = np.abs(tone(math.pi * cycles)[0])
+    return phase
 
 
-def cubic_part(cycles: Any) -> Any:
+def cubic_part(cycles: PerCase) -> PerCase:
     """Worst cubic phase at the aperture edge: 17.5·j₃(π·cycles), the least-squares cubic of sin(πnx)."""
-    return np.abs(tone(math.pi * cycles)[1])
+    phase: PerCase = np.abs(tone(math.pi * cycles)[1])
+    return phase
 
 
 class DeclaredPhase(NamedTuple):
@@ -296,13 +308,13 @@ class DeclaredPhase(NamedTuple):
 
     row_id: str
     owner: str
-    qpe_rad: Any
+    qpe_rad: PerCase
     cubic_rad: Any
-    coverage: Any = 1.0
-    is_there: Any = True
-    hidden_rad: Any = 0.0
+    coverage: PerCase = 1.0
+    is_there: PerCaseFlag = True
+    hidden_rad: PerCase = 0.0
 
-    def judged(self, gain: Any) -> Any:
+    def judged(self, gain: PerCase) -> PerCase:
         """Magnitude of the phase that counts against a limit raised by autofocus' gain: `Declared.judged`. [rad]"""
         return np.hypot(self.qpe_rad, gain * self.hidden_rad)
 
@@ -329,7 +341,7 @@ def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
 
 
 # ---------------------------------------------------------------------- by a spectrum
-def power_of(vibration: Vibration | FeltVibration) -> Any:
+def power_of(vibration: Vibration | FeltVibration) -> PerCase:
     """Factor of power by which `spectrum_level` shifts a spectrum."""
     return 1.0 if vibration.spectrum_level is None else 10 ** (np.asarray(vibration.spectrum_level) / 10)
 
@@ -363,7 +375,11 @@ def _mean(slope: float, low: float, high: float, at_low: float, at_high: float) 
 
 
 def spectrum_parts(
-    seen: SensorCases, spectrum: Spectrum, law: tuple[float, float], interval: Any = None, delay: Any = None
+    seen: SensorCases,
+    spectrum: Spectrum,
+    law: tuple[float, float],
+    interval: float | None = None,
+    delay: PerCase | None = None,
 ) -> Parts:
     """Parts over the aperture of a spectrum times a law, (cases,) each, see `spectrum_pieces`.
 

@@ -12,7 +12,7 @@ from bisar_budget.findings.requirement import Override
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import NOTHING, Note
 
-FLOOR_DB = -40.0  # relative to the error-free peak: black in a chip
+CHIP_FLOOR_DB = -40.0  # relative to the error-free peak: black in a chip
 
 
 class Verdict(NamedTuple):
@@ -120,9 +120,10 @@ class PointImage(NamedTuple):
     """Image of the point with an error, its cut along y′, and the cut without error at the same place.
 
     `chip` holds `columns` × `rows` bytes. Rows run from the largest y′ to the smallest, columns from the smallest x′
-    to the largest. The value 0 is `FLOOR_DB` or less, 255 the peak without error. `pixel_m` are the steps of the chip
-    along x′ and y′. A pixel along y′ represents `thinned` samples; a resolution cell has as many samples along y′ as
-    along x′. The cuts are powers over the error-free peak [dB], `step_m` apart, with y′ = 0 at index `len // 2`.
+    to the largest. The value 0 is `CHIP_FLOOR_DB` or less, 255 the peak without error. `pixel_m` are the steps of the
+    chip along x′ and y′. A pixel along y′ represents `thinned` samples; a resolution cell has as many samples along
+    y′ as along x′. The cuts are powers over the error-free peak [dB], `step_m` apart, with y′ = 0 at index
+    `len // 2`.
     """
 
     columns: int

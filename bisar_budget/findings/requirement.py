@@ -7,7 +7,7 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.row import AppliedWaiver, holding
 from bisar_budget.phrases import Note
 
-NAMES = {
+REQUIREMENT_NAMES = {
     "quadratic_phase_error": "quadratic phase error",
     "cubic_phase_error": "cubic phase error",
     "location_error": "location error",
@@ -80,7 +80,7 @@ class JudgedRequirement(NamedTuple):
     @property
     def name(self) -> str:
         """Name of the requirement in a sentence."""
-        return NAMES[self.key]
+        return REQUIREMENT_NAMES[self.key]
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ class RowUse(NamedTuple):
     multiplier: float
 
 
-LEAST_ROOM = 1e-6  # of a limit, that errors without a specification must leave free
+MIN_ROOM_FRACTION = 1e-6  # of a limit, that errors without a specification must leave free
 
 
 class Broken(NamedTuple):

@@ -48,7 +48,7 @@ class Status(NamedTuple):
 
 
 # Worst first. A waived row breaks its requirement: it breaks no run, and is worse than any row that meets it.
-_WORST_FIRST = (
+_STATUSES_WORST_FIRST = (
     Status(
         "error", "ERROR", "unusable",
         gates=True, junit="error", verdict="Cannot be judged",
@@ -91,7 +91,7 @@ _WORST_FIRST = (
     Status("info", "info", "info", junit="skipped", junit_words="computed, not judged"),
     Status("not_declared", "not decl", "not declared", junit="skipped", junit_words="not declared", sgr="2"),
 )  # fmt: skip
-STATUS = {status.name: status for status in _WORST_FIRST}
+STATUS = {status.name: status for status in _STATUSES_WORST_FIRST}
 RANK = {name: place for place, name in enumerate(STATUS)}  # the worst status has the lowest rank
 BROKEN = tuple(name for name, one in STATUS.items() if one.fails)  # a waiver covers them
 # In the order of summaries: statuses that a mission can have, then statuses that gate nothing.
@@ -112,5 +112,5 @@ def exit_code(statuses: Container[str], strict: bool) -> int:
     """Return 2 if a file is unusable, 1 if a requirement is broken or not judged, else 0; `strict`: on doubt too."""
     if "error" in statuses:
         return 2
-    breaks = (one.name for one in _WORST_FIRST if one.fails or (strict and one.fails_strict))
+    breaks = (one.name for one in _STATUSES_WORST_FIRST if one.fails or (strict and one.fails_strict))
     return 1 if any(name in statuses for name in breaks) else 0

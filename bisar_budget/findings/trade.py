@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from datetime import date
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.arrays import NumbersOrWords
 from bisar_budget.findings.status import RANK
 
 Floats = NDArray[np.float64]
@@ -49,7 +50,7 @@ class Trade(NamedTuple):
     """
 
     axes: tuple[Axis, ...]
-    values: Mapping[str, NDArray[Any]]
+    values: Mapping[str, NumbersOrWords]
     fixed: tuple[str, ...] = ()
     column: str = ""
     heading: str = ""
@@ -72,7 +73,7 @@ class TradeStudy(NamedTuple):
 
     asked: tuple[str, ...]
     trade: Trade
-    rows: Mapping[str, NDArray[Any]]
+    rows: Mapping[str, NumbersOrWords]
     cases: int
     complying: int
     waived: int

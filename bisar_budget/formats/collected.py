@@ -14,16 +14,29 @@ import json
 import math
 from dataclasses import dataclass, replace
 from textwrap import wrap
-from typing import Any
 
 import numpy as np
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.faults import printable
 from bisar_budget.formats.containers import Element
-from bisar_budget.geometry import FRAME_AXES, STRAIGHT, Axes, PlatformState, Vector, cross, dot, norm, unit
+from bisar_budget.geometry import (
+    FRAME_AXES,
+    STRAIGHT,
+    Axes,
+    PlatformState,
+    Vector,
+    cross,
+    dot,
+    norm,
+    plain_vector,
+    unit,
+)
+from bisar_budget.json_types import JsonDocument, JsonObject
+from bisar_budget.paths.accuracy import with_rate
 from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes
 from bisar_budget.paths.flight import Fitted, least_squares, path_of, powers_of
+from bisar_budget.paths.free_fall import fall_of
 
 MIN_FIT_PULSES = 5  # in an aperture to which a path is fitted
 MAX_APERTURE_S = 1e6  # of an aperture, and from the file's start to its middle
@@ -125,7 +138,7 @@ def reference_of(seen: Seen, slow_time: float) -> ReferenceGeometry:
     """Ranges and bistatic angle at a slow time."""
     t, r = (track.state.at(slow_time)[0] for track in (seen.transmitter, seen.receiver))
     angle = math.atan2(norm(cross(unit(t), unit(r))), dot(unit(t), unit(r)))
-    return ReferenceGeometry(slow_time, norm(t), norm(r), angle)
+    return ReferenceGeometry(slow_time, float(norm(t)), float(norm(r)), angle)
 
 
 def fitted(times: Floats, positions: Floats, aperture_time_s: float, wavelength_m: float) -> Fitted:
@@ -223,18 +236,27 @@ def declared(
 ) -> tuple[DeclaredMotionError, list[str]]:
     """Turn a covariance (6, 6) from a file's frame into the frame of a mission, with remarks on the changes.
 
-    ECF becomes the scene's axes, RIC_ECI is `ric`, and RIC_ECF is turned into `ric` about the radial axis. Without
+    ECF becomes the scene's axes, RIC_ECI is `ric`, and RIC_ECF is turned into `ric` about the radial axis; for a
+    platform in free fall its velocities become those against the stars. Without
     correlations the turned covariance becomes its sigmas.
     """
     name = frame.text()
     _require_size(np.sqrt(np.abs(covariance).max(axis=1)), frame)
     if name not in MISSION_FRAMES:
         raise frame.fault(f"must be one of {', '.join(MISSION_FRAMES)} (got {name!r})")
-    target = state.frame("scene") if name == "ECF" else axes.radial(state.position, state.velocity)
+    target = (
+        state.frame("scene")
+        if name == "ECF"
+        else axes.radial(plain_vector(state.position), plain_vector(state.velocity))
+    )
     source = _axes_of(name, state, axes)
     turn: Floats = np.array(target) @ np.array(source).T  # from the file's frame into the mission's frame
     turn_of_both = np.kron(np.eye(2), turn)
     turned = turn_of_both @ covariance @ turn_of_both.T
+    if name == "RIC_ECF" and (fall := fall_of(state, axes)) is not None:
+        turned = with_rate(
+            turned, np.array(target) @ np.array(fall.rotation)
+        )  # `ric` has velocities against the stars
     remarks = []
     if name != "RIC_ECI" and covariance.any():
         target_axes = (
@@ -261,8 +283,8 @@ def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
         x, y, z = zip(*axes.axes, strict=True)
         return x, y, z
     if name == "RIC_ECI":
-        return axes.radial(state.position, state.velocity)
-    radial = unit(axes.turned(axes.earth_fixed(state.position)))
+        return axes.radial(plain_vector(state.position), plain_vector(state.velocity))
+    radial = unit(axes.turned(axes.earth_fixed(plain_vector(state.position))))
     across = unit(cross(radial, state.velocity))
     return radial, cross(across, radial), across
 
@@ -293,7 +315,7 @@ def _of_monostatic(mono: Element, seen: Seen) -> FileErrors:
     if sensor is not None:
         remarks += _unused_of_sensor(sensor, ("ClockFreqSF", "TransmitFreqSF", "CollectionStartTime"), "RadarSensor")
         if sensor.maybe("RangeBias") is not None:
-            constant = 2 * sensor.number("RangeBias") / SPEED_OF_LIGHT
+            constant = 2 * sensor.number("RangeBias") / SPEED_OF_LIGHT_MPS
             remarks.append("timing_error.constant is 2 RangeBias/c: the range of a monostatic file is half the way.")
             remarks += _decorrelation(sensor, "range bias")
     for name in ("TropoError", "IonoError"):
@@ -465,9 +487,9 @@ _BENDS = (
 )
 
 
-def mission_tree(imported: Imported) -> dict[str, Any]:
+def mission_tree(imported: Imported) -> JsonObject:
     """Return the keys of a mission with their values as a person writes them, without comments."""
-    tree: dict[str, Any] = {
+    tree: JsonDocument = {
         "schema_version": 1,
         "name": imported.name,
         "radar": {
@@ -544,24 +566,24 @@ def _fit(track: Fitted) -> str:
     return f"{words}: what is left is faster than a mission states" if is_faster else words
 
 
-def _platform(imported: Imported, track: Fitted, error: DeclaredMotionError | None) -> dict[str, Any]:
+def _platform(imported: Imported, track: Fitted, error: DeclaredMotionError | None) -> JsonObject:
     state = track.state
-    platform: dict[str, Any] = {
-        "position": _triple(state.position, "m", 6),
-        "velocity": _triple(state.velocity, "m/s", 9),
+    platform: JsonObject = {
+        "position": _triple(plain_vector(state.position), "m", 6),
+        "velocity": _triple(plain_vector(state.velocity), "m/s", 9),
     }
     if state.acceleration != STRAIGHT:
-        platform["acceleration"] = _triple(state.acceleration, "m/s^2")
+        platform["acceleration"] = _triple(plain_vector(state.acceleration), "m/s^2")
     for bend, (key, per, factor) in zip(state.bends, _BENDS, strict=False):
-        platform[key] = _triple((bend[0] * factor, bend[1] * factor, bend[2] * factor), per)
+        platform[key] = _triple(plain_vector((bend[0] * factor, bend[1] * factor, bend[2] * factor)), per)
     if error is not None:
         platform["motion_error"] = _error(imported, error)
     return platform
 
 
-def _error(imported: Imported, error: DeclaredMotionError) -> dict[str, Any]:
+def _error(imported: Imported, error: DeclaredMotionError) -> JsonObject:
     units = {"position": "m", "velocity": "m/s"}
-    tree: dict[str, Any] = {"frame": error.frame}
+    tree: JsonObject = {"frame": error.frame}
     sigmas = {
         kind: _triple(value, units[kind]) for kind in _MOTION_KINDS if (value := getattr(error, kind)) is not None
     }
@@ -595,7 +617,7 @@ def _triple(vector: Vector, unit: str, decimals: int | None = None) -> list[str]
     return [f"{'0' if text in ('', '-0') else text} {unit}" for text in trimmed]
 
 
-def _write(lines: list[str], tree: dict[str, Any], path: tuple[str, ...], notes: dict[tuple[str, ...], str]) -> None:
+def _write(lines: list[str], tree: JsonObject, path: tuple[str, ...], notes: dict[tuple[str, ...], str]) -> None:
     indent = "  " * len(path)
     for key, value in tree.items():
         key_path = (*path, key)

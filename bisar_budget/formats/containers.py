@@ -10,15 +10,19 @@ import os
 import stat
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bisar_budget.arrays import Records
 from bisar_budget.extras import install_command
 from bisar_budget.faults import printable, shown
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.earth import Floats
+
+if TYPE_CHECKING:
+    from lxml.etree import _Element
+
 
 _MAX_POLYNOMIAL_ORDER = 30  # a higher order was not fitted to data
 _INCLUDE = "{http://www.w3.org/2001/XInclude}"
@@ -54,7 +58,7 @@ class Element:
     on a child, `Parameters[Identifier='1']`.
     """
 
-    def __init__(self, file: str, node: Any) -> None:
+    def __init__(self, file: str, node: "_Element") -> None:
         self.file, self.node = file, node
 
     @property
@@ -233,7 +237,7 @@ class Container:
         """Whether the file has parameters of pulses in addition to the XML."""
         return "PVP" in self.blocks
 
-    def vectors(self, block: str, offset: int, count: int, dtype: np.dtype[Any]) -> NDArray[Any]:
+    def vectors(self, block: str, offset: int, count: int, dtype: np.dtype[np.void]) -> Records:
         """Parameters of `count` vectors of a block, from an offset in bytes. Only these bytes are read."""
         start, length = self.blocks[block]
         needed = count * dtype.itemsize
@@ -244,7 +248,7 @@ class Container:
             )
         with open(self.file, "rb") as stream:
             data = _read(stream, self.file, start + offset, needed)
-        vectors: NDArray[Any] = np.frombuffer(data, dtype.newbyteorder(">")).astype(dtype)
+        vectors: Records = np.frombuffer(data, dtype.newbyteorder(">")).astype(dtype)
         return vectors
 
 
@@ -333,7 +337,7 @@ def _with_header(file: str, stream: BinaryIO) -> Container:
 
 def _nitf(file: str, stream: BinaryIO) -> Container:
     try:
-        jbpy: Any = import_module("jbpy")
+        jbpy = import_module("jbpy")
     except ImportError:
         raise MissingExtraError from None
     size = os.fstat(stream.fileno()).st_size

@@ -11,28 +11,36 @@ import io
 import math
 import os
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import __version__
 from bisar_budget.analysis.analysis import Analysis, Case
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.arrays import Records
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
-from bisar_budget.geometry import Axes, PlatformState, Vector
+from bisar_budget.geometry import Axes, PlatformState, Vector, plain_vector
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
+from bisar_budget.paths.accuracy import block_turned, with_rate
 from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import Instant, parse_instant
 from bisar_budget.simulator.collection import PointCollection
-from bisar_budget.simulator.phase_history import Errors, Flight
+from bisar_budget.simulator.phase_history import Errors, Flight, ReceiverNoise
 from bisar_budget.simulator.point import SimulationError, declared_errors, pulses_for
 from bisar_budget.simulator.realisations import has_unset_clocks
 from bisar_budget.simulator.targets import Targets
+
+if TYPE_CHECKING:
+    from lxml.etree import _Element, _ElementTree
+
 
 NAMESPACE = "http://api.nsgreg.nga.mil/schema/cphd/1.1.0"
 DEFAULT_SCENE = Geodetic(0.0, 0.0, 0.0)  # of a scene without coordinates in its mission
@@ -113,7 +121,10 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     flown = collection.flight(errors, slow_time, np.random.default_rng(settings.seed))
     scatterers, amplitudes = _scene(mission, targets, plan)
     rng = np.random.default_rng(settings.seed)
-    noise = {"noise_power": 10 ** (settings.noise / 10) if settings.noise is not None else 0.0, "rng": rng}
+    noise: ReceiverNoise = {
+        "noise_power": 10 ** (settings.noise / 10) if settings.noise is not None else 0.0,
+        "rng": rng,
+    }
     history = flown.record(scatterers, amplitudes, slow_time, frequency, **noise)
     remarks = []
     axes = mission.scene.axes
@@ -145,19 +156,20 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
         raise SimulationError(f"the declared errors leave no image of a point: {fault}") from None
     shift = max(abs(component) for component in effect.displacement)
     reach = max(max(abs(target.east), abs(target.north)) for target in targets.points)
-    cell = Case(Analysis(mission)).resolution[:2]
+    resolution = Case(Analysis(mission)).resolution
+    cell = float(resolution.range), float(resolution.cross_range)
     half = float(math.ceil(reach + shift + _AREA_MARGIN_CELLS * max(cell)))
     times: Floats = np.linspace(-T / 2, T / 2, _EXTENT_SAMPLES)
     flown = collection.flight(errors.smooth(), times)
     measured = sum(np.linalg.norm(path.measured, axis=1) for path in flown.paths)
     actual = sum(np.linalg.norm(path.actual, axis=1) for path in flown.paths)
-    error = actual - measured + SPEED_OF_LIGHT * flown.seen
+    error = actual - measured + SPEED_OF_LIGHT_MPS * flown.seen
     delays, turns = [], []
     for corner in ((half, half), (half, -half), (-half, half), (-half, -half)):
         excess_range = sum(np.linalg.norm(path.measured - (*corner, 0.0), axis=1) for path in flown.paths) - measured
         delays.append(float(np.abs(excess_range).max()))
         turns.append(float(np.abs(np.gradient(excess_range, times)).max()))
-    delay = (max(delays) + float(np.abs(error).max())) / SPEED_OF_LIGHT
+    delay = (max(delays) + float(np.abs(error).max())) / SPEED_OF_LIGHT_MPS
     turn = (max(turns) + float(np.abs(np.gradient(error, times)).max())) / radar.wavelength
     pulses = pulses_for(mission, math.ceil(2 * turn * T))
     if mission.collection.pulses is None:
@@ -187,7 +199,7 @@ def _scene(mission: Mission, targets: Targets, plan: _Plan) -> tuple[Floats, NDA
 
 def _vectors(
     mission: Mission, slow_time: Floats, flown: Flight, smooth: Flight, axes: SceneAxes, plan: _Plan
-) -> tuple[NDArray[Any], float]:
+) -> tuple[Records, float]:
     """Parameters of each vector, and the time of the file at the middle of the aperture. [s]
 
     A pulse is at the scene centre at its slow time. It left the transmitter R_t/c earlier and is received R_r/c
@@ -197,7 +209,7 @@ def _vectors(
     dtype = np.dtype(
         [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR_WORDS]
     )
-    vectors: NDArray[Any] = np.zeros(slow_time.size, dtype)
+    vectors: Records = np.zeros(slow_time.size, dtype)
     ranges = []
     doppler = np.zeros(slow_time.size)
     sides = (
@@ -211,18 +223,20 @@ def _vectors(
         velocity = velocity + np.gradient(smooth_path.measured - smooth_path.actual, slow_time, axis=0, edge_order=2)
         length = np.linalg.norm(position, axis=1)
         closing = np.sum(position * velocity, axis=1) / length
-        own_velocity = velocity / (1 + sign * closing / SPEED_OF_LIGHT)[:, None]
+        own_velocity = velocity / (1 + sign * closing / SPEED_OF_LIGHT_MPS)[:, None]
         vectors[f"{side}Pos"] = position @ turn + np.array(axes.origin)
         vectors[f"{side}Vel"] = own_velocity @ turn
-        vectors[f"{side}Time"] = slow_time + sign * length / SPEED_OF_LIGHT
+        vectors[f"{side}Time"] = slow_time + sign * length / SPEED_OF_LIGHT_MPS
         ranges.append(length)
         doppler += np.sum(position * own_velocity, axis=1) / length
     # Whole milliseconds, so that a file states the start of the collection exactly.
-    offset = math.ceil((mission.collection.aperture_time / 2 + float(ranges[0].max()) / SPEED_OF_LIGHT) * 1e3) / 1e3
+    offset = (
+        math.ceil((mission.collection.aperture_time / 2 + float(ranges[0].max()) / SPEED_OF_LIGHT_MPS) * 1e3) / 1e3
+    )
     vectors["TxTime"] += offset
     vectors["RcvTime"] += offset
     vectors["SRPPos"] = axes.origin
-    vectors["aFDOP"] = -doppler / SPEED_OF_LIGHT  # −2/c times the mean range rate of both legs
+    vectors["aFDOP"] = -doppler / SPEED_OF_LIGHT_MPS  # −2/c times the mean range rate of both legs
     radar = mission.radar
     vectors["FX1"] = vectors["SC0"] = radar.center_frequency - radar.bandwidth / 2
     vectors["FX2"] = radar.center_frequency + radar.bandwidth / 2
@@ -233,7 +247,7 @@ def _vectors(
 
 
 # ---------------------------------------------------------------------- XML
-_Leaves = dict[str, Any]  # text or number by the path of its element, in the order of the file
+_Leaves = dict[str, object]  # text or number by the path of its element, in the order of the file
 
 
 def _document(
@@ -241,14 +255,14 @@ def _document(
     targets: Targets,
     plan: _Plan,
     axes: SceneAxes,
-    vectors: NDArray[Any],
+    vectors: Records,
     start: Instant,
     offset: float,
     remarks: list[str],
-) -> Any:
+) -> "_ElementTree":
     """XML of the file as an lxml tree, with the reference geometry that sarkit computes from the vectors."""
-    etree: Any = import_module("lxml.etree")
-    skcphd: Any = import_module("sarkit.cphd")
+    etree = import_module("lxml.etree")
+    skcphd = import_module("sarkit.cphd")
     low, high = float(vectors["FX1"][0]), float(vectors["FX2"][0])
     leaves: _Leaves = {
         "CollectionID/CollectorName": "receiver, simulated",
@@ -313,7 +327,7 @@ def _document(
     return tree
 
 
-def _grow(etree: Any, root: Any, leaves: _Leaves) -> None:
+def _grow(etree: ModuleType, root: "_Element", leaves: _Leaves) -> None:
     """Add elements below the root. A step of a path may have an attribute; a polynomial has only its constant."""
     elements = {"": root}
     for path, value in leaves.items():
@@ -354,8 +368,8 @@ def _scene_coordinates(plan: _Plan, axes: SceneAxes) -> _Leaves:
         **_xyz("IARP/ECF", axes.origin),
         **_degrees("IARP/LLH", reference_point),
         "IARP/LLH/HAE": reference_point.height,
-        **_xyz("ReferenceSurface/Planar/uIAX", axes.axes[0]),
-        **_xyz("ReferenceSurface/Planar/uIAY", axes.axes[1]),
+        **_xyz("ReferenceSurface/Planar/uIAX", plain_vector(axes.axes[0])),
+        **_xyz("ReferenceSurface/Planar/uIAY", plain_vector(axes.axes[1])),
         **{f"ImageArea/X1Y1/{axis}": -half for axis in "XY"},
         **{f"ImageArea/X2Y2/{axis}": half for axis in "XY"},
     }
@@ -369,8 +383,8 @@ def _scene_coordinates(plan: _Plan, axes: SceneAxes) -> _Leaves:
     return {f"SceneCoordinates/{path}": value for path, value in leaves.items()}
 
 
-def _layout(vectors: NDArray[Any]) -> _Leaves:
-    fields: Any = vectors.dtype.fields
+def _layout(vectors: Records) -> _Leaves:
+    fields: Mapping[str, Any] = vectors.dtype.fields or {}
     leaves: _Leaves = {}
     for name, size in _VECTOR_WORDS:
         form = "X=F8;Y=F8;Z=F8;" if size == 3 else "I8" if name == "SIGNAL" else "F8"
@@ -456,17 +470,25 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
     if is_radial:
         return covariance, "RIC_ECI"
     # Columns are the axes of the error's frame in the scene's axes. Rows are the scene's axes in Earth-fixed axes.
-    turn_of_both = np.kron(np.eye(2), np.array(source).T)
-    covariance = turn_of_both @ covariance @ turn_of_both.T
+    covariance = _along_scene(covariance, state, error.frame)
     if common is not None:
-        turn = np.array(state.frame(common.frame)).T
+        shared = np.zeros((6, 6))
         for index, kind in enumerate(("position", "velocity")):
             if getattr(common, kind) is not None:
                 block = slice(3 * index, 3 * index + 3)
-                covariance[block, block] += turn @ np.diag(np.square(getattr(common, kind))) @ turn.T
+                shared[block, block] = np.diag(np.square(getattr(common, kind)))
+        covariance = covariance + _along_scene(shared, state, common.frame)
         added[f"{owner}.common"] = "the sigmas hold an error that both platforms share"
     turn_of_both = np.kron(np.eye(2), np.array(axes.axes).T)
     return turn_of_both @ covariance @ turn_of_both.T, "ECF"
+
+
+def _along_scene(covariance: Floats, state: PlatformState, frame: str) -> Floats:
+    """A covariance (6, 6) along the axes of a frame, along those of the scene, with Earth-fixed velocities."""
+    axes = np.array(state.frame(frame), dtype=float)
+    if frame == "ric" and state.fall is not None:
+        covariance = with_rate(covariance, -axes @ np.array(state.fall.rotation))
+    return block_turned(covariance, axes.T)
 
 
 def _pos_vel_err(path: str, covariance: Floats, frame: str) -> _Leaves:
@@ -479,9 +501,9 @@ def _pos_vel_err(path: str, covariance: Floats, frame: str) -> _Leaves:
     return leaves
 
 
-def _file(tree: Any, vectors: NDArray[Any], signal: NDArray[Any]) -> bytes:
+def _file(tree: "_ElementTree", vectors: Records, signal: NDArray[np.generic]) -> bytes:
     """A CPHD file by sarkit's writer."""
-    skcphd: Any = import_module("sarkit.cphd")
+    skcphd = import_module("sarkit.cphd")
     with tempfile.TemporaryFile() as stream:  # the writer needs a real file
         with skcphd.Writer(stream, skcphd.Metadata(xmltree=tree)) as writer:
             writer.write_pvp(_CHANNEL, vectors)

@@ -6,12 +6,12 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.arrays import Records
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.faults import printable, shown
 from bisar_budget.formats.collected import (
     MAX_APERTURE_S,
@@ -124,18 +124,18 @@ def _cphd(container: Container, channel: str | None) -> Imported:
     )  # fmt: skip
 
 
-def _dtype(xml: Element, block: str) -> np.dtype[Any]:
+def _dtype(xml: Element, block: str) -> np.dtype[np.void]:
     """NumPy type of the parameters of a vector, or of a transmitted pulse, as the XML describes them."""
-    module: Any = import_module("sarkit.cphd" if xml.tag == "CPHD" else "sarkit.crsd")
+    module = import_module("sarkit.cphd" if xml.tag == "CPHD" else "sarkit.crsd")
     reads = module.get_ppp_dtype if block == "PPP" else module.get_pvp_dtype
     try:
-        dtype: np.dtype[Any] = reads(xml.node.getroottree())
+        dtype: np.dtype[np.void] = reads(xml.node.getroottree())
     except (AttributeError, IndexError, KeyError, SyntaxError, TypeError, ValueError) as error:
         raise xml.fault(f"describes no parameters ({shown(str(error))})", block) from None
     return dtype
 
 
-def _fields(xml: Element, vectors: NDArray[Any], block: str, *names: str) -> list[Floats]:
+def _fields(xml: Element, vectors: Records, block: str, *names: str) -> list[Floats]:
     columns = []
     for name in names:
         if name not in (vectors.dtype.names or ()):
@@ -149,7 +149,7 @@ def _fields(xml: Element, vectors: NDArray[Any], block: str, *names: str) -> lis
     return columns
 
 
-def _pulses_of_cphd(container: Container, vectors: NDArray[Any], parameters: Element) -> tuple[_Pulses, Vector]:
+def _pulses_of_cphd(container: Container, vectors: Records, parameters: Element) -> tuple[_Pulses, Vector]:
     names = ("TxTime", "TxPos", "RcvTime", "RcvPos", "SRPPos")
     sent, transmitter, received, receiver, points = _fields(container.xml, vectors, "PVP", *names)
     reference = parameters.whole("RefVectorIndex")
@@ -279,7 +279,7 @@ def _crsd(container: Container, channel: str | None) -> Imported:
 
 
 def _pulses_of_crsd(
-    container: Container, vectors: NDArray[Any], transmit_vectors: NDArray[Any], point: Vector, parameters: Element
+    container: Container, vectors: Records, transmit_vectors: Records, point: Vector, parameters: Element
 ) -> _Pulses:
     """Pulses with the time at which the echo of the scene point is received.
 
@@ -303,7 +303,7 @@ def _pulses_of_crsd(
     transmit_range = np.linalg.norm(transmitter - point, axis=1)
     received, receiver = window_start, positions
     for _ in range(_LIGHT_TIME_STEPS):
-        received = sent + (transmit_range + np.linalg.norm(receiver - point, axis=1)) / SPEED_OF_LIGHT
+        received = sent + (transmit_range + np.linalg.norm(receiver - point, axis=1)) / SPEED_OF_LIGHT_MPS
         receiver = positions + velocities * (received - window_start)[:, None]
     return _Pulses(sent, transmitter, received, receiver, int(usable[:reference].sum()), int((~usable).sum()))
 
@@ -329,8 +329,8 @@ def _sicd(container: Container, channel: str | None) -> Imported:
         sent, received = times, times
         if not is_monostatic:  # a monostatic aperture reference point is at the time in between
             for _ in range(_LIGHT_TIME_STEPS):
-                sent = times - np.linalg.norm(_over(transmitter_path, sent) - point, axis=1) / SPEED_OF_LIGHT
-                received = times + np.linalg.norm(_over(receiver_path, received) - point, axis=1) / SPEED_OF_LIGHT
+                sent = times - np.linalg.norm(_over(transmitter_path, sent) - point, axis=1) / SPEED_OF_LIGHT_MPS
+                received = times + np.linalg.norm(_over(receiver_path, received) - point, axis=1) / SPEED_OF_LIGHT_MPS
         return _Pulses(sent, _over(transmitter_path, sent), received, _over(receiver_path, received), times.size // 2)
 
     name, collectors = _names(xml, "CollectionInfo")
@@ -407,7 +407,10 @@ def _aperture_of_sicd(
     t, r = neighbours.transmitter - point, neighbours.receiver - point
     sights: Floats = t / np.linalg.norm(t, axis=1, keepdims=True) + r / np.linalg.norm(r, axis=1, keepdims=True)
     rate = (
-        abs(float((sights[1] - sights[0]) @ xml.vector("Grid/Col/UVectECF"))) / (2 * step) * center / SPEED_OF_LIGHT
+        abs(float((sights[1] - sights[0]) @ xml.vector("Grid/Col/UVectECF")))
+        / (2 * step)
+        * center
+        / SPEED_OF_LIGHT_MPS
     )
     band_time = xml.number("Grid/Col/ImpRespBW") / rate if rate else math.inf
     if band_time < (1 - _MAX_GAP_FRACTION) * processed:
@@ -442,7 +445,7 @@ def _flown(container: Container, pulses: _Pulses, point: Vector, aperture: _Aper
     times = _scene_time(pulses, axes) - aperture.middle
     try:
         transmitter, receiver = (
-            fitted(times, axes.places(positions), aperture.length, SPEED_OF_LIGHT / center)
+            fitted(times, axes.places(positions), aperture.length, SPEED_OF_LIGHT_MPS / center)
             for positions in (pulses.transmitter, pulses.receiver)
         )
     except NoPathError as error:

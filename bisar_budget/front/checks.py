@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, ParamSpec, TypeVar, cast
 
 from bisar_budget import __version__, phrases
 from bisar_budget.budget.check import (
@@ -37,12 +37,14 @@ if TYPE_CHECKING:
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.sampling.draws import Drawing, DrawsPiece, Share, Tally
 
-MAX_CASES = 40_000  # of a study; a page has no room for more
-MAX_KEYS = 2  # of a study; a drawing has no more axes
+MAX_STUDY_CASES = 40_000  # of a study; a page has no room for more
+MAX_STUDY_KEY_COUNT = 2  # of a study; a drawing has no more axes
 _MANY_DRAWS = 1_000_000  # from which the time is estimated
 _TRIAL_DRAWS = 1 << 12  # of the first trial for this estimate
 DAY_OF_RUN = "the day of the run"
 _CALLER = "the caller"
+Arguments = ParamSpec("Arguments")
+Answer = TypeVar("Answer")
 _OPTION = "--sweep"
 
 
@@ -73,17 +75,17 @@ def day_of(date: str | dt.date | None) -> dt.date:
         raise ValueError(f"SOURCE_DATE_EPOCH must be seconds since 1970 (got {printable(epoch)!r})") from None
 
 
-def day_origin(given: str | dt.date | None, giver: str) -> str:
-    """Origin of the day of waivers: the giver of `given`, or else the environment, or else the clock."""
-    if given is not None:
+def day_origin(day: str | dt.date | None, giver: str) -> str:
+    """Origin of the day of waivers: the giver of `day`, or else the environment, or else the clock."""
+    if day is not None:
         return giver
     return "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else DAY_OF_RUN
 
 
-def outside_of(model: str | None, given: str | dt.date | None) -> Outside:
+def outside_of(model: str | None, day: str | dt.date | None) -> Outside:
     """Influences of a question's arguments on its verdict."""
     options = () if model is None else (Override("--model", model, _CALLER),)
-    return Outside(options, day_origin(given, _CALLER), given is not None, _CALLER)
+    return Outside(options, day_origin(day, _CALLER), day is not None, _CALLER)
 
 
 # ---------------------------------------------------------------------- one mission
@@ -95,7 +97,7 @@ def check(
     monte_carlo: int | None = None,
     seed: int | None = None,
     verify: bool = False,
-    sweep: Mapping[str, Any] | None = None,
+    sweep: Mapping[str, object] | None = None,
     outside: Outside | None = None,
 ) -> "CheckResult":
     """Check a mission against its requirements.
@@ -257,23 +259,25 @@ def with_images(missions: Sequence[CheckedMission], today: dt.date, *, is_illust
     from bisar_budget.front import imaging
     from bisar_budget.verifier.limits import form_image_evidence
 
-    usable = [found.analysed().mission for found in missions if isinstance(found, MissionFindings)]
+    usable = [findings.analysed().mission for findings in missions if isinstance(findings, MissionFindings)]
     verified = iter(imaging.verify_all(usable) if usable else ())
     result: list[CheckedMission] = []
-    for found in missions:
-        if isinstance(found, MissionFindings):
-            found = with_verdicts(found, next(verified), today)
+    for findings in missions:
+        if isinstance(findings, MissionFindings):
+            findings = with_verdicts(findings, next(verified), today)
             if is_illustrated:
-                found = found._replace(image_evidence=form_image_evidence(found.analysed().mission, found))
+                findings = findings._replace(
+                    image_evidence=form_image_evidence(findings.analysed().mission, findings)
+                )
             else:
-                found = found._replace(analysis=None)
-        result.append(found)
+                findings = findings._replace(analysis=None)
+        result.append(findings)
     return result
 
 
 # ---------------------------------------------------------------------- studies
 def with_studies(
-    missions: Sequence[CheckedMission], asked: Sequence[str] | Mapping[str, Any], model: str | None, today: dt.date
+    missions: Sequence[CheckedMission], asked: Sequence[str] | Mapping[str, object], model: str | None, today: dt.date
 ) -> list[CheckedMission]:
     """Missions with a study: the results of a sweep of each usable mission.
 
@@ -288,7 +292,7 @@ def with_studies(
     from bisar_budget.findings.trade import TradeStudy
     from bisar_budget.report.drawing.trades import uses_of_rows
 
-    usable = [found.analysed().mission for found in missions if isinstance(found, MissionFindings)]
+    usable = [findings.analysed().mission for findings in missions if isinstance(findings, MissionFindings)]
     all_cases = [_of(mission, study_cases, mission, asked) for mission in usable]
     done, total = 0, sum(cases.count for cases in all_cases)
     studies = []
@@ -323,28 +327,30 @@ def with_studies(
     return [each._replace(study=next(next_study)) if isinstance(each, MissionFindings) else each for each in missions]
 
 
-def _of(mission: Mission, ask: Callable[..., Any], *arguments: Any) -> Any:
+def _of(
+    mission: Mission, ask: Callable[Arguments, Answer], *arguments: Arguments.args, **options: Arguments.kwargs
+) -> Answer:
     """Answer of a function about a mission; the message of a `QuestionError` begins with the mission's file."""
     try:
-        return ask(*arguments)
+        return ask(*arguments, **options)
     except QuestionError as error:
         raise QuestionError(f"{mission.file}: {error}") from None
 
 
-def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, Any]) -> "Cases":
-    """Cases of a study: several values of each key, at most `MAX_CASES` cases."""
+def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, object]) -> "Cases":
+    """Cases of a study: several values of each key, at most `MAX_STUDY_CASES` cases."""
     from bisar_budget.design.cases import grid
     from bisar_budget.front.missions import grid_of
 
-    if len(asked) > MAX_KEYS:
+    if len(asked) > MAX_STUDY_KEY_COUNT:
         raise QuestionError(f"{_OPTION} draws one key or two, and there are {len(asked)}.")
     cases = grid_of(mission, asked) if isinstance(asked, Mapping) else grid(tree_of(mission), asked, _OPTION)
     for varied, size in zip(cases.varied, cases.shape, strict=True):
         if size < 2:
             raise QuestionError(f"{_OPTION} {varied.key}: has one value; accepted: several. --set puts in one")
-    if cases.count > MAX_CASES:
+    if cases.count > MAX_STUDY_CASES:
         raise QuestionError(
-            f"{_OPTION}: {cases.count} cases; accepted: up to {MAX_CASES}, for which a page has room. "
+            f"{_OPTION}: {cases.count} cases; accepted: up to {MAX_STUDY_CASES}, for which a page has room. "
             "`bisar-budget sweep` checks more"
         )
     return cases
@@ -377,19 +383,22 @@ def gathered(
 # ---------------------------------------------------------------------- specifications
 def with_sheets(missions: Sequence[CheckedMission], model: str | None, today: dt.date) -> list[CheckedMission]:
     """Missions with sheets of specifications, if their files have `allocation.specify`, or with a warning."""
-    return [_with_sheet(found, model, today) if isinstance(found, MissionFindings) else found for found in missions]
+    return [
+        _with_sheet(findings, model, today) if isinstance(findings, MissionFindings) else findings
+        for findings in missions
+    ]
 
 
-def _with_sheet(found: MissionFindings, model: str | None, today: dt.date) -> MissionFindings:
-    mission = found.analysed().mission
+def _with_sheet(findings: MissionFindings, model: str | None, today: dt.date) -> MissionFindings:
+    mission = findings.analysed().mission
     if not mission.allocation.specify:
-        return found
+        return findings
     from bisar_budget.design.allocate import allocate
 
     try:
-        return found._replace(sheet=allocate(mission, model=model, today=today))
+        return findings._replace(sheet=allocate(mission, model=model, today=today))
     except QuestionError as error:
         warning = FileWarning(
             mission.line(("allocation", "specify")), phrases.note("no-specifications", why=str(error))
         )
-        return found._replace(warnings=(*found.warnings, warning))
+        return findings._replace(warnings=(*findings.warnings, warning))

@@ -3,16 +3,17 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from bisar_budget.design.cases import Cases, grid, table_file
 from bisar_budget.design.cases import grid_of as grid_of_arrays
 from bisar_budget.design.cases import sample as sample_of
+from bisar_budget.json_types import JsonObject
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import (
+    Measured,
     QuestionError,
     is_quantity,
     magnitude,
@@ -70,7 +71,7 @@ class Spaced:
         return f"{key}={self.start}:{self.stop}:{self.count}" + (":log" if self.is_log else "")
 
 
-def linspace(start: Any, stop: Any, count: int) -> Spaced:
+def linspace(start: object, stop: object, count: int) -> Spaced:
     """`count` values from `start` to `stop` at even distances, both included, for `sweep`.
 
     Parameters
@@ -83,12 +84,12 @@ def linspace(start: Any, stop: Any, count: int) -> Spaced:
     return Spaced(text_of("", start), text_of("", stop), count)
 
 
-def geomspace(start: Any, stop: Any, count: int) -> Spaced:
+def geomspace(start: object, stop: object, count: int) -> Spaced:
     """`count` values from `start` to `stop` in equal ratios; arguments are as in `linspace`, and above zero."""
     return Spaced(text_of("", start), text_of("", stop), count, is_log=True)
 
 
-def cases_of(mission: Mission, values: Mapping[str, Any] | str | os.PathLike[str], paired: bool = False) -> Cases:
+def cases_of(mission: Mission, values: Mapping[str, object] | str | os.PathLike[str], paired: bool = False) -> Cases:
     """The cases of a sweep: every combination of the values of each key, the last key the fastest, or a file's cases.
 
     Parameters
@@ -119,7 +120,7 @@ def cases_of(mission: Mission, values: Mapping[str, Any] | str | os.PathLike[str
     return replace(cases, is_grid=False)
 
 
-def grid_of(mission: Mission, values: Mapping[str, Any]) -> Cases:
+def grid_of(mission: Mission, values: Mapping[str, object]) -> Cases:
     """Every combination of values of keys; `values` is as in `cases_of`."""
     tree = tree_of(mission)
     axes = [_axis(tree, key, axis_values) for key, axis_values in values.items()]
@@ -132,7 +133,7 @@ def cases_of_texts(mission: Mission, texts: Sequence[str], sample: str | None = 
     return grid(tree, texts) if sample is None else sample_of(tree, texts, sample)
 
 
-def _axis(tree: dict[str, Any], key: str, values: Any) -> Cases:
+def _axis(tree: JsonObject, key: str, values: Measured) -> Cases:
     """The values of one key."""
     if isinstance(values, Spaced):
         return grid(tree, [values.of(key)], "sweep")

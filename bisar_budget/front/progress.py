@@ -8,18 +8,22 @@ from importlib import import_module
 from importlib.util import find_spec
 from threading import RLock
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bisar_budget.faults import printable
-from bisar_budget.memory import OF_TABLES
+from bisar_budget.memory import TABLES_MEMORY_BYTES
 
 if TYPE_CHECKING:
+    from typing import NoReturn
+
+    from tqdm import tqdm
+
     from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.workers import Progress
 
-LONG = 60.0  # [s]; work that takes longer is announced
+MIN_ANNOUNCED_S = 60.0  # work that takes longer is announced
 FORMING = "Forming images"  # label of a bar
-_MOMENT = 1.0  # [s]; work that is done earlier has no bar
+_MIN_SHOWN_S = 1.0  # work that is done earlier has no bar
 _LEAST_TRIAL_S = 0.3  # a shorter trial is too short to measure
 _TRIAL_GROWTH_FACTOR = 3  # size of a trial over the size of the trial before
 
@@ -30,13 +34,13 @@ SAYING: ContextVar[Callable[[str], None]] = ContextVar("SAYING", default=lambda 
 @contextmanager
 def watched(label: str) -> "Iterator[Progress]":
     """Yield a function that takes the progress of long work, and shows a bar with the remaining time to a watcher."""
-    began, bars = monotonic(), list[Any]()
+    began, bars = monotonic(), list["tqdm[NoReturn]"]()
 
     def progress(done: int, total: int) -> None:
         if not bars:
             is_notebook = _is_notebook()
             is_seen = is_notebook or (sys.stderr is not None and sys.stderr.isatty())
-            if not is_seen or monotonic() - began < _MOMENT:
+            if not is_seen or monotonic() - began < _MIN_SHOWN_S:
                 return
             bars.append(_bar(label, total, is_notebook))
         bars[0].total = total
@@ -55,7 +59,7 @@ def _is_notebook() -> bool:
     return hasattr(shell, "kernel")
 
 
-def _bar(label: str, total: int, is_notebook: bool) -> Any:
+def _bar(label: str, total: int, is_notebook: bool) -> "tqdm[NoReturn]":
     """A bar of tqdm, for a notebook or a terminal."""
     has_widgets = is_notebook and find_spec("ipywidgets") is not None
     kind = import_module("tqdm.notebook").tqdm_notebook if has_widgets else import_module("tqdm").tqdm
@@ -97,7 +101,7 @@ def lasting(seconds: float) -> str:
 
 def foretell(seconds: float, doing: str, advice: str = "") -> None:
     """Tell the user who waits that work will take long, and what to change."""
-    if seconds > LONG:
+    if seconds > MIN_ANNOUNCED_S:
         SAYING.get()(f"{doing} will take about {lasting(seconds)}{'; ' if advice else ''}{advice}.")
 
 
@@ -128,4 +132,4 @@ def hold_to_tables() -> None:
     """Raise an error if the libraries that write parts are not installed."""
     from bisar_budget.cluster.parts_folder import check_libraries
 
-    check_libraries("--resume", OF_TABLES, "tables", "pyarrow")
+    check_libraries("--resume", TABLES_MEMORY_BYTES, "tables", "pyarrow")

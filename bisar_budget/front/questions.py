@@ -49,7 +49,7 @@ def _judged(
 
 def sweep(
     mission: Mission,
-    values: "Mapping[str, Any] | str | os.PathLike[str] | Cases",
+    values: "Mapping[str, object] | str | os.PathLike[str] | Cases",
     *,
     paired: bool = False,
     columns: str | Sequence[str] = (),
@@ -92,7 +92,7 @@ def solve(
     mission: Mission,
     key: str,
     *,
-    between: tuple[Any, Any] | str | None = None,
+    between: tuple[object, object] | str | None = None,
     scale: bool = False,
     row: str | None = None,
     target: str = "fail",
@@ -129,7 +129,7 @@ def solve(
     QuestionError
         The mission cannot answer the question.
     """
-    from bisar_budget.design.compare import compare_parts, is_of_parts
+    from bisar_budget.design.compare import compare_parts, is_sensor_key
     from bisar_budget.design.solve import solve as solved
 
     today, influences = _judged(mission, model, date, outside)
@@ -141,7 +141,7 @@ def solve(
     hold_to_parts(key, between, scale)
     solution: Solution | Comparison
     with watched_checks(mission.name) as progress:
-        if is_of_parts(key):
+        if is_sensor_key(key):
             solution = compare_parts(mission, key, **arguments, progress=progress)
         else:
             solution = solved(mission, key, between=between, is_scale=scale, **arguments, progress=progress)
@@ -157,9 +157,9 @@ def hold_to_parts(key: str, between: object, scale: bool) -> None:
     QuestionError
         The key names parts.
     """
-    from bisar_budget.design.compare import is_of_parts
+    from bisar_budget.design.compare import is_sensor_key
 
-    if is_of_parts(key) and (between is not None or scale):
+    if is_sensor_key(key) and (between is not None or scale):
         option = "--scale" if scale else "--between"
         raise QuestionError(f"{option}: {key} names parts of the catalogue, which are compared one by one.")
 
@@ -253,8 +253,8 @@ def passes(
     start: str | dt.date | None = None,
     *,
     days: float = 3.0,
-    min_elevation: Any = "20 deg",
-    squint: Any = "0 deg",
+    min_elevation: object = "20 deg",
+    squint: object = "0 deg",
     platform: str | None = None,
     model: str | None = None,
     date: str | dt.date | None = None,
@@ -303,7 +303,7 @@ def passes(
     return PassesResult(found_passes._replace(overrides=influences), loaded, model)
 
 
-def angle_of(option: str, value: Any, least: float) -> float:
+def angle_of(option: str, value: object, least: float) -> float:
     """Angle of an option, from `least` [deg] to less than 90 deg. [rad]
 
     Raises

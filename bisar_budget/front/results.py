@@ -13,6 +13,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from bisar_budget import __version__, notebook
+from bisar_budget.arrays import Complexes
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.images import VerifiedMission
 from bisar_budget.findings.mission import MissionFindings, Report
@@ -21,6 +22,7 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row, unknown_id, worst_first
 from bisar_budget.findings.specification import SpecificationSheet
 from bisar_budget.findings.status import exit_code
+from bisar_budget.json_types import JsonDocument
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import FORMATS, Style, format_of, pictures, render
 from bisar_budget.report.words.requirements import declared_words, requirement_lines, verdict
@@ -40,11 +42,15 @@ _HEADINGS = {"none": "fail", "waived": "waived"}  # of a solution, by its status
 _MAX_SHOWN_ROWS = 12  # of a result in a notebook
 
 
+DataFrame = Any
+"""A data frame of pandas or polars, neither of which has to be installed."""
+
+
 class MissingPackageError(ImportError):
     """A package that an answer needs is not installed; the message says which."""
 
 
-def frame_of(columns: Mapping[str, Any], library: str | None = None) -> Any:
+def frame_of(columns: Mapping[str, object], library: str | None = None) -> DataFrame:
     """A data frame of columns, of pandas or of polars.
 
     Parameters
@@ -66,7 +72,7 @@ def frame_of(columns: Mapping[str, Any], library: str | None = None) -> Any:
     raise MissingPackageError(f"a data frame needs {' or '.join(libraries)}: pip install {libraries[0]}")
 
 
-def _frame_of_rows(rows: Sequence[Mapping[str, Any]], library: str | None) -> Any:
+def _frame_of_rows(rows: Sequence[Mapping[str, object]], library: str | None) -> DataFrame:
     """A data frame of the rows of a document; the keys of the first row are the columns."""
     return frame_of({key: [row.get(key) for row in rows] for key in (rows[0] if rows else ())}, library)
 
@@ -176,12 +182,12 @@ class CheckResult(Mapping[str, Row]):
         """Requirements of the file by their keys, each with its status and the row that decides."""
         return {requirement.key: requirement for requirement in self.findings.requirements}
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> JsonDocument:
         """The document of `--format json`."""
-        document: dict[str, Any] = json.loads(render("json", self._report, Style()))
+        document: JsonDocument = json.loads(render("json", self._report, Style()))
         return document
 
-    def to_dataframe(self, library: str | None = None) -> Any:
+    def to_dataframe(self, library: str | None = None) -> DataFrame:
         """The rows as a data frame of pandas, or of polars; numbers in SI and radians.
 
         Raises
@@ -287,9 +293,9 @@ class _Answer:
 
         return as_json([self.found], Style())
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> JsonDocument:
         """The document of `--format json` of the command."""
-        document: dict[str, Any] = json.loads(self._document())
+        document: JsonDocument = json.loads(self._document())
         return document
 
 
@@ -322,8 +328,8 @@ class SolveResult(_Answer):
         return f"{self.value:.6g} {self.unit}{waived_words}"
 
     def _repr_html_(self) -> str:
-        found, rows = self.found, list[tuple[object, ...]]()
-        if (parts := getattr(found, "parts", None)) is not None:
+        answer, rows = self.found, list[tuple[object, ...]]()
+        if (parts := getattr(answer, "parts", None)) is not None:
             columns = ("part", "status", "worst row", "use")
             for part in parts:
                 standing = part.standing
@@ -334,9 +340,9 @@ class SolveResult(_Answer):
             for crossing in self.crossings:
                 inside, outside = crossing.inside, crossing.outside
                 rows.append((inside.value, inside.row or "", use_words(inside.utilization), outside.row or ""))
-        title = f"{found.key} of {found.name}"
+        title = f"{answer.key} of {answer.name}"
         return notebook.page(
-            notebook.heading(_HEADINGS.get(found.status, "pass"), title, f"{found.status}: {self._summary}"),
+            notebook.heading(_HEADINGS.get(answer.status, "pass"), title, f"{answer.status}: {self._summary}"),
             notebook.table(columns, rows),
         )
 
@@ -382,7 +388,7 @@ class AllocateResult(_Answer):
 
         return as_json([(self.found, self.offer)], Style())
 
-    def to_dataframe(self, library: str | None = None) -> Any:
+    def to_dataframe(self, library: str | None = None) -> DataFrame:
         """The specifications as a data frame; numbers in SI, lists of three if axes differ."""
         (mission,) = self.to_dict()["missions"]
         return _frame_of_rows([{key: row[key] for key in _SPECIFIED} for row in mission["specifications"]], library)
@@ -411,7 +417,7 @@ class VerifyResult(_Answer):
 
         return as_json([self.found], Style())
 
-    def to_dataframe(self, library: str | None = None) -> Any:
+    def to_dataframe(self, library: str | None = None) -> DataFrame:
         """The verdicts as a data frame."""
         (mission,) = self.to_dict()["missions"]
         return _frame_of_rows(mission["rows"], library)
@@ -437,9 +443,9 @@ class PassesResult(_Answer):
 
     def __repr__(self) -> str:
         """Number of passes that comply, on one line."""
-        found = self.found
-        waived = _waived([each.waived_by for each in found.found if each.status == "waived"])
-        return f"<passes of {found.name!r}: {len(found.complying)} of {len(found.found)} comply{waived}>"
+        answer = self.found
+        waived = _waived([each.waived_by for each in answer.found if each.status == "waived"])
+        return f"<passes of {answer.name!r}: {len(answer.complying)} of {len(answer.found)} comply{waived}>"
 
     def __len__(self) -> int:
         """Number of passes."""
@@ -449,13 +455,13 @@ class PassesResult(_Answer):
         """A pass, counted from 0."""
         return self.found.found[index]
 
-    def mission_text(self, one: "SatellitePass", folder: str | os.PathLike[str]) -> str:
+    def mission_text(self, satellite_pass: "SatellitePass", folder: str | os.PathLike[str]) -> str:
         """Text of a mission file with the aperture in a pass; names of files are relative to a folder."""
         from bisar_budget.design.passes import center_time
         from bisar_budget.mission.edited import in_folder, with_values
 
         of_model = [SetValue("allocation.model", self.model)] if self.model else []
-        at_mid_time = [] if one.center is None else center_time(one.center)
+        at_mid_time = [] if satellite_pass.center is None else center_time(satellite_pass.center)
         changes = [*self.mission.changes, *of_model, *in_folder(self.mission, os.fspath(folder)), *at_mid_time]
         return with_values(self.mission.data.decode("utf-8-sig"), changes)
 
@@ -464,7 +470,7 @@ class PassesResult(_Answer):
 
         return as_json(self.found, Style())
 
-    def to_dataframe(self, library: str | None = None) -> Any:
+    def to_dataframe(self, library: str | None = None) -> DataFrame:
         """The passes as a data frame; angles in radians, lengths in metres, times as texts of UTC."""
         return _frame_of_rows(self.to_dict()["passes"], library)
 
@@ -488,17 +494,17 @@ class MonteCarloResult(_Answer):
 
     def __repr__(self) -> str:
         """Draws and the probability of all requirements, on one line."""
-        found = self.found
-        if found.probability is None:
-            return f"<monte_carlo: {found.draws} draws, no requirement to hold>"
-        interval = f"{found.probability_low:.4g} to {found.probability_high:.4g}"
-        return f"<monte_carlo: {found.draws} draws, all hold in {found.probability:.4g} ({interval})>"
+        answer = self.found
+        if answer.probability is None:
+            return f"<monte_carlo: {answer.draws} draws, no requirement to hold>"
+        interval = f"{answer.probability_low:.4g} to {answer.probability_high:.4g}"
+        return f"<monte_carlo: {answer.draws} draws, all hold in {answer.probability:.4g} ({interval})>"
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> JsonDocument:
         """The Monte Carlo part of the document of `check --monte-carlo --format json`."""
         from bisar_budget.report.formats.json_document import monte_carlo_item
 
-        document: dict[str, Any] = json.loads(json.dumps(monte_carlo_item(self.found)))
+        document: JsonDocument = json.loads(json.dumps(monte_carlo_item(self.found)))
         return document
 
     def _repr_html_(self) -> str:
@@ -524,7 +530,7 @@ class SimulateResult:
         return f"<simulate of {self._mission.name!r}: image {self.image.shape}, pixels {x:.3g} m by {y:.3g} m>"
 
     @property
-    def image(self) -> Any:
+    def image(self) -> Complexes:
         """The image in the axes of the scene: (nx, ny) complex, along east and north."""
         return self.images.in_scene
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property, partial
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bisar_budget import __version__, notebook
-from bisar_budget.design.cases import Cases, some_of
+from bisar_budget.design.cases import Cases, Values, sampled_cases
 from bisar_budget.design.sweep import Asked, Block, part_of
 from bisar_budget.design.table import Part, Question, Swept, listed
 from bisar_budget.faults import ClusterError, printable
@@ -20,7 +20,7 @@ from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import complying
 from bisar_budget.front import progress
 from bisar_budget.front.checks import gathered
-from bisar_budget.front.results import MissingPackageError, Picture, frame_of
+from bisar_budget.front.results import DataFrame, MissingPackageError, Picture, frame_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.report.drawing.trades import Gathered, check_plot, uses_of_rows
@@ -29,6 +29,9 @@ from bisar_budget.report.words.sentences import waived_count
 from bisar_budget.resources import cores
 
 if TYPE_CHECKING:
+    from dask.array import Array
+    from xarray import Dataset
+
     from bisar_budget.cluster.scheduler import Workers
 
 _MANY_CASES = 20_000  # from which the time is estimated
@@ -77,11 +80,11 @@ class SweepResult:
             return 0.0
 
         def trial(count: int) -> float:
-            sample = some_of(self.cases, count)
+            sample = sampled_cases(self.cases, count)
             asked = Asked(self.mission, sample, columns=self.more, model=self.model, today=self.day)
-            parts = asked.checked().parts
+            blocks = asked.checked().parts
             began = perf_counter()
-            for _ in parts:
+            for _ in blocks:
                 pass
             return perf_counter() - began
 
@@ -123,9 +126,9 @@ class SweepResult:
                 missing = [start for start in chunks.starts if start not in folder.done]
                 done = sum(chunks.stop(start) - start for start in folder.done)
                 with progress.watched("Checking cases") as report:
-                    for part in asked.shared_out(missing, self.jobs, self.workers.mapped if self.workers else None):
-                        folder.put(part)
-                        done += part.stop - part.start
+                    for block in asked.shared_out(missing, self.jobs, self.workers.mapped if self.workers else None):
+                        folder.put(block)
+                        done += block.stop - block.start
                         report(done, self.cases.count)
                 yield asked.swept(folder.parts(chunks.starts))
             except BaseException:
@@ -139,14 +142,14 @@ class SweepResult:
     def _described(self, swept: Swept) -> Described:
         return Described(swept, self.cases, self.mission, __version__, self.overrides)
 
-    def _counted(self, parts: Iterator[Part], report: Callable[[int, int], None]) -> Iterator[Part]:
+    def _counted(self, blocks: Iterator[Part], report: Callable[[int, int], None]) -> Iterator[Part]:
         self.statuses.clear()
         self.waived_by.clear()
-        for part in parts:
-            self.statuses.update(part.values["status"].tolist())
-            waivers_of_cases = (listed(waivers) for waivers in dict.fromkeys(part.values["waived_by"].tolist()))
+        for block in blocks:
+            self.statuses.update(block.values["status"].tolist())
+            waivers_of_cases = (listed(waivers) for waivers in dict.fromkeys(block.values["waived_by"].tolist()))
             self.waived_by |= dict.fromkeys(waiver for waivers in waivers_of_cases for waiver in waivers)
-            yield part
+            yield block
             report(self.statuses.total(), self.cases.count)
 
     @property
@@ -191,13 +194,13 @@ class SweepResult:
     # ------------------------------------------------------------------ all cases, for a notebook
     @cached_property
     def _parts(self) -> tuple[Swept, tuple[Part, ...]]:
-        with self.checked() as (described, parts):
-            return described.swept, tuple(parts)
+        with self.checked() as (described, blocks):
+            return described.swept, tuple(blocks)
 
     @property
     def _table(self) -> Described:
-        swept, parts = self._parts
-        return self._described(replace(swept, parts=iter(parts)))
+        swept, blocks = self._parts
+        return self._described(replace(swept, parts=iter(blocks)))
 
     @property
     def summary(self) -> str:
@@ -205,25 +208,25 @@ class SweepResult:
         return self.so_far if self._parts else ""  # cases are counted when they are checked
 
     @cached_property
-    def columns(self) -> Mapping[str, Any]:
+    def columns(self) -> Mapping[str, Values]:
         """Values of each column by its name, (cases,); varied keys are in the unit of the question."""
         table = self._table
-        parts = [table.values(part) for part in table.swept.parts]
-        return {column.name: np.concatenate([part[column.name] for part in parts]) for column in table.columns}
+        values = [table.values(block) for block in table.swept.parts]
+        return {column.name: np.concatenate([block[column.name] for block in values]) for column in table.columns}
 
-    def __getitem__(self, name: str) -> Any:
+    def __getitem__(self, name: str) -> Values:
         """Values of a column, (cases,)."""
         if name not in self.columns:
             raise KeyError(f"{name}: no such column; accepted: {', '.join(self.columns)}")
         return self.columns[name]
 
-    def to_dataframe(self, library: str | None = None) -> Any:
+    def to_dataframe(self, library: str | None = None) -> DataFrame:
         """The table as a data frame of pandas or of polars, with the columns of the CSV file of `sweep`."""
         columns = self.columns.items()
         lists = {name: values.tolist() if values.dtype == object else values for name, values in columns}
         return frame_of(lists, library)
 
-    def to_xarray(self, chunks: Any = None) -> Any:
+    def to_xarray(self, chunks: Mapping[str, int] | int | str | None = None) -> "Dataset":
         """The table as `xarray.Dataset`, a dimension for each key, with units and long names (CF).
 
         Parameters
@@ -253,7 +256,7 @@ class SweepResult:
             keep_attrs=True,
         )
 
-    def _later(self) -> dict[str, Any]:
+    def _later(self) -> "dict[str, Array]":
         """Columns as arrays of Dask: each chunk of the sweep is a task, with the result that it would have now."""
         try:
             from dask import array
@@ -263,14 +266,14 @@ class SweepResult:
             raise MissingPackageError("chunks need Dask: pip install dask") from None
         table, chunks = self._described(self.asked.swept(iter(()))), self.asked.chunks
         common = delayed((self.asked.travelling, table, SerializableLock()), pure=False)
-        columns: dict[str, list[Any]] = {column.name: [] for column in table.columns}
+        columns: dict[str, list[Array]] = {column.name: [] for column in table.columns}
         for start in chunks.starts:
             stop = chunks.stop(start)
             values = delayed(_values)(common, (start, stop, self.cases.values(start, stop)))
             for column in table.columns:
                 kind = object if column.is_text else float
                 columns[column.name].append(array.from_delayed(values[column.name], (stop - start,), kind))
-        return {name: array.concatenate(parts) for name, parts in columns.items()}
+        return {name: array.concatenate(chunk_arrays) for name, chunk_arrays in columns.items()}
 
     def plot(self, column: str | None = None) -> Picture:
         """Curves of utilization over one key, or a map over two keys of the cases that comply.
@@ -290,8 +293,8 @@ class SweepResult:
         check_plot(self.cases, is_polar=False)
         table = self._table
         gathered_cases = Gathered(table, column=column)
-        for part in table.swept.parts:
-            gathered_cases.add(part)
+        for block in table.swept.parts:
+            gathered_cases.add(block)
         return Picture(
             f"{self._keys(' and ')}, {self.mission.name}", partial(drawing_file, self.drawing(gathered_cases))
         )
@@ -306,7 +309,7 @@ class SweepResult:
         return notebook.page(drawn, notebook.note(f"{self.mission.name}: {self.summary}"))
 
 
-def _values(common: tuple[Question, Described, Any], block: Block) -> Mapping[str, Any]:
+def _values(common: tuple[Question, Described, AbstractContextManager[object]], block: Block) -> Mapping[str, Values]:
     """Values of the columns in a block of cases; threads take turns, because a table caches results."""
     question, table, lock = common
     with lock:

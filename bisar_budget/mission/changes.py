@@ -7,16 +7,15 @@ interpreted, so every check works as for a file. `KEY=null` takes the key out. T
 from collections.abc import Iterator, Sequence
 from difflib import SequenceMatcher, get_close_matches
 from functools import cache
-from typing import Any
 
 import yaml
 
 from bisar_budget.faults import Changed, InvalidValueError, KeyPath, Problem, SetNumber, SetValue, shown
 from bisar_budget.mission.model import MISSION
-from bisar_budget.mission.readers import INVALID, ListOf, OneOf, Reader, Section, did_you_mean, is_place
-from bisar_budget.mission.tree import MAX_BYTES, NULLS, Tree
+from bisar_budget.mission.readers import INVALID, ListOf, OneOf, Reader, Section, did_you_mean, is_index
+from bisar_budget.mission.tree import MAX_BYTES, NULLS, Content, Tree
 
-_ACCEPTED = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
+_ACCEPTED_CHANGE = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
 _MAX_KEY_CHARACTERS = 500  # a path of the schema has a tenth
 # Sections whose keys have dots: ids of rows, or whole paths.
 _WITH_DOTTED_KEYS = (("requirement_ids",), ("specifications",), ("allocation", "specify"))
@@ -35,15 +34,15 @@ def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
         key, equals, value = text.partition("=")
         key = key.strip()
         if not equals or not key:
-            raise InvalidValueError(f"{shown(text)!r} is not KEY=VALUE", _ACCEPTED)
+            raise InvalidValueError(f"{shown(text)!r} is not KEY=VALUE", _ACCEPTED_CHANGE)
         if len(key) > _MAX_KEY_CHARACTERS or len(value) > MAX_BYTES:
-            raise InvalidValueError(f"{shown(text)!r} is too long", _ACCEPTED)
-        parts = parts_of(key)
-        if "" in parts:
-            raise InvalidValueError(f"{shown(key)!r} is no path of keys", _ACCEPTED)
-        if parts in changes:
+            raise InvalidValueError(f"{shown(text)!r} is too long", _ACCEPTED_CHANGE)
+        steps = parts_of(key)
+        if "" in steps:
+            raise InvalidValueError(f"{shown(key)!r} is no path of keys", _ACCEPTED_CHANGE)
+        if steps in changes:
             raise InvalidValueError(f"{shown(key)} is set twice", "accepted: each key once")
-        changes[parts] = SetValue(key, value.strip())
+        changes[steps] = SetValue(key, value.strip())
     return tuple(changes.values())
 
 
@@ -76,11 +75,11 @@ def takes_out(change: SetValue) -> bool:
 
 def _take_out(tree: Tree, change: SetValue) -> None:
     """Take a key out of the tree. A known key that the file does not have is no fault; an unknown key is."""
-    parts = parts_of(change.key)
-    container: Any = tree.root
+    steps = parts_of(change.key)
+    container: Content = tree.root
     path: KeyPath = ()
     while True:
-        name, remaining = next_name(container, parts, has_dotted_keys=path in _WITH_DOTTED_KEYS)
+        name, remaining = next_name(container, steps, has_dotted_keys=path in _WITH_DOTTED_KEYS)
         is_entry = isinstance(container, list)
         if name is None or (is_entry and (not remaining or int(name) >= len(container))) or container is INVALID:
             break
@@ -92,7 +91,7 @@ def _take_out(tree: Tree, change: SetValue) -> None:
             _forget(tree, path)
             tree.changes[path] = change
             return
-        container, parts = container[name], remaining
+        container, steps = container[name], remaining
     if container is INVALID:
         return  # the tree has a fault for the invalid value
     here = tuple(parts_of(change.key))
@@ -100,19 +99,19 @@ def _take_out(tree: Tree, change: SetValue) -> None:
         tree.changes[here] = change
         accepted = "accepted: null for a key, or the list without the entry"
         tree.fault(None, here, "is an entry of a list, which null does not take out", accepted=accepted)
-    elif ".".join(part for part in here if not is_place(part)) not in all_keys():
+    elif ".".join(step for step in here if not is_index(step)) not in all_keys():
         tree.changes[here] = change
         tree.fault(None, here, "is not in the file, and null takes nothing out", hint=nearest_keys(change.key))
 
 
 def _apply(tree: Tree, change: SetValue) -> None:
     """Put a value at its path, and make the sections that are missing on the way."""
-    parts = parts_of(change.key)
-    container: Any = tree.root
+    steps = parts_of(change.key)
+    container: Content = tree.root
     path: KeyPath = ()
     first_new: KeyPath | None = None
     while True:
-        name, remaining = next_name(container, parts, has_dotted_keys=path in _WITH_DOTTED_KEYS)
+        name, remaining = next_name(container, steps, has_dotted_keys=path in _WITH_DOTTED_KEYS)
         if name is None:
             tree.changes[path] = change
             is_list = isinstance(container, list)
@@ -120,7 +119,7 @@ def _apply(tree: Tree, change: SetValue) -> None:
             problem = f"has {entries}, and none has this number" if is_list else "has no keys"
             accepted = f"accepted: 0 to {len(container)}, where the last adds one" if is_list else ""
             shown_value = "" if is_list else shown(str(container))
-            tree.fault(None, path, problem, given=parts[0] if is_list else shown_value, accepted=accepted)
+            tree.fault(None, path, problem, given=steps[0] if is_list else shown_value, accepted=accepted)
             return
         path = (*path, name)
         is_there = name in container if isinstance(container, dict) else int(name) < len(container)
@@ -130,7 +129,7 @@ def _apply(tree: Tree, change: SetValue) -> None:
             break
         if not is_there:
             _put(container, name, {})
-        container, parts = container[name], remaining
+        container, steps = container[name], remaining
         if container is INVALID:
             return  # the tree has a fault for the invalid value
     tree.changes[first_new or path] = change
@@ -141,26 +140,26 @@ def _apply(tree: Tree, change: SetValue) -> None:
 
 
 def next_name(
-    container: Any, parts: tuple[str, ...], has_dotted_keys: bool = False
+    container: Content, steps: tuple[str, ...], has_dotted_keys: bool = False
 ) -> tuple[str | int | None, tuple[str, ...]]:
-    """The next key or index of a path within a container, and the parts behind it; None if there is none.
+    """The next key or index of a path within a container, and the steps behind it; None if there is none.
 
-    With `has_dotted_keys` all parts are one key, joined by dots.
+    With `has_dotted_keys` all steps are one key, joined by dots.
     """
     if isinstance(container, list):
-        is_entry = is_place(parts[0]) and int(parts[0]) <= len(container)
-        return (int(parts[0]) if is_entry else None), parts[1:]
+        is_entry = is_index(steps[0]) and int(steps[0]) <= len(container)
+        return (int(steps[0]) if is_entry else None), steps[1:]
     if not isinstance(container, dict):
         return None, ()
     if has_dotted_keys:
-        return ".".join(parts), ()
-    for length in range(len(parts), 1, -1):  # a key that has dots itself
-        if (name := ".".join(parts[:length])) in container:
-            return name, parts[length:]
-    return parts[0], parts[1:]
+        return ".".join(steps), ()
+    for length in range(len(steps), 1, -1):  # a key that has dots itself
+        if (name := ".".join(steps[:length])) in container:
+            return name, steps[length:]
+    return steps[0], steps[1:]
 
 
-def _put(container: Any, name: str | int, value: Any) -> None:
+def _put(container: Content, name: str | int, value: object) -> None:
     """Set a value in a mapping or a list; the index behind the last entry appends."""
     if isinstance(container, list) and name == len(container):
         container.append(value)
@@ -168,7 +167,7 @@ def _put(container: Any, name: str | int, value: Any) -> None:
         container[name] = value
 
 
-def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
+def _value(tree: Tree, change: SetValue, path: KeyPath) -> Content:
     """The value of an option, read as a value of the file; faults name the option. A number stays as it is."""
     if isinstance(change, SetNumber):
         return change.value
@@ -197,9 +196,9 @@ def _forget(tree: Tree, path: KeyPath) -> None:
 
 # ---------------------------------------------------------------------- hints for unknown keys
 _MAX_PATH_CHARACTERS = 200  # of a path that is compared with known paths
-_MAX_HINT_PATHS = 4  # in a hint; a key of more sections has no hint
+_MAX_HINT_PATH_COUNT = 4  # in a hint; a key of more sections has no hint
 # Smallest similarity of a misspelt key to a key of its section: if another section has the key as it is, and if not.
-_SIMILARITY_RATIO, _SIMILARITY_RATIO_OF_UNKNOWN = 0.8, 0.6
+_KNOWN_KEY_SIMILARITY_RATIO, _UNKNOWN_KEY_SIMILARITY_RATIO = 0.8, 0.6
 
 
 @cache
@@ -208,7 +207,7 @@ def all_keys() -> tuple[str, ...]:
     return tuple(dict.fromkeys(_below(MISSION, "")))
 
 
-def _below(reader: Reader, path: str) -> Iterator[str]:
+def _below(reader: Reader[object], path: str) -> Iterator[str]:
     """Paths of all keys below a path."""
     if isinstance(reader, OneOf):
         for form in reader.forms:
@@ -229,19 +228,19 @@ def nearest_keys(path: str) -> str:
     with the paths that end like it.
     """
     path = path[:_MAX_PATH_CHARACTERS]
-    parts = parts_of(path)
-    meant = _spelt_right(parts)
-    if meant and meant != ".".join(parts):  # equal if the key belongs to another form of the section
+    steps = parts_of(path)
+    meant = _spelt_right(steps)
+    if meant and meant != ".".join(steps):  # equal if the key belongs to another form of the section
         return f"Did you mean {meant!r}?"
     section, missing = _split(_names(path))
     prefix = f"{section}." if section else ""
     candidates = [key for key in all_keys() if key.startswith(prefix) and key.endswith(f".{missing}")]
     if not (candidates or section):  # without a known section, any section may have the last key
         candidates = [key for key in all_keys() if key.rpartition(".")[2] == missing.rpartition(".")[2]]
-    if 0 < len(candidates) <= _MAX_HINT_PATHS:
+    if 0 < len(candidates) <= _MAX_HINT_PATH_COUNT:
         nearest_first = sorted(candidates, key=lambda candidate: -SequenceMatcher(None, path, candidate).ratio())
         return f"Did you mean {' or '.join(map(repr, nearest_first))}?"
-    if section or _is_known((_names(path) or [""])[-1]):
+    if section or _is_key((_names(path) or [""])[-1]):
         return section_hint(path, "")
     return did_you_mean(path, all_keys())
 
@@ -250,28 +249,28 @@ def section_hint(path: str, near: str) -> str:
     """Hint at the sections that have the last key of a path; `near` is the hint at a key with a similar name.
 
     The hint is `near` if the key resembles a key of its own section, or if no section has it. The hint names the
-    sections that share most of the path, and is empty if they are more than `_MAX_HINT_PATHS`.
+    sections that share most of the path, and is empty if they are more than `_MAX_HINT_PATH_COUNT`.
     """
     *above, name = _names(path[:_MAX_PATH_CHARACTERS]) or [""]
     sections = [key.split(".")[:-1] for key in all_keys() if key.rpartition(".")[2] == name]
-    if not sections or above in sections or get_close_matches(name, _keys_of(above), 1, _SIMILARITY_RATIO):
+    if not sections or above in sections or get_close_matches(name, _keys_of(above), 1, _KNOWN_KEY_SIMILARITY_RATIO):
         return near
     shared = [_shared(section, above) for section in sections]
     nearest = [section for section, length in zip(sections, shared, strict=True) if length == max(shared)]
-    if len(nearest) > _MAX_HINT_PATHS:
+    if len(nearest) > _MAX_HINT_PATH_COUNT:
         return ""
     *first, last = [repr(".".join(section)) if section else "the file itself" for section in nearest]
     return f"{name!r} is a key of {', '.join(first)}{' and ' * bool(first)}{last}"
 
 
-def _is_known(name: str) -> bool:
+def _is_key(name: str) -> bool:
     """Whether any section has a key."""
     return any(key.rpartition(".")[2] == name for key in all_keys())
 
 
 def _names(path: str) -> list[str]:
     """Keys of a path, without the numbers of lists."""
-    return [part for part in parts_of(path) if not part.isdigit()]
+    return [step for step in parts_of(path) if not step.isdigit()]
 
 
 def _keys_of(section: Sequence[str]) -> list[str]:
@@ -287,17 +286,17 @@ def _split(names: list[str]) -> tuple[str, str]:
     return ".".join(names[:count]), ".".join(names[count:])
 
 
-def _spelt_right(parts: Sequence[str]) -> str:
+def _spelt_right(steps: Sequence[str]) -> str:
     """The path with each unknown key replaced by the nearest key of its section; empty if no key is near."""
     meant: list[str] = []
     section: list[str] = []
-    for part in parts:
-        if part.isdigit():
-            meant.append(part)
+    for step in steps:
+        if step.isdigit():
+            meant.append(step)
             continue
         keys = _keys_of(section)
-        smallest_ratio = _SIMILARITY_RATIO if _is_known(part) else _SIMILARITY_RATIO_OF_UNKNOWN
-        near = [part] if part in keys else get_close_matches(part, keys, 1, smallest_ratio)
+        smallest_ratio = _KNOWN_KEY_SIMILARITY_RATIO if _is_key(step) else _UNKNOWN_KEY_SIMILARITY_RATIO
+        near = [step] if step in keys else get_close_matches(step, keys, 1, smallest_ratio)
         if not near:
             return ""
         meant += near
@@ -314,7 +313,7 @@ def _shared(names: list[str], other_names: list[str]) -> int:
 
 
 # ---------------------------------------------------------------------- keys of errors
-_ERRORS = (
+_ERROR_KEYS = (
     *("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors"),
     *("oscillator", "synchronization"),
 )
@@ -327,13 +326,13 @@ ACCEPTED_ERRORS = (
 
 def is_error(key: str) -> bool:
     """Whether a key is the size of an error: in a section of errors, and no interval, frequency or the like."""
-    parts = parts_of(key)
-    return any(part in _ERRORS for part in parts[:3]) and parts[-1] not in _NO_SIZES
+    steps = parts_of(key)
+    return any(step in _ERROR_KEYS for step in steps[:3]) and steps[-1] not in _NO_SIZES
 
 
 def name_of_error(key: str) -> str:
     """The name of an error in rows: `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
-    return ".".join(part for part in parts_of(key) if part not in ("platforms", "motion_error"))
+    return ".".join(step for step in parts_of(key) if step not in ("platforms", "motion_error"))
 
 
 def report_specified(tree: Tree) -> None:

@@ -6,32 +6,35 @@ correlation matrix has no units, so a tolerance means the same for metres and fo
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from bisar_budget import units
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import FRAME_AXES, Vector
+from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.mission.readers import (
     INVALID,
+    Invalid,
     Key,
     Quantity,
     Reader,
     Report,
     Section,
     Triple,
+    are_valid,
     either,
     read_part,
 )
 
-KINDS = ("position", "velocity")
-SIZE = 6
+MOTION_KINDS = ("position", "velocity")
+MATRIX_SIZE = 6
 
 # Matrices are written with finite digits. Six decimals of a correlation leave an element wrong by 5e-7 and, five
 # of them in a row, an eigenvalue by 2.5e-6 (Weyl).
-_ELEMENT_TOLERANCE = 1e-6
-EIGENVALUE_TOLERANCE = 2.5e-6
+_ELEMENT_TOLERANCE_FRACTION = 1e-6
+EIGENVALUE_TOLERANCE_FRACTION = 2.5e-6
 
 _AXIS = {name: index for names in FRAME_AXES.values() for index, name in enumerate(names)}
 _Matrix = tuple[tuple[float, ...], ...]
@@ -51,18 +54,18 @@ class Covariance(NamedTuple):
 
     def of(self, kind: str) -> Vector:
         """Marginal sigmas of a kind, position or velocity, along the frame's axes."""
-        first = 3 * KINDS.index(kind)
+        first = 3 * MOTION_KINDS.index(kind)
         a, b, c = self.sigmas[first : first + 3]
         return (a, b, c)
 
     def block(self, kind: str) -> list[tuple[float, ...]]:
         """Correlations (3, 3) of the errors of a kind among each other."""
-        first = 3 * KINDS.index(kind)
+        first = 3 * MOTION_KINDS.index(kind)
         return [row[first : first + 3] for row in self.correlation[first : first + 3]]
 
     def path(self, kind: str, axis: int) -> KeyPath:
         """Path below `covariance` of the sigma of an error in the file."""
-        index = 3 * KINDS.index(kind) + axis
+        index = 3 * MOTION_KINDS.index(kind) + axis
         return (index, index) if self.is_matrix else (kind, axis)
 
     def has_correlations(self) -> bool:
@@ -73,7 +76,7 @@ class Covariance(NamedTuple):
 def _problems(correlation: _Matrix) -> Iterator[Problem]:
     """Problem of a correlation matrix that is not positive semi-definite."""
     smallest = float(np.linalg.eigvalsh(correlation)[0])
-    if smallest <= -EIGENVALUE_TOLERANCE:
+    if smallest <= -EIGENVALUE_TOLERANCE_FRACTION:
         yield Problem(
             f"is not positive semi-definite: the correlation matrix has the eigenvalue {smallest:.3g}",
             "no error has such a covariance",
@@ -81,27 +84,32 @@ def _problems(correlation: _Matrix) -> Iterator[Problem]:
         )
 
 
-def _rows(value: Any, readers: Sequence[Sequence[Reader]], path: KeyPath, report: Report, otherwise: str) -> Any:
+def _rows(
+    value: object, readers: Sequence[Sequence[Reader[float]]], path: KeyPath, report: Report, otherwise: str
+) -> list[tuple[float, ...]] | Invalid:
     """Read a 6 x 6 matrix as six lists; `INVALID` after a report."""
-    if not isinstance(value, list) or len(value) != SIZE:
+    if not isinstance(value, list) or len(value) != MATRIX_SIZE:
         given = f", {len(value)} given" if isinstance(value, list) else ""
         accepted = f"accepted: x, y, z of position, then of velocity, or {otherwise}"
         report(path, Problem(f"must be 6 rows of 6 numbers{given}", accepted))
         return INVALID
-    broken = [index for index, row in enumerate(value) if not isinstance(row, list) or len(row) != SIZE]
+    broken = [index for index, row in enumerate(value) if not isinstance(row, list) or len(row) != MATRIX_SIZE]
     for index in broken:
         given = f", {len(value[index])} given" if isinstance(value[index], list) else ""
         report((*path, index), Problem(f"must be a row of 6 numbers{given}"))
     if broken:
         return INVALID
     rows = [
-        [
-            read_part(reader, item, (*path, i, j), report)
-            for j, (item, reader) in enumerate(zip(row, of_row, strict=True))
-        ]
+        tuple(
+            [
+                read_part(reader, item, (*path, i, j), report)
+                for j, (item, reader) in enumerate(zip(row, of_row, strict=True))
+            ]
+        )
         for i, (row, of_row) in enumerate(zip(value, readers, strict=True))
     ]
-    return INVALID if any(item is INVALID for row in rows for item in row) else rows
+    valid_rows = [row for row in rows if are_valid(row)]
+    return valid_rows if len(valid_rows) == MATRIX_SIZE else INVALID
 
 
 def _report_all(faults: Sequence[Problem], path: KeyPath, report: Report) -> bool:
@@ -113,17 +121,17 @@ def _report_all(faults: Sequence[Problem], path: KeyPath, report: Report) -> boo
 
 def _asymmetries(rows: Sequence[Sequence[float]], scales: Sequence[float]) -> Iterator[Problem]:
     """Problems of elements that differ from their mirror element, in units of the scales of row and column."""
-    for i in range(SIZE):
+    for i in range(MATRIX_SIZE):
         for j in range(i):
-            if abs(rows[i][j] - rows[j][i]) > _ELEMENT_TOLERANCE * scales[i] * scales[j]:
+            if abs(rows[i][j] - rows[j][i]) > _ELEMENT_TOLERANCE_FRACTION * scales[i] * scales[j]:
                 yield Problem(f"is not symmetric: row {j + 1}, column {i + 1} is {rows[j][i]:.7g}", at=(i, j))
 
 
 def _symmetric(rows: Sequence[Sequence[float]]) -> _Matrix:
     """Mean of a matrix and its transpose, with a diagonal of 1, and elements within ±1."""
     return tuple(
-        tuple(1.0 if i == j else max(-1.0, min(1.0, (rows[i][j] + rows[j][i]) / 2)) for j in range(SIZE))
-        for i in range(SIZE)
+        tuple(1.0 if i == j else max(-1.0, min(1.0, (rows[i][j] + rows[j][i]) / 2)) for j in range(MATRIX_SIZE))
+        for i in range(MATRIX_SIZE)
     )
 
 
@@ -131,20 +139,20 @@ _BLOCKS = [
     Quantity(dimension, ge=-1e18, le=1e18)
     for dimension in (units.POSITION_VARIANCE, units.POSITION_VELOCITY, units.VELOCITY_VARIANCE)
 ]
-_ELEMENTS = [[_BLOCKS[(i > 2) + (j > 2)] for j in range(SIZE)] for i in range(SIZE)]
+_ELEMENTS = [[_BLOCKS[(i > 2) + (j > 2)] for j in range(MATRIX_SIZE)] for i in range(MATRIX_SIZE)]
 
 
-class _MatrixReader(Reader):
+class _MatrixReader(Reader[Covariance]):
     """The 6 x 6 matrix: m², m²/s and m²/s², position before velocity, each in the order of the frame's axes."""
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> Covariance | Invalid:
         """Read the elements, and check that they are a covariance."""
         rows = _rows(value, _ELEMENTS, path, report, "a mapping with position, velocity and correlation")
         if rows is INVALID:
             return INVALID
-        faults = [Problem("is a negative variance", at=(i, i)) for i in range(SIZE) if rows[i][i] < 0]
+        faults = [Problem("is a negative variance", at=(i, i)) for i in range(MATRIX_SIZE) if rows[i][i] < 0]
         if not faults:
-            sigmas = [math.sqrt(rows[i][i]) for i in range(SIZE)]
+            sigmas = [math.sqrt(rows[i][i]) for i in range(MATRIX_SIZE)]
             faults += [*_asymmetries(rows, sigmas), *_excesses(rows, sigmas)]
         if not faults:
             ratios = [
@@ -157,17 +165,17 @@ class _MatrixReader(Reader):
             INVALID if _report_all(faults, path, report) else Covariance(tuple(sigmas), correlation, is_matrix=True)
         )
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: array of six arrays of six."""
         return _matrix_schema([[element.schema(definitions) for element in row] for row in _ELEMENTS])
 
 
 def _excesses(rows: Sequence[Sequence[float]], sigmas: Sequence[float]) -> Iterator[Problem]:
     """Problems of elements that are larger than the product of their sigmas."""
-    for i in range(SIZE):
+    for i in range(MATRIX_SIZE):
         for j in range(i):
             most = sigmas[i] * sigmas[j]
-            if abs(rows[i][j]) > most * (1 + _ELEMENT_TOLERANCE):
+            if abs(rows[i][j]) > most * (1 + _ELEMENT_TOLERANCE_FRACTION):
                 problem = (
                     f"makes a correlation of {rows[i][j] / most:.4g}, beyond ±1"
                     if most
@@ -177,9 +185,9 @@ def _excesses(rows: Sequence[Sequence[float]], sigmas: Sequence[float]) -> Itera
                 yield Problem(problem, accepted, at=(i, j))
 
 
-def _matrix_schema(elements: Sequence[Sequence[dict[str, Any]]]) -> dict[str, Any]:
-    def six(items: Sequence[dict[str, Any]]) -> dict[str, Any]:
-        return {"type": "array", "items": items, "minItems": SIZE, "maxItems": SIZE}
+def _matrix_schema(elements: Sequence[Sequence[JsonObject]]) -> JsonObject:
+    def six(items: Sequence[JsonObject]) -> JsonObject:
+        return {"type": "array", "items": items, "minItems": MATRIX_SIZE, "maxItems": MATRIX_SIZE}
 
     return six([six(row) for row in elements])
 
@@ -189,12 +197,12 @@ class _Correlations(NamedTuple):
     pairs: tuple[str, ...] = ()
 
 
-class _CorrelationReader(Reader):
+class _CorrelationReader(Reader[_Correlations]):
     """Correlations of named pairs of errors, zero for other pairs; or the 6 x 6 matrix with a diagonal of 1."""
 
     _NUMBER = Quantity(units.RATIO, ge=-1, le=1)
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> _Correlations | Invalid:
         """Read pairs or a matrix."""
         read = self._pairs(value, path, report) if isinstance(value, dict) else self._matrix(value, path, report)
         if read is INVALID:
@@ -202,19 +210,21 @@ class _CorrelationReader(Reader):
         faults = list(_problems(read.matrix))
         return INVALID if _report_all(faults, path, report) else read
 
-    def _matrix(self, value: Any, path: KeyPath, report: Report) -> Any:
-        readers = [[self._NUMBER] * SIZE] * SIZE
+    def _matrix(self, value: object, path: KeyPath, report: Report) -> _Correlations | Invalid:
+        readers = [[self._NUMBER] * MATRIX_SIZE] * MATRIX_SIZE
         rows = _rows(value, readers, path, report, "pairs such as position.x-velocity.x: 0.3")
         if rows is INVALID:
             return INVALID
         faults = [
-            Problem("an error's correlation with itself is 1", at=(i, i)) for i in range(SIZE) if rows[i][i] != 1
+            Problem("an error's correlation with itself is 1", at=(i, i))
+            for i in range(MATRIX_SIZE)
+            if rows[i][i] != 1
         ]
-        faults += _asymmetries(rows, [1.0] * SIZE)
+        faults += _asymmetries(rows, [1.0] * MATRIX_SIZE)
         return INVALID if _report_all(faults, path, report) else _Correlations(_symmetric(rows))
 
-    def _pairs(self, value: dict[str, Any], path: KeyPath, report: Report) -> Any:
-        rows = [[float(i == j) for j in range(SIZE)] for i in range(SIZE)]
+    def _pairs(self, value: dict[str, object], path: KeyPath, report: Report) -> _Correlations | Invalid:
+        rows = [[float(i == j) for j in range(MATRIX_SIZE)] for i in range(MATRIX_SIZE)]
         named: dict[frozenset[int | None], str] = {}
         is_valid = True
         for key, text in value.items():
@@ -236,26 +246,26 @@ class _CorrelationReader(Reader):
             is_valid = False
         return _Correlations(tuple(map(tuple, rows)), tuple(named.values())) if is_valid else INVALID
 
-    def below(self, part: str) -> Reader | None:
+    def below(self, part: str) -> Reader[object] | None:
         """Reader of the correlation of a pair."""
         return self._NUMBER if "-" in part else None
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: object of pairs, or array of six arrays of six."""
         number = self._NUMBER.schema(definitions)
-        name = rf"(?:{'|'.join(KINDS)})\.(?:{'|'.join(_AXIS)})"
+        name = rf"(?:{'|'.join(MOTION_KINDS)})\.(?:{'|'.join(_AXIS)})"
         pairs = {
             "type": "object",
             "patternProperties": {rf"^\s*{name}\s*-\s*{name}\s*$": number},
             "additionalProperties": False,
         }
-        return {"anyOf": [pairs, _matrix_schema([[number] * SIZE] * SIZE)]}
+        return {"anyOf": [pairs, _matrix_schema([[number] * MATRIX_SIZE] * MATRIX_SIZE)]}
 
 
 def error_index(name: str) -> int | None:
     """Index from 0 to 5 of `position.x`, `velocity.along` and the like; None for another name."""
     kind, _, axis = name.partition(".")
-    return 3 * KINDS.index(kind) + _AXIS[axis] if kind in KINDS and axis in _AXIS else None
+    return 3 * MOTION_KINDS.index(kind) + _AXIS[axis] if kind in MOTION_KINDS and axis in _AXIS else None
 
 
 class Sigmas(NamedTuple):
@@ -273,14 +283,14 @@ class Sigmas(NamedTuple):
             _CorrelationReader(),
             "Correlations of pairs, such as position.x-velocity.x: 0.3, or a 6 x 6 matrix; omitted: none.",
         ),
-    ] = _Correlations(_symmetric([[0.0] * SIZE] * SIZE))
+    ] = _Correlations(_symmetric([[0.0] * MATRIX_SIZE] * MATRIX_SIZE))
 
 
-class _SigmasReader(Section):
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+class _SigmasReader(Section[Sigmas | Covariance]):
+    def read(self, value: object, path: KeyPath, report: Report) -> Covariance | Invalid:
         """Read the section as a covariance."""
         sigmas_section = super().read(value, path, report)
-        if sigmas_section is INVALID:
+        if not isinstance(sigmas_section, Sigmas):
             return INVALID
         sigmas = (*sigmas_section.position, *sigmas_section.velocity)
         return Covariance(

@@ -15,6 +15,8 @@ from bisar_budget.mission.parts import is_file
 from bisar_budget.mission.paths import path_files
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+Node = Any
+"""A node of PyYAML: a mapping, a sequence or a scalar, with the marks of its start and end."""
 
 
 def with_values(text: str, changes: Sequence[SetValue]) -> str:
@@ -38,7 +40,7 @@ def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
     Keys of the section may have dots.
     """
     is_of_dos, text = "\r\n" in text, text.replace("\r\n", "\n")
-    root: Any = yaml.compose(text, Loader=_LOADER)
+    root: Node = yaml.compose(text, Loader=_LOADER)
     inline = f"{name}: {{{', '.join(f'{key}: {value}' for key, value in values.items())}}}"
     lines = "\n".join([f"{name}:", *(f"  {key}: {value}" for key, value in values.items())])
     existing = next(((key, value) for key, value in root.value if key.value == name), None)
@@ -60,7 +62,7 @@ def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
 
 def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
     """Values with which the file of a mission, moved to a folder, names the same files from there."""
-    for key, name in (*path_files(mission), *_parts_beside(mission)):
+    for key, name in (*path_files(mission), *_named_part_files(mission)):
         if os.path.isabs(name):
             continue
         file = os.path.realpath(os.path.join(folder_of(mission.file), name))
@@ -71,7 +73,7 @@ def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
         yield SetValue(key, json.dumps(name.replace(os.sep, "/"), ensure_ascii=False))
 
 
-def _parts_beside(mission: Mission) -> Iterator[tuple[str, str]]:
+def _named_part_files(mission: Mission) -> Iterator[tuple[str, str]]:
     """Keys under which a mission names files of parts, with the names; parts of a catalogue are left out."""
     for owner, platform in mission.platforms._asdict().items():
         sensor = platform.motion_error.sensor
@@ -84,11 +86,11 @@ def _parts_beside(mission: Mission) -> Iterator[tuple[str, str]]:
         yield from ((key, name) for key, name in name_by_key.items() if is_file(name))
 
 
-def _with_value(text: str, parts: tuple[str, ...], value: str) -> str:
+def _with_value(text: str, steps: tuple[str, ...], value: str) -> str:
     """The text with a value at a path of keys."""
-    node: Any = yaml.compose(text, Loader=_LOADER)
+    node: Node = yaml.compose(text, Loader=_LOADER)
     while True:
-        key, remaining = _next(node, parts)
+        key, remaining = _next(node, steps)
         inner = _below(node, key)
         if inner is None:
             return _with_entry(text, node, key, remaining, value)
@@ -96,12 +98,12 @@ def _with_value(text: str, parts: tuple[str, ...], value: str) -> str:
             return _replaced(text, inner, value, _end_of_key(node, key))
         if not isinstance(inner, yaml.MappingNode | yaml.SequenceNode):  # an empty section
             return _replaced(text, inner, _nested(remaining, value), _end_of_key(node, key))
-        node, parts = inner, remaining
+        node, steps = inner, remaining
 
 
 def _without_key(text: str, parts: tuple[str, ...]) -> str:
     """The text without a key and its value; a section without other keys becomes empty. Other comments stay."""
-    node: Any = yaml.compose(text, Loader=_LOADER)
+    node: Node = yaml.compose(text, Loader=_LOADER)
     end_of_key = 0
     while True:
         key, remaining = _next(node, parts)
@@ -127,30 +129,30 @@ def _without_key(text: str, parts: tuple[str, ...]) -> str:
     return text[:line_start] + ("" if line_end < 0 else text[line_end + 1 :])
 
 
-def _next(node: Any, parts: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
+def _next(node: Node, parts: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
     """The next key or index of a path within a node, and the parts behind it; a key may have dots itself."""
-    names: Any = (
+    names: dict[str, None] | list[Node] = (
         {key.value: None for key, _ in node.value} if isinstance(node, yaml.MappingNode) else list(node.value)
     )
     name, remaining = next_name(names, parts)
     return str(name), remaining
 
 
-def _below(node: Any, name: str) -> Any:
+def _below(node: Node, name: str) -> Node:
     """The node at a key or an index; None if there is none."""
     if isinstance(node, yaml.MappingNode):
         return next((value for key, value in node.value if key.value == name), None)
     return node.value[int(name)] if int(name) < len(node.value) else None
 
 
-def _end_of_key(node: Any, name: str) -> int:
+def _end_of_key(node: Node, name: str) -> int:
     """Index in the text of the end of a mapping's key, or of the start of a list."""
     if not isinstance(node, yaml.MappingNode):
         return int(node.start_mark.index)
     return next(int(key.end_mark.index) for key, _ in node.value if key.value == name)
 
 
-def _replaced(text: str, node: Any, value: str, end_of_key: int) -> str:
+def _replaced(text: str, node: Node, value: str, end_of_key: int) -> str:
     """The text with a value in place of a node; comments within a node of several lines stay."""
     start, end = node.start_mark.index, node.end_mark.index
     if isinstance(node, yaml.ScalarNode):
@@ -182,7 +184,7 @@ def _nested(parts: Sequence[str], value: str) -> str:
     return value
 
 
-def _with_entry(text: str, node: Any, key: str, remaining: Sequence[str], value: str) -> str:
+def _with_entry(text: str, node: Node, key: str, remaining: Sequence[str], value: str) -> str:
     """The text with a further key of a mapping, or a further entry of a list, in the style of that node."""
     nested_value, start, end = _nested(remaining, value), node.start_mark.index, node.end_mark.index
     entry = nested_value if isinstance(node, yaml.SequenceNode) else f"{key}: {nested_value}"

@@ -3,15 +3,17 @@
 import math
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import Vector
+from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.mission.readers import (
     INVALID,
     Choice,
     CurveReader,
+    Invalid,
     Key,
     ListOf,
     Points,
@@ -20,9 +22,11 @@ from bisar_budget.mission.readers import (
     Reference,
     Report,
     Section,
+    SectionValues,
     Source,
     Text,
     Triple,
+    has_valid_values,
     read_part,
 )
 from bisar_budget.mission.vibrations import FELT_VIBRATION, LEVEL, FeltVibration
@@ -85,7 +89,7 @@ class TakenFigure(NamedTuple):
     """
 
     key: str
-    value: Any
+    value: object
     part: str
 
 
@@ -146,7 +150,7 @@ class LeverArm(NamedTuple):
         return ("arm", "uncertainty")
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Reject an empty section."""
         if values.keys() >= {"arm", "uncertainty"} and values["arm"] is None and values["uncertainty"] is None:
             yield Problem("is empty", "accepted: arm, uncertainty or both")
@@ -166,18 +170,18 @@ POWERS = dict(zip(("h-2", "h-1", "h0", "h1", "h2"), PowerLaw._fields, strict=Tru
 _COEFFICIENT = Quantity(units.RATIO, ge=0, le=1)
 
 
-class _PowerLawReader(Reader):
+class _PowerLawReader(Reader[PowerLaw]):
     """A mapping of h-2 … h2 to coefficients."""
 
     accepted = "{h-2: 4e-23, h-1: 2e-21, h0: 8e-20} and the like"
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> PowerLaw | Invalid:
         """Read each coefficient; a problem is reported at its own path."""
         accepted = f"accepted: {', '.join(POWERS)}"
         if not isinstance(value, dict) or not value:
             report(path, Problem("must be a mapping of coefficients", accepted))
             return INVALID
-        coefficients = dict.fromkeys(POWERS, 0.0)
+        coefficients: dict[str, float | Invalid] = dict.fromkeys(POWERS, 0.0)
         is_valid = True
         for key, item in value.items():
             if key not in coefficients:
@@ -185,20 +189,20 @@ class _PowerLawReader(Reader):
                 is_valid = False
                 continue
             coefficients[key] = read_part(_COEFFICIENT, item, (*path, key), report)
-        return PowerLaw(*coefficients.values()) if is_valid and INVALID not in coefficients.values() else INVALID
+        return PowerLaw(*coefficients.values()) if is_valid and has_valid_values(coefficients) else INVALID
 
-    def below(self, part: str) -> Reader | None:
+    def below(self, part: str) -> Reader[object] | None:
         """Reader of a coefficient."""
         return _COEFFICIENT if part in POWERS else None
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: object of coefficients."""
         coefficient = _COEFFICIENT.schema(definitions)
         properties = dict.fromkeys(POWERS, coefficient)
         return {"type": "object", "properties": properties, "additionalProperties": False, "minProperties": 1}
 
 
-FORMS = ("phase_noise", "allan_deviation", "power_law")
+OSCILLATOR_NOISE_FORMS = ("phase_noise", "allan_deviation", "power_law")
 MAX_FALL_DB_PER_DECADE = 60.0  # of a mask; noise of an oscillator falls by 40 at most
 MAX_RISE_DB_PER_DECADE = 20.0  # of a mask; a steeper rise is a tone or a mistake
 _OR_SENSOR = ", or sensor: a part of the catalogue"
@@ -317,13 +321,13 @@ class Oscillator(NamedTuple):
         return self._replace(level=0.0, aging=None, acceleration_sensitivity=None, vibration=None)
 
     @staticmethod
-    def problems(values: Mapping[str, Any], or_else: str = _OR_SENSOR) -> Iterator[Problem]:
+    def problems(values: SectionValues, or_else: str = _OR_SENSOR) -> Iterator[Problem]:
         """Require one form, and possible slopes of a mask; `or_else` names what else is accepted."""
-        forms = [form for form in FORMS if values.get(form) is not None]
-        accepted = f"accepted: one of {', '.join(FORMS)}"
+        forms = [form for form in OSCILLATOR_NOISE_FORMS if values.get(form) is not None]
+        accepted = f"accepted: one of {', '.join(OSCILLATOR_NOISE_FORMS)}"
         for form in forms[1:]:
             yield Problem(f"stands beside {forms[0]}", accepted, at=(form,))
-        if values.get("sensor") is None and values.keys() >= set(FORMS):
+        if values.get("sensor") is None and values.keys() >= set(OSCILLATOR_NOISE_FORMS):
             if not forms:
                 yield Problem("says nothing of its noise", f"{accepted}{or_else}")
             if values["phase_noise"] is not None and values.get("frequency", 0.0) is None:
@@ -414,7 +418,7 @@ class Synchronization(NamedTuple):
         return self.method == "holdover"
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require the keys of the method, and refuse keys of other methods."""
         method = values.get("method")
         if method is None:

@@ -7,11 +7,11 @@ import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import BinaryIO, cast
+from typing import BinaryIO
 
 from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, file_fault, sentences
 from bisar_budget.mission.model import MISSION, Mission, PartFile, flies_on_earth, names_files, names_parts
-from bisar_budget.mission.readers import INVALID
+from bisar_budget.mission.readers import INVALID, Invalid
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
 from bisar_budget.resources import UnreadableError, held, special_file, standard_input
 
@@ -66,7 +66,7 @@ def parse_mission(
     data: bytes | str,
     file: str = "-",
     model: str | None = None,
-    beside: Callable[[str], bytes] | None = None,
+    read_path: Callable[[str], bytes] | None = None,
     changes: Sequence[SetValue] = (),
     find: _Find | None = None,
     *,
@@ -82,7 +82,7 @@ def parse_mission(
         Name of the file for messages.
     model : str, optional
         Gating model in place of `allocation.model`.
-    beside : callable, optional
+    read_path : callable, optional
         Returns the content of a file that the mission names, or raises `PathFileError`. By default files are read
         relative to the folder of the mission file.
     changes : sequence of SetValue
@@ -99,7 +99,7 @@ def parse_mission(
     MissionError
         Not a usable mission; carries every fault.
     """
-    return mission_of(read_tree(data, file), data, file, model, beside, changes, find, is_placed=is_placed)
+    return mission_of(read_tree(data, file), data, file, model, read_path, changes, find, is_placed=is_placed)
 
 
 def mission_of(
@@ -107,7 +107,7 @@ def mission_of(
     data: bytes | str,
     file: str,
     model: str | None = None,
-    beside: Callable[[str], bytes] | None = None,
+    read_path: Callable[[str], bytes] | None = None,
     changes: Sequence[SetValue] = (),
     find: _Find | None = None,
     *,
@@ -121,7 +121,7 @@ def mission_of(
             apply_changes(tree, changes)
     if model is not None and isinstance(tree.root.get("allocation"), dict):
         tree.root["allocation"]["model"] = model
-    mission = INVALID
+    mission: Mission | Invalid = INVALID
     parts: dict[str, PartFile] = {}
     with suppress(UnusableError):
         mission = MISSION.read(tree.root, (), tree.report)
@@ -137,11 +137,11 @@ def mission_of(
         if (mission is INVALID or not is_placed) and names_files(tree.root):
             from bisar_budget.mission.paths import reader_of, report_files
 
-            report_files(tree.root, beside or reader_of(folder), tree.report)
+            report_files(tree.root, read_path or reader_of(folder), tree.report)
         elif mission is not INVALID and is_placed and flies_on_earth(mission):
             from bisar_budget.mission.paths import reader_of, with_paths
 
-            mission = with_paths(mission, beside or reader_of(folder), tree.report)
+            mission = with_paths(mission, read_path or reader_of(folder), tree.report)
         if mission is INVALID and names_files(tree.root):
             from bisar_budget.mission.parts import finder_of, report_parts
 
@@ -150,13 +150,13 @@ def mission_of(
             from bisar_budget.mission.parts import finder_of, with_parts
 
             mission = with_parts(mission, _recording(find or finder_of(folder), parts), tree.report)
-    if tree.faults:
+    if tree.faults or mission is INVALID:
         ordered = tuple([_with_hint(fault) for fault in tree.in_order()])
         if changes:
             ordered = tuple([_with_changes(fault, changes) for fault in ordered])
         raise MissionError(file, ordered)
     as_bytes = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
-    finished = cast(Mission, mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes)))
+    finished = mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes))
     finished = finished._replace(parts=tuple(parts.values()))
     return finished if model is None else finished._replace(allocation=finished.allocation._replace(model=model))
 
@@ -210,15 +210,15 @@ class Named:
         self, tree: Tree, data: bytes, file: str, model: str | None = None, *, changes: Sequence[SetValue] = ()
     ) -> Mission:
         """Read a mission that names only these files; arguments and faults are as in `mission_of`."""
-        parts = {part.name: (part.file, part.data) for part in self.parts}
-        return mission_of(tree, data, file, model, dict(self.paths).__getitem__, changes, parts.__getitem__)
+        content_by_name = {part_file.name: (part_file.file, part_file.data) for part_file in self.parts}
+        return mission_of(tree, data, file, model, dict(self.paths).__getitem__, changes, content_by_name.__getitem__)
 
     @property
     def sha256(self) -> str:
         """Hash of all names and contents; empty if the mission names no files."""
         from hashlib import sha256  # a check does not need it
 
-        files = (*self.paths, *((part.name, part.data) for part in self.parts))
+        files = (*self.paths, *((part_file.name, part_file.data) for part_file in self.parts))
         digests = [(name, sha256(content).hexdigest()) for name, content in files]
         return sha256(ascii(digests).encode()).hexdigest() if digests else ""
 

@@ -3,12 +3,14 @@
 import math
 from collections.abc import Iterator, Mapping
 from datetime import date
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from bisar_budget import units
-from bisar_budget.constants import GATING_MODELS, SPEED_OF_LIGHT
-from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, changes_words, shown, upwards
+from bisar_budget.arrays import PerCase
+from bisar_budget.constants import GATING_MODELS, SPEED_OF_LIGHT_MPS
+from bisar_budget.faults import Changed, KeyPath, ParserEvent, Place, Problem, SetValue, changes_words, shown, upwards
 from bisar_budget.geometry import BistaticGeometry, PlatformState
+from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization, TakenFigure
 from bisar_budget.mission.platforms import INSTANT, CommonMotionError, Platforms, without_image
 from bisar_budget.mission.propagation import PROPAGATION, Propagation, too_low
@@ -16,11 +18,11 @@ from bisar_budget.mission.readers import (
     COORDINATE,
     DIRECTION,
     DURATION,
-    FREQUENCY,
     HEIGHT,
     LATITUDE,
     PHASE,
     PHASE_REQUIREMENT,
+    RADAR_FREQUENCY,
     RANGE,
     SHARE,
     SIDELOBE_REQUIREMENT,
@@ -35,6 +37,7 @@ from bisar_budget.mission.readers import (
     Reader,
     Reference,
     Section,
+    SectionValues,
     SizeMap,
     Text,
     TextMap,
@@ -64,11 +67,11 @@ class Document(NamedTuple):
 class Radar(NamedTuple):
     """The waveform."""
 
-    center_frequency: Annotated[float, Key(FREQUENCY, "Centre of the band; every phase uses it.")]
-    bandwidth: Annotated[float, Key(FREQUENCY, "Width of the band, for the resolution.")]
+    center_frequency: Annotated[float, Key(RADAR_FREQUENCY, "Centre of the band; every phase uses it.")]
+    bandwidth: Annotated[float, Key(RADAR_FREQUENCY, "Width of the band, for the resolution.")]
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require a band above 0 Hz."""
         if (
             values.keys() >= {"bandwidth", "center_frequency"}
@@ -79,7 +82,7 @@ class Radar(NamedTuple):
     @property
     def wavelength(self) -> float:
         """Wavelength at the centre frequency. [m]"""
-        return SPEED_OF_LIGHT / self.center_frequency
+        return SPEED_OF_LIGHT_MPS / self.center_frequency
 
 
 class Collection(NamedTuple):
@@ -107,7 +110,7 @@ class Scene(NamedTuple):
     ] = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require all three coordinates of the scene, or none."""
         if values.keys() >= set(PLACE_KEYS):
             missing = [key for key in PLACE_KEYS if values[key] is None]
@@ -146,7 +149,7 @@ class EarthOrientation(NamedTuple):
     ] = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require figures that go together, or a table."""
         figures = [key for key in values if key != "file" and values[key] is not None]
         if values.get("file") is not None:
@@ -192,7 +195,7 @@ class OtherError(NamedTuple):
         return OTHER_EFFECTS
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require at least one effect."""
         if values.keys() >= set(OTHER_EFFECTS) and all(values[effect] is None for effect in OTHER_EFFECTS):
             yield Problem("states no effect", f"accepted: any of {', '.join(OTHER_EFFECTS)}")
@@ -247,12 +250,12 @@ class Requirements(NamedTuple):
     ] = ()
 
 
-def least_age(averaging: Any, aperture_time: Any) -> Any:
+def least_age(averaging: PerCase, aperture_time: PerCase) -> PerCase:
     """Least age of a clock setting whose averaging does not overlap with the aperture. [s]"""
     return (averaging + aperture_time) / 2
 
 
-def _unset_clocks(values: Mapping[str, Any]) -> Iterator[Problem]:
+def _unset_clocks(values: SectionValues) -> Iterator[Problem]:
     """Problems of clocks that were set: too late, or with their errors stated twice."""
     sync, collection, timing = (values.get(key) for key in ("synchronization", "collection", "timing_error"))
     if sync is None or sync.is_direct_path:
@@ -282,12 +285,12 @@ def _unset_clocks(values: Mapping[str, Any]) -> Iterator[Problem]:
             )
 
 
-def least_bandwidth(aperture_time: Any) -> Any:
+def least_bandwidth(aperture_time: PerCase) -> PerCase:
     """Least bandwidth of an oscillator's noise, a cycle per aperture; with a smaller one no noise counts. [Hz]"""
     return 1 / aperture_time
 
 
-def _noise_cut_off(values: Mapping[str, Any]) -> Iterator[Problem]:
+def _noise_cut_off(values: SectionValues) -> Iterator[Problem]:
     """Problems of oscillators whose bandwidth excludes all noise of the aperture."""
     platforms, collection = values.get("platforms"), values.get("collection")
     if platforms is None or collection is None:
@@ -303,7 +306,7 @@ def _noise_cut_off(values: Mapping[str, Any]) -> Iterator[Problem]:
             )
 
 
-WHOLE = 1e-6  # largest difference of a sum of shares from 1
+SHARE_SUM_TOLERANCE_FRACTION = 1e-6  # largest difference of a sum of shares from 1
 
 
 class Shares(NamedTuple):
@@ -327,12 +330,12 @@ class Shares(NamedTuple):
         return of in ("mission", owner) or (owner == "clock" and of == "receiver" and self.clock is None)
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require shares that sum to 1."""
         if not values.keys() >= set(Shares._fields):
             return
         total = sum(values[name] or 0.0 for name in Shares._fields)
-        if abs(total - 1) > WHOLE:
+        if abs(total - 1) > SHARE_SUM_TOLERANCE_FRACTION:
             yield Problem(f"shares must sum to 1, these sum to {total:.9g}")
 
 
@@ -352,7 +355,7 @@ class MetricSplits(NamedTuple):
 METRIC_SPLITS = Section(MetricSplits)
 
 
-def _form_of_split(value: Any) -> Reader:
+def _form_of_split(value: object) -> Reader[str | Shares | MetricSplits]:
     """Reader of a split: a rule, shares, or splits by metric."""
     if not isinstance(value, dict):
         return RULE
@@ -499,7 +502,7 @@ class Mission(NamedTuple):
     simulation: Annotated[Simulation | None, Key(Section(Simulation))] = None
     waivers: Annotated[tuple[Waiver, ...], Key(ListOf(Waiver))] = ()
     file: str = ""
-    places: Mapping[KeyPath, Any] = {}
+    places: Mapping[KeyPath, ParserEvent] = {}
     data: bytes = b""
     changes: tuple[SetValue, ...] = ()
     parts: tuple[PartFile, ...] = ()
@@ -537,14 +540,14 @@ class Mission(NamedTuple):
         """Whether two missions differ; defined because a tuple has an answer of its own."""
         return not self == other
 
-    def replace(self, values: Mapping[str, Any]) -> "Mission":
+    def replace(self, values: Mapping[str, object]) -> "Mission":
         """A mission with some values changed; see `quantities.changed`."""
         from bisar_budget.mission.quantities import changed  # that module imports this one
 
         return changed(self, values)
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require a collection that forms an image, and distinct names."""
         platforms: Platforms | None = values.get("platforms")
         if platforms is not None and not any(platform.is_of_the_earth for platform in platforms):
@@ -605,7 +608,8 @@ def _at_a_glance(state: PlatformState) -> str:
     """Position and motion of a platform in a line."""
     speed = math.hypot(*state.velocity)
     moves = "stands still" if state.is_still else f"moves at {format_quantity(speed, 'm/s', 4)}"
-    return f"{format_quantity(state.slant_range, 'm', 4)} away, {math.degrees(state.elevation):.1f}° high, {moves}"
+    slant_range = format_quantity(float(state.slant_range), "m", 4)
+    return f"{slant_range} away, {math.degrees(state.elevation):.1f}° high, {moves}"
 
 
 def has_instruments(mission: Mission) -> bool:
@@ -652,7 +656,7 @@ def names_parts(mission: Mission) -> bool:
     )
 
 
-def names_files(root: Mapping[str, Any]) -> bool:
+def names_files(root: Mapping[str, object]) -> bool:
     """Whether the content of a file, mission or not, names a part, an orbit or a log."""
     platforms = root.get("platforms")
     sections = platforms.values() if isinstance(platforms, dict) else ()
@@ -669,9 +673,9 @@ MISSION = Section(Mission)
 DRAFT = "http://json-schema.org/draft-07/schema#"
 
 
-def mission_schema() -> dict[str, Any]:
+def mission_schema() -> JsonObject:
     """JSON Schema of a mission; quantities are text with a unit, which only the tool checks, or a bare number."""
-    definitions: dict[str, Any] = {}
+    definitions: Definitions = {}
     return {
         "$schema": DRAFT,
         "title": "bisar-budget mission file",

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from bisar_budget.faults import (
     Fault,
@@ -22,11 +22,12 @@ from bisar_budget.faults import (
     shown,
 )
 from bisar_budget.geometry import Vector
+from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.mission.instruments import (
-    FORMS,
     IMU_KINDS,
     NOT_SENSITIVE,
     OSCILLATOR,
+    OSCILLATOR_NOISE_FORMS,
     AccelerationSensitivity,
     AccelerometerBias,
     AccelerometerScaleFactor,
@@ -52,11 +53,14 @@ from bisar_budget.mission.readers import (
     INVALID,
     VELOCITY,
     Choice,
+    Invalid,
     Key,
     ListOf,
     Reference,
     Report,
     Section,
+    SectionValue,
+    SectionValues,
     Text,
     TextMap,
     Triple,
@@ -72,7 +76,7 @@ Find = Callable[[str], tuple[str, bytes]]  # name of a part to the path and the 
 
 MOTION_ERROR = Section(MotionError)
 _TEXT = Text()
-_NAME = Key(_TEXT, "Maker, type, and revision or mode; reports show it.")
+_PART_NAME_KEY = Key(_TEXT, "Maker, type, and revision or mode; reports show it.")
 _SAYS = Key(
     _TEXT, "Meaning of the figures in their source: which statistic, typical or largest, in which conditions."
 )
@@ -80,8 +84,8 @@ _SOURCE = either(dict, TextMap("figure"), _TEXT)
 _SOURCES = Key(_SOURCE, "Document, revision and table of every figure, or of each figure by its key.")
 _IN_ORBIT = Key(YesNo(), "Whether it serves a satellite. `allocate` offers a satellite only such parts of this kind.")
 _KIND = "Kind of the part; it determines the figures."
-_POSITION = "1 sigma east, north, up; a single value means each axis."
-_NOISE = "Position errors that change within an aperture: the residual noise."
+_POSITION_TEXT = "1 sigma east, north, up; a single value means each axis."
+_NOISE_TEXT = "Position errors that change within an aperture: the residual noise."
 _GNSS_KINDS = ("position", "velocity", "random")
 _SUFFIXES = (".yaml", ".yml")
 _MAX_FOLDER_FILES = 1000  # parts that are read of one folder
@@ -91,7 +95,7 @@ class ImuPart(NamedTuple):
     """An inertial sensor, 1 sigma; a single value means each axis."""
 
     kind: Annotated[str, Key(Choice("imu"), _KIND)]
-    name: Annotated[str, _NAME]
+    name: Annotated[str, _PART_NAME_KEY]
     source: Annotated[str | Mapping[str, str], _SOURCES]
     accelerometer_bias: AccelerometerBias = None
     accelerometer_scale_factor: AccelerometerScaleFactor = None
@@ -103,7 +107,7 @@ class ImuPart(NamedTuple):
     says: Annotated[str | None, _SAYS] = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require a figure that is not zero."""
         yield from _without_figure(values, IMU_KINDS)
 
@@ -112,16 +116,16 @@ class GnssPart(NamedTuple):
     """A GNSS receiver in one of its modes: errors of its position and velocity, 1 sigma, east, north, up."""
 
     kind: Annotated[str, Key(Choice("gnss"), _KIND)]
-    name: Annotated[str, _NAME]
+    name: Annotated[str, _PART_NAME_KEY]
     source: Annotated[str | Mapping[str, str], _SOURCES]
-    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), _POSITION)] = None
-    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), _POSITION)] = None
-    random: Annotated[tuple[GaussMarkov, ...], Key(ListOf(GaussMarkov), _NOISE)] = ()
+    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), _POSITION_TEXT)] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), _POSITION_TEXT)] = None
+    random: Annotated[tuple[GaussMarkov, ...], Key(ListOf(GaussMarkov), _NOISE_TEXT)] = ()
     in_orbit: Annotated[bool | None, _IN_ORBIT] = None
     says: Annotated[str | None, _SAYS] = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require a figure that is not zero, and check the noise as in a mission."""
         yield from MotionError.problems({"random": values.get("random", ())})
         yield from _without_figure(values, _GNSS_KINDS)
@@ -131,7 +135,7 @@ class OscillatorPart(NamedTuple):
     """An oscillator, with its noise in one of three forms."""
 
     kind: Annotated[str, Key(Choice("oscillator"), _KIND)]
-    name: Annotated[str, _NAME]
+    name: Annotated[str, _PART_NAME_KEY]
     source: Annotated[str | Mapping[str, str], _SOURCES]
     frequency: Frequency = None
     phase_noise: PhaseNoise = None
@@ -142,21 +146,21 @@ class OscillatorPart(NamedTuple):
     says: Annotated[str | None, _SAYS] = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Check the part as an oscillator of a mission, and require noise that is not zero."""
         yield from Oscillator.problems({**values, "sensor": None}, or_else="")
-        if any(values.get(form) is not None for form in FORMS):
-            yield from _without_figure(values, FORMS)
+        if any(values.get(form) is not None for form in OSCILLATOR_NOISE_FORMS):
+            yield from _without_figure(values, OSCILLATOR_NOISE_FORMS)
 
 
 Part = ImuPart | GnssPart | OscillatorPart
-SECTIONS: dict[str, Section] = {
+PART_SECTIONS: dict[str, Section[Part]] = {
     "imu": Section(ImuPart),
     "gnss": Section(GnssPart),
     "oscillator": Section(OscillatorPart),
 }
 BESIDE_NOISE = ("aging", "acceleration_sensitivity")  # figures of an oscillator in addition to a form of noise
-FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *FORMS, *BESIDE_NOISE)}
+FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *OSCILLATOR_NOISE_FORMS, *BESIDE_NOISE)}
 
 
 class PartError(Exception):
@@ -196,7 +200,7 @@ class Entry:
 
     file: str
     part: Part
-    written: Mapping[str, Any]
+    written: Mapping[str, object]
 
     @property
     def id(self) -> str:
@@ -218,10 +222,10 @@ def entries(places: Sequence[str]) -> Iterator[Entry]:
         One of the files is no part.
     """
     read = [_entry(file, _content(file, DISK)) for file in catalogue(places).values()]
-    yield from sorted(read, key=lambda entry: (list(SECTIONS).index(entry.part.kind), entry.id))
+    yield from sorted(read, key=lambda entry: (list(PART_SECTIONS).index(entry.part.kind), entry.id))
 
 
-def figure_text(value: Any) -> str:
+def figure_text(value: object) -> str:
     """A figure as the file of its part writes it, in one line."""
     if isinstance(value, dict):
         return ", ".join(f"{key}: {figure_text(item)}" for key, item in value.items())
@@ -282,56 +286,56 @@ def _standard_input() -> bytes:
 @lru_cache(maxsize=64)  # a thousand missions name the same parts
 def _entry(file: str, data: bytes) -> Entry:
     """Read a part; parts that were read before come from the cache."""
-    part: Any = INVALID
+    part: Part | Invalid = INVALID
     try:
         tree = read_tree(data, file, "part")
     except MissionError as error:
         raise PartError.of(file, error.faults) from None
     with suppress(UnusableError):
         part = _part_of(tree)
-    if tree.faults:
+    if tree.faults or part is INVALID:
         raise PartError.of(file, tree.in_order())
     return Entry(file, part, tree.root)
 
 
-def _part_of(tree: Tree) -> Any:
+def _part_of(tree: Tree) -> Part | Invalid:
     """The part of a file; `INVALID` after a report.
 
     A file without a valid kind is read as the kind with most of its figures, so that all faults are reported at once.
     """
     root = tree.root
     kind = root.get("kind")
-    if not (isinstance(kind, str) and kind in SECTIONS):
-        kind = max(SECTIONS, key=lambda name: len(root.keys() & set(FIGURES[name])))
+    if not (isinstance(kind, str) and kind in PART_SECTIONS):
+        kind = max(PART_SECTIONS, key=lambda name: len(root.keys() & set(FIGURES[name])))
         is_likely = not root.keys().isdisjoint(FIGURES[kind])
         if root.get("kind") is not INVALID:  # an invalid value was reported by the tree
             tree.report(("kind",), _no_kind(root, kind if is_likely else ""))
         if not is_likely:
             return INVALID
-    part = SECTIONS[kind].read({**root, "kind": kind}, (), tree.report)
+    part = PART_SECTIONS[kind].read({**root, "kind": kind}, (), tree.report)
     for problem in _without_source(root, FIGURES[kind]):
         tree.report((), problem)
     return part
 
 
-def _no_kind(root: Mapping[str, Any], likely: str) -> Problem:
+def _no_kind(root: Mapping[str, object], likely: str) -> Problem:
     """The problem with a missing or unknown kind; `likely` is the kind that the figures belong to, or empty."""
-    hint = did_you_mean(root.get("kind", ""), tuple(SECTIONS))
+    hint = did_you_mean(root.get("kind", ""), tuple(PART_SECTIONS))
     if likely:
         hint = f"Its figures are those of kind: {likely}"
     elif "platforms" in root:
         hint = "This seems to be a mission file, which `bisar-budget check` reads"
     missing = "" if "kind" in root else ", and is missing"
-    return Problem(f"must be one of {', '.join(SECTIONS)}{missing}", hint=hint)
+    return Problem(f"must be one of {', '.join(PART_SECTIONS)}{missing}", hint=hint)
 
 
-def _without_figure(values: Mapping[str, Any], figures: Sequence[str]) -> Iterator[Problem]:
+def _without_figure(values: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
     """A problem if all figures are missing or zero; none if `values` lacks a figure because it was reported."""
     if values.keys() >= set(figures) and not any(_is_not_zero(values[figure]) for figure in figures):
         yield Problem("states no figure", f"accepted: one of {', '.join(figures)} that is not zero")
 
 
-def _without_source(root: Mapping[str, Any], figures: Sequence[str]) -> Iterator[Problem]:
+def _without_source(root: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
     """A problem if sources are given by figure and a figure of the file, valid or not, has none."""
     source = root.get("source")
     if not isinstance(source, dict):
@@ -345,7 +349,7 @@ def _without_source(root: Mapping[str, Any], figures: Sequence[str]) -> Iterator
         )
 
 
-def _is_not_zero(figure: Any) -> bool:
+def _is_not_zero(figure: object) -> bool:
     """Whether a figure is stated and not zero: no sensor is without error."""
     if isinstance(figure, GaussMarkov):
         return _is_not_zero(figure.sigma)
@@ -435,7 +439,7 @@ def _file_of(name: str, beside: str, files: Files) -> str:
     raise PartError("is no part of the catalogue", hint=sentences("`bisar-budget sensors` lists them", near))
 
 
-def with_parts(mission: Mission, find: Find, report: Report) -> Any:
+def with_parts(mission: Mission, find: Find, report: Report) -> Mission | Invalid:
     """The mission with the figures of its parts; `INVALID` after a report. `find` raises `PartError`."""
     is_valid, taken = True, list[TakenFigure]()
     platforms = mission.platforms
@@ -452,7 +456,7 @@ def with_parts(mission: Mission, find: Find, report: Report) -> Any:
     return mission._replace(platforms=platforms, taken=tuple(taken)) if is_valid else INVALID
 
 
-def report_parts(root: Any, find: Find, report: Report) -> None:
+def report_parts(root: Mapping[str, object], find: Find, report: Report) -> None:
     """Report problems with the parts of a file that is no mission for other reasons.
 
     A valid section is checked together with its parts as in a mission. For an invalid section only the names of its
@@ -470,7 +474,7 @@ def report_parts(root: Any, find: Find, report: Report) -> None:
             _with_sensor(Oscillator(**oscillator), (*path, "oscillator"), find, report, [])
 
 
-def _stand_in(section: Section, value: Any) -> dict[str, Any]:
+def _stand_in(section: Section[object], value: object) -> SectionValues:
     """Values of a section if all of them are valid, else only the names of its parts."""
     values = section.each(value)
     if INVALID not in values.values():
@@ -480,7 +484,7 @@ def _stand_in(section: Section, value: Any) -> dict[str, Any]:
 
 def _parts_of(
     names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequence[str], find: Find, report: Report
-) -> Any:
+) -> dict[str, Entry] | Invalid:
     """Entries of parts by their names; `INVALID` after a report."""
     is_list = isinstance(names, tuple)
     entry_by_name: dict[str, Entry] = {}
@@ -506,7 +510,9 @@ def _parts_of(
     return entry_by_name if is_valid else INVALID
 
 
-def _with_sensors(error: MotionError, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]) -> Any:
+def _with_sensors(
+    error: MotionError, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]
+) -> MotionError | Invalid:
     """A motion error with figures of parts in place of missing figures; `INVALID` after a report.
 
     Figures taken from parts are appended to `taken`. A figure of the file overrides the same figure of a part, and
@@ -564,7 +570,9 @@ def _own_key(error: MotionError, stating: MotionError | Imu, figure: str) -> str
     return f"motion_error.imu.{figure}" if isinstance(stating, Imu) else f"motion_error.{figure}"
 
 
-def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]) -> Any:
+def _with_sensor(
+    oscillator: Oscillator, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]
+) -> Oscillator | Invalid:
     """An oscillator with the figures of its part; `INVALID` after a report.
 
     Figures taken from the part are appended to `taken`. A figure of the file overrides the same figure of the part,
@@ -578,10 +586,11 @@ def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Repo
     if entries is INVALID:
         return INVALID
     entry = entries[oscillator.sensor]
-    part, written, overridden, of_parts = entry.part, entry.figures, [], []
-    own_form = next((form for form in FORMS if getattr(oscillator, form) is not None), None)
-    (form,) = [form for form in FORMS if getattr(part, form) is not None]
-    figures: dict[str, Any] = {}
+    part: SectionValue = entry.part
+    written, overridden, of_parts = entry.figures, [], []
+    own_form = next((form for form in OSCILLATOR_NOISE_FORMS if getattr(oscillator, form) is not None), None)
+    (form,) = [form for form in OSCILLATOR_NOISE_FORMS if getattr(part, form) is not None]
+    figures: dict[str, SectionValue] = {}
     if own_form is None:
         figures = {form: getattr(part, form), "source": evidence(part, form)}
     else:
@@ -620,14 +629,14 @@ def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Repo
 
 
 # ---------------------------------------------------------------------- JSON Schema of a part
-_NOT_EMPTY: dict[str, Any] = {"not": {"const": []}}  # an empty list states no figure
+_NOT_EMPTY: JsonObject = {"not": {"const": []}}  # an empty list states no figure
 
 
-def part_schema() -> dict[str, Any]:
+def part_schema() -> JsonObject:
     """JSON Schema of the file of a part, with one alternative for each kind; quantities as in `mission_schema`."""
-    definitions: dict[str, Any] = {}
+    definitions: Definitions = {}
     kinds = []
-    for kind, section in SECTIONS.items():
+    for kind, section in PART_SECTIONS.items():
         kinds.append(section.schema(definitions))
         definitions[section.kind.__name__] |= _rules(FIGURES[kind])
     return {
@@ -642,7 +651,7 @@ def part_schema() -> dict[str, Any]:
     }
 
 
-def _rules(figures: Sequence[str]) -> dict[str, Any]:
+def _rules(figures: Sequence[str]) -> JsonObject:
     """Schema rules between the figures of a part: at least one is stated, and each has a source.
 
     An oscillator has exactly one form of noise, and a mask has its frequency. The rules do not see figures that are
@@ -658,6 +667,6 @@ def _rules(figures: Sequence[str]) -> dict[str, Any]:
         }
         for figure in figures
     ]
-    if set(FORMS) <= set(figures):
+    if set(OSCILLATOR_NOISE_FORMS) <= set(figures):
         return {"oneOf": alternatives, "dependencies": {"phase_noise": ["frequency"]}, "allOf": sourced}
     return {"anyOf": alternatives, "allOf": sourced}

@@ -3,16 +3,17 @@
 import hashlib
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from bisar_budget.arrays import Booleans
 from bisar_budget.faults import KeyPath, Problem, printable
 from bisar_budget.geometry import STRAIGHT, PlatformState, UndefinedFrameError
-from bisar_budget.mission.covariance import KINDS, Covariance
+from bisar_budget.mission.covariance import MOTION_KINDS, Covariance
 from bisar_budget.mission.instruments import Overridden
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import (
@@ -30,7 +31,7 @@ from bisar_budget.mission.platforms import (
     without_image,
 )
 from bisar_budget.mission.propagation import too_low
-from bisar_budget.mission.readers import INVALID, Report
+from bisar_budget.mission.readers import INVALID, Invalid, Report, SectionValues
 from bisar_budget.paths import earth
 from bisar_budget.paths.accuracy import (
     StatedAccuracy,
@@ -40,6 +41,7 @@ from bisar_budget.paths.accuracy import (
     correlations,
     covering_sigmas,
     diagonal,
+    with_rate,
 )
 from bisar_budget.paths.flight import (
     Fitted,
@@ -57,7 +59,8 @@ from bisar_budget.paths.flight import (
     track_around,
     widest_stretch,
 )
-from bisar_budget.paths.instant import DAY, Instant, later
+from bisar_budget.paths.free_fall import fall_of, of_scene
+from bisar_budget.paths.instant import DAY_S, Instant, later
 from bisar_budget.paths.log_places import LogKeys, filled_sigmas, hold_to_motion
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_earth_rotation
 from bisar_budget.paths.path_formats import ORBIT_FORMATS, hold_to_format, hold_to_log, read_log
@@ -71,9 +74,9 @@ Beside = Callable[[str], bytes]  # name of a file in a mission to the content of
 
 _FILE_KEYS = (*ORBIT_FORMATS, "file", "accuracy")  # keys of orbits and trajectories that name files
 _MAX_FILE_BYTES = 500_000_000
-_MAX_KEPT_LOGS = 2  # the logs of a mission that is read again and again, such as by `solve`
+_KEPT_LOG_COUNT = 2  # the logs of a mission that is read again and again, such as by `solve`
 _logs: dict[tuple[object, ...], Log] = {}  # by the hash of the file and the keys that decide how it is read
-_MAX_KEPT_PATHS = 256  # cases of a sweep have the same path where nothing that decides it changes
+_KEPT_PATH_COUNT = 256  # cases of a sweep have the same path where nothing that decides it changes
 _paths: dict[tuple[object, ...], FlownPath] = {}  # by all values that decide them
 _MAX_ORBIT_RADIUS_M = 4.1e8  # beyond the Moon
 _ROUNDED_CORRELATION_FRACTION = 1e-6  # a correlation this small is a rounding error of turned axes
@@ -119,14 +122,14 @@ def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
         yield "earth_orientation.file", mission.earth_orientation.file
 
 
-def report_files(root: Any, read: Beside, report: Report) -> None:
+def report_files(root: Mapping[str, object], read: Beside, report: Report) -> None:
     """Report orbits and logs that cannot be read, for a file that is no mission for other reasons.
 
     Their content is not checked here, because a path depends on the scene, time and aperture of a valid mission.
     `root` is the content of the mission file.
     """
     platforms, orientation = root.get("platforms"), root.get("earth_orientation")
-    files: dict[KeyPath, Any] = {}
+    files: dict[KeyPath, object] = {}
     for name in Platforms._fields:
         platform = platforms.get(name) if isinstance(platforms, dict) else None
         for key, section in (("orbit", ORBIT), ("trajectory", TRAJECTORY)):
@@ -141,7 +144,7 @@ def report_files(root: Any, read: Beside, report: Report) -> None:
                 report(path, _file_problem(file, error))
 
 
-def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
+def with_paths(mission: Mission, read: Beside, report: Report) -> Mission | Invalid:
     """The mission with the paths of its platforms; `INVALID` after a report. `read` may raise `PathFileError`."""
     axes, platforms, is_valid = mission.scene.axes, mission.platforms, True
     if (orientation_problem := _unusable_orientation(mission, read)) is not None:
@@ -200,6 +203,7 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
         raise _UnusablePathError((platform.way,), Problem(words))
     if axes is not None:
         path = path._replace(state=with_radial(path.state, axes))
+    path = path._replace(state=with_dynamics(path.state, axes, is_orbit=platform.orbit is not None))
     trajectory, error = platform.trajectory, platform.motion_error
     if trajectory is not None and trajectory.accuracy is not None:
         accuracy, digest = _by_accuracy(mission, trajectory, error, read)
@@ -229,6 +233,11 @@ def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
         return replace(state, radial=axes.radial(state.position, state.velocity))
     except ZeroDivisionError:  # at rest against the stars, on the Earth's axis: no plane
         return state
+
+
+def with_dynamics(state: PlatformState, axes: earth.SceneAxes | None, *, is_orbit: bool = False) -> PlatformState:
+    """The path with the dynamics of its errors if it is an orbit, or a path in free fall."""
+    return replace(state, fall=of_scene(axes) if is_orbit else fall_of(state, axes))
 
 
 class _OrbitFile(NamedTuple):
@@ -287,7 +296,7 @@ def orbits_of(mission: Mission, route: OrbitSource, read: Beside) -> Callable[[I
 
     @lru_cache(maxsize=64)
     def orientation(day: int) -> Orientation:
-        return _orientation(mission, Instant(day, DAY / 2), read)[0]
+        return _orientation(mission, Instant(day, DAY_S / 2), read)[0]
 
     return lambda center: orbit_file.orbit(center, orientation(center.day))
 
@@ -308,7 +317,7 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
             return path._replace(orientation=table) if orbit.is_turned else path
 
         key = (*orbit_file._replace(data=digest.encode()), center, axes, T, orientation, table)
-        path = _kept(_paths, _MAX_KEPT_PATHS, key, orbit_path)
+        path = _kept(_paths, _KEPT_PATH_COUNT, key, orbit_path)
     except PathFileError as error:
         source = getattr(route, _form_of(route))
         file = source if isinstance(source, str) else None
@@ -363,7 +372,7 @@ def _orbit_path(
     instants = [later(center, fraction * half) for fraction in (0.0, -0.5, 0.5, -1.0, 1.0)]
     orbit_doubts = max((orbit.doubts(instant) for instant in instants), key=len)
     doubt = max(orbit.doubt(instant) for instant in instants)
-    _hold_to_range(doubt, fitted.state.slant_range, orbit_doubts, orbit.remedy, name)
+    _hold_to_range(doubt, float(fitted.state.slant_range), orbit_doubts, orbit.remedy, name)
     age = None if orbit.epoch is None else center.since(orbit.epoch)
     doubts = (*orbit_doubts, *fitted.doubts)
     return _flown(fitted, orbit.words, file)._replace(
@@ -405,7 +414,7 @@ def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | N
         data = read(route.file)
         digest = hashlib.sha256(data).hexdigest()
         key = (route, digest, mission.collection.center_time, axes, aperture_time)
-        return _kept(_paths, _MAX_KEPT_PATHS, key, lambda: _log_path(mission, route, axes, data, digest))
+        return _kept(_paths, _KEPT_PATH_COUNT, key, lambda: _log_path(mission, route, axes, data, digest))
     except PathFileError as error:
         problem = _file_problem(None if error.key else route.file, error)
         raise _UnusablePathError(("trajectory", error.key or "file"), problem) from None
@@ -459,7 +468,7 @@ def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
         hold_to_log(data, route.file)
         return read_log(data, route.file, route.format, keys)
 
-    return _kept(_logs, _MAX_KEPT_LOGS, key, read_file)
+    return _kept(_logs, _KEPT_LOG_COUNT, key, read_file)
 
 
 def _by_accuracy(
@@ -490,7 +499,7 @@ def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]
     Along an axis of which the log states none, the largest of the others counts. The usual one counts for fixes of
     which the log does not state all sigmas.
     """
-    unstated: Any = np.ones(log.times[near].shape, dtype=bool)
+    unstated: Booleans = np.ones(log.times[near].shape, dtype=bool)
     if log.sigmas is not None:
         sigmas = np.nan_to_num(log.sigmas[near])
         largest = filled_sigmas(sigmas.max(axis=0))
@@ -520,7 +529,9 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
         return error
     covariance_of_source = diagonal([stated.total**2] * 3) if stated.covariance is None else stated.covariance
     along = block_turned(np.array(covariance_of_source), axes)
-    kinds = KINDS[: len(along) // 3]
+    if error.frame == "ric" and state.fall is not None and len(along) == 6:
+        along = with_rate(along, axes @ np.array(state.fall.rotation))  # velocities in `ric` are against the stars
+    kinds = MOTION_KINDS[: len(along) // 3]
     sigmas = np.sqrt(np.diag(along))
     is_complete = error.covariance is None and error.position is None and error.velocity is None
     if is_complete and len(kinds) == 2 and error.distribution == "normal" and _is_correlated(along):
@@ -539,7 +550,7 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
                 replaced = Overridden(kind, key, stated.words, f"[{', '.join(figure)}]")
                 error = error._replace(overridden=(*error.overridden, replaced))
         elif error.distribution == "normal":
-            figures: Any = {kind: covering_sigmas(block)}
+            figures: SectionValues = {kind: covering_sigmas(block)}
             error = error._replace(**figures, of_parts=(*error.of_parts, (kind, stated.words)))
     return error
 
@@ -566,7 +577,7 @@ def _of_position(platform: Platform, axes: earth.SceneAxes, aperture_time_s: flo
         return _flown(fitted, "geodetic position, flight along the geodesic")
 
     key = (position, heading, speed, climb, axes, aperture_time_s)
-    return _kept(_paths, _MAX_KEPT_PATHS, key, path)
+    return _kept(_paths, _KEPT_PATH_COUNT, key, path)
 
 
 def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | None = None) -> FlownPath:

@@ -2,15 +2,17 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
 from bisar_budget import units
+from bisar_budget.arrays import Booleans, Floats, PerCase
+from bisar_budget.constants import LEAST_FALLING_HEIGHT_M
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.geometry import (
-    STILL,
+    STILL_SPEED_MPS,
     STRAIGHT,
     BistaticGeometry,
     PlatformState,
@@ -20,6 +22,7 @@ from bisar_budget.geometry import (
     state_from_angles,
 )
 from bisar_budget.image_plane import degeneracy
+from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.mission.covariance import COVARIANCE, Covariance, misplaced_axes
 from bisar_budget.mission.instruments import (
     IMU,
@@ -33,27 +36,29 @@ from bisar_budget.mission.instruments import (
     Overridden,
 )
 from bisar_budget.mission.readers import (
-    ACCELERATION,
+    ACCELERATION_COMPONENT,
     COORDINATE,
     DIRECTION,
     DISTRIBUTION,
-    DISTRIBUTIONS,
+    DISTRIBUTION_TEXT,
     ELEVATION,
+    GROUND_SPEED,
     HEIGHT,
     INVALID,
-    JERK,
+    JERK_COMPONENT,
     LATITUDE,
     RANGE,
-    SNAP,
-    SPEED,
+    SNAP_COMPONENT,
     VELOCITY,
     Choice,
+    Invalid,
     Key,
     Quantity,
     Reader,
     Reference,
     Report,
     Section,
+    SectionValues,
     Source,
     Text,
     TextList,
@@ -65,25 +70,25 @@ from bisar_budget.mission.readers import (
 )
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.paths.accuracy import Matrix, PathNoise, StatedAccuracy
-from bisar_budget.paths.instant import SCALES, parse_instant
+from bisar_budget.paths.instant import SCALES, Instant, parse_instant
 
 if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
 
-LEAST_BASELINE = 1.0  # between platforms with a direct path [m]
+MIN_BASELINE_M = 1.0  # between platforms with a direct path
 # Largest relative motion in half an aperture over the least baseline; up to it a fit through 16 nodes is accurate.
-FARTHEST_BY = 3
+MAX_TRAVEL_RATIO = 3
 
 _LEVEL_FRACTION = 1e-3  # of the speed; a smaller speed over the ground has no direction
 # In halves of the aperture time. Between neighbours, a 32nd apart, a distance is hardly smaller than at them.
-_APERTURE_TIMES = np.linspace(-1, 1, 65)[:, None]
+_FINE_APERTURE_TIMES = np.linspace(-1, 1, 65)[:, None]
 
 FRAMES = Choice("scene", "track", "look", "ric")
 TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)
 # Copies of `paths.path_formats`, whose import would load all readers in every check.
 SMOOTHED, RAW = "smoothed", "raw"  # path that a processor flies with a log
-_LOG_FORMATS = ("csv", "sbet", "pos", "nmea", "gpx", "ulog")
-PARTS = either(list, TextList(), Reference())
+_LOG_FORMAT_NAMES = ("csv", "sbet", "pos", "nmea", "gpx", "ulog")
+PART_REFERENCES = either(list, TextList(), Reference())
 
 
 class MotionError(NamedTuple):
@@ -103,7 +108,9 @@ class MotionError(NamedTuple):
     ] = "scene"
     position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
     velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
-    acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
+    acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION_COMPONENT, or_scalar=True), "Constant part.")] = (
+        None
+    )
     covariance: Annotated[
         Covariance | None,
         Key(
@@ -112,11 +119,14 @@ class MotionError(NamedTuple):
             "correlations.",
         ),
     ] = None
-    distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTIONS)] = "normal"
+    distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTION_TEXT)] = "normal"
     vibration: Annotated[Vibration, Key(Section(Vibration))] = Vibration()
     sensor: Annotated[
         str | tuple[str, ...] | None,
-        Key(PARTS, "Parts of the catalogue (`bisar-budget sensors`), or files; keys of this file override theirs."),
+        Key(
+            PART_REFERENCES,
+            "Parts of the catalogue (`bisar-budget sensors`), or files; keys of this file override theirs.",
+        ),
     ] = None
     imu: Annotated[Imu | None, Key(IMU, "Figures of the inertial sensor.")] = None
     random: Annotated[
@@ -135,7 +145,7 @@ class MotionError(NamedTuple):
     overridden: tuple[Overridden, ...] = ()
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Check that a covariance is alone, fits its frame and is normal, and that names of errors are distinct."""
         yield from _names_twice(values.get("random", ()))
         covariance: Covariance | None = values.get("covariance")
@@ -190,8 +200,10 @@ class CommonMotionError(NamedTuple):
     ] = "scene"
     position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
     velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
-    acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
-    distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTIONS)] = "normal"
+    acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION_COMPONENT, or_scalar=True), "Constant part.")] = (
+        None
+    )
+    distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTION_TEXT)] = "normal"
     random: Annotated[
         tuple[GaussMarkov, ...],
         Key(RANDOM, "Position errors that change within the aperture, the same on both platforms."),
@@ -212,30 +224,30 @@ class CommonMotionError(NamedTuple):
         return bool(self.random) or any(figure is not None for figure in figures)
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Check that names of errors are distinct."""
         yield from _names_twice(values.get("random", ()))
 
 
 # ---------------------------------------------------------------------- paths of platforms
-_FILE = Reference()
+_FILE_REFERENCE = Reference()
 _TALKER = "[A-Z]{2}"
 
 
-class _Lines(Reader):
+class _Lines(Reader[tuple[str, ...]]):
     """The two lines of an element set."""
 
     is_word = True
     accepted = "[line 1, line 2]"
 
-    def read(self, value: Any, path: tuple[Any, ...], report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> tuple[str, ...] | Invalid:
         """Read both lines."""
         if not isinstance(value, list) or len(value) != 2 or not all(isinstance(line, str) for line in value):
             report(path, Problem("must be the name of a file, or the two lines of an element set"))
             return INVALID
         return tuple(value)
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: array of two lines."""
         return {"type": "array", "items": Reference().schema(definitions), "minItems": 2, "maxItems": 2}
 
@@ -246,16 +258,20 @@ class OrbitSource(NamedTuple):
     tle: Annotated[
         str | tuple[str, str] | None,
         Key(
-            either(list, _Lines(), _FILE),
+            either(list, _Lines(), _FILE_REFERENCE),
             "File of two-line elements, or the two lines; SGP4.",
         ),
     ] = None
-    omm: Annotated[str | None, Key(_FILE, "Orbit mean-elements message, text, XML, JSON or CSV; SGP4.")] = None
+    omm: Annotated[str | None, Key(_FILE_REFERENCE, "Orbit mean-elements message, text, XML, JSON or CSV; SGP4.")] = (
+        None
+    )
     oem: Annotated[
-        str | None, Key(_FILE, "Orbit ephemeris message, text or XML; interpolated as the message states.")
+        str | None, Key(_FILE_REFERENCE, "Orbit ephemeris message, text or XML; interpolated as the message states.")
     ] = None
-    eof: Annotated[str | None, Key(_FILE, "Orbit file of a Sentinel, POEORB or RESORB; Hermite.")] = None
-    sp3: Annotated[str | None, Key(_FILE, "Orbits of GNSS or low satellites, SP3-c or SP3-d; object: G05.")] = None
+    eof: Annotated[str | None, Key(_FILE_REFERENCE, "Orbit file of a Sentinel, POEORB or RESORB; Hermite.")] = None
+    sp3: Annotated[
+        str | None, Key(_FILE_REFERENCE, "Orbits of GNSS or low satellites, SP3-c or SP3-d; object: G05.")
+    ] = None
     object: Annotated[str | None, Key(Reference(), "Name or catalogue number, where a file has several.")] = None
     planned: Annotated[
         bool | None,
@@ -268,7 +284,7 @@ class OrbitSource(NamedTuple):
         return tuple(key for key in OrbitSource._fields if key not in ("object", "planned"))
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require exactly one format."""
         formats = OrbitSource.any_of()
         stated = [key for key in formats if values.get(key) is not None]
@@ -277,13 +293,13 @@ class OrbitSource(NamedTuple):
             yield Problem(problem, f"accepted: one of {', '.join(formats)}")
 
 
-class _Instant(Reader):
+class _Instant(Reader[Instant]):
     """An instant of UTC."""
 
     is_word = True
     accepted = "2026-06-01T05:20:31.250Z and the like"
 
-    def leaf(self, value: Any) -> Any:
+    def leaf(self, value: object) -> Instant:
         """Read 2026-06-01T05:20:31.250Z, or with an offset from UTC."""
         instant = parse_instant(value) if isinstance(value, str) else None
         if instant is None:
@@ -293,7 +309,7 @@ class _Instant(Reader):
             raise InvalidValueError(problem, f"accepted: {self.accepted}", hint)
         return instant
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: date and time."""
         return date_schema(r"^\s*\d{4}-\d\d-\d\d[T ]")
 
@@ -303,13 +319,13 @@ class _Talker(Text):
 
     is_word = True
 
-    def leaf(self, value: Any) -> str:
+    def leaf(self, value: object) -> str:
         """Refuse a text that is no talker."""
         if not isinstance(value, str) or not re.fullmatch(_TALKER, value, re.ASCII):
             raise InvalidValueError("must be two capital letters", "accepted: GN, GP and the like")
         return value
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: two capital letters."""
         return {"type": "string", "pattern": f"^{_TALKER}$"}
 
@@ -317,10 +333,10 @@ class _Talker(Text):
 class TrajectorySource(NamedTuple):
     """A log of a flight."""
 
-    file: Annotated[str, Key(_FILE, "The log, by its path relative to the mission file.")]
+    file: Annotated[str, Key(_FILE_REFERENCE, "The log, by its path relative to the mission file.")]
     format: Annotated[
         str | None,
-        Key(Choice(*_LOG_FORMATS), "Omitted: detected from the content, or else from the ending of the name."),
+        Key(Choice(*_LOG_FORMAT_NAMES), "Omitted: detected from the content, or else from the ending of the name."),
     ] = None
     week: Annotated[int | None, Key(Whole(0, 9999), "GPS week in which an SBET begins, not rolled over.")] = None
     time_scale: Annotated[
@@ -342,7 +358,7 @@ class TrajectorySource(NamedTuple):
         ),
     ] = None
     accuracy: Annotated[
-        str | None, Key(_FILE, "SBET accuracy file (smrmsg): fills position and velocity of motion_error.")
+        str | None, Key(_FILE_REFERENCE, "SBET accuracy file (smrmsg): fills position and velocity of motion_error.")
     ] = None
     talker: Annotated[
         str | None,
@@ -390,13 +406,17 @@ class Way:
         return tuple(key for key in self.keys if key != "speed")
 
 
-_CURVES = ("acceleration", "jerk", "snap")
+_HIGHER_DERIVATIVES = ("acceleration", "jerk", "snap")
 WAYS = (
-    Way(("position", "velocity"), _CURVES),
+    Way(("position", "velocity"), _HIGHER_DERIVATIVES),
     Way(("orbit",)),
     Way(("trajectory",)),
     Way(("latitude", "longitude", "altitude", "speed", "heading"), ("climb",), "heading"),
-    Way(("slant_range", "azimuth", "elevation", "speed", "motion_azimuth"), ("climb", *_CURVES), "motion_azimuth"),
+    Way(
+        ("slant_range", "azimuth", "elevation", "speed", "motion_azimuth"),
+        ("climb", *_HIGHER_DERIVATIVES),
+        "motion_azimuth",
+    ),
 )
 _PATH_KEYS = tuple(dict.fromkeys(key for way in WAYS for key in (*way.keys, *way.optional)))
 ACCEPTED_WAYS = (
@@ -514,10 +534,10 @@ class Platform(NamedTuple):
     position: Annotated[Vector | None, Key(Triple(COORDINATE), "East, north, up of the scene centre.")] = None
     velocity: Annotated[Vector | None, Key(Triple(VELOCITY), "East, north, up.")] = None
     acceleration: Annotated[
-        Vector | None, Key(Triple(ACCELERATION), "East, north, up, at the midpoint: a curved path.")
+        Vector | None, Key(Triple(ACCELERATION_COMPONENT), "East, north, up, at the midpoint: a curved path.")
     ] = None
-    jerk: Annotated[Vector | None, Key(Triple(JERK), "Rate of the acceleration, at the midpoint.")] = None
-    snap: Annotated[Vector | None, Key(Triple(SNAP), "Rate of the jerk.")] = None
+    jerk: Annotated[Vector | None, Key(Triple(JERK_COMPONENT), "Rate of the acceleration, at the midpoint.")] = None
+    snap: Annotated[Vector | None, Key(Triple(SNAP_COMPONENT), "Rate of the jerk.")] = None
     orbit: Annotated[OrbitSource | None, Key(ORBIT, "A satellite, by its orbit.")] = None
     trajectory: Annotated[TrajectorySource | None, Key(TRAJECTORY, "A log of a flight.")] = None
     latitude: Annotated[float | None, Key(LATITUDE, "Geodetic, WGS-84.")] = None
@@ -527,7 +547,7 @@ class Platform(NamedTuple):
     slant_range: Annotated[float | None, Key(RANGE, "Distance to the scene centre.")] = None
     azimuth: Annotated[float | None, Key(DIRECTION, "From east, counter-clockwise.")] = None
     elevation: Annotated[float | None, Key(ELEVATION, "Above the ground, seen from the scene centre.")] = None
-    speed: Annotated[float | None, Key(SPEED, "Over ground; 0 is a fixed platform.")] = None
+    speed: Annotated[float | None, Key(GROUND_SPEED, "Over ground; 0 is a fixed platform.")] = None
     motion_azimuth: Annotated[
         float | None, Key(DIRECTION, "Direction of motion, counted like azimuth (not a compass heading).")
     ] = None
@@ -537,7 +557,7 @@ class Platform(NamedTuple):
     path: FlownPath | None = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Require one complete geometry, above the ground and away from the scene centre."""
         wrong = [key for key in _PATH_KEYS if key not in values]  # stated with an invalid value
         given = [key for key in _PATH_KEYS if key in wrong or values[key] is not None]
@@ -585,10 +605,16 @@ class Platform(NamedTuple):
             return self.path.state
         acceleration, bends = self.acceleration or STRAIGHT, _bends(self.jerk, self.snap)
         if self.position is not None and self.velocity is not None:
-            return PlatformState(
+            state = PlatformState(
                 position=self.position, velocity=self.velocity, acceleration=acceleration, bends=bends
             )
-        return state_from_angles(
+            return _with_fall(state)
+        # A file without position and velocity has these.
+        assert self.slant_range is not None
+        assert self.azimuth is not None
+        assert self.elevation is not None
+        assert self.speed is not None
+        state = state_from_angles(
             slant_range=self.slant_range,
             azimuth=self.azimuth,
             elevation=self.elevation,
@@ -598,6 +624,16 @@ class Platform(NamedTuple):
             acceleration=acceleration,
             bends=bends,
         )
+        return _with_fall(state)
+
+
+def _with_fall(state: PlatformState) -> PlatformState:
+    """The path, with the dynamics of its errors if it is in free fall over a scene without a place on the Earth."""
+    if not np.any(np.asarray(state.position[2]) > LEAST_FALLING_HEIGHT_M):
+        return state
+    from bisar_budget.paths.free_fall import fall_of  # takes 8 ms; most missions have no satellite
+
+    return replace(state, fall=fall_of(state, None))
 
 
 def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: bool) -> Problem | None:
@@ -659,7 +695,7 @@ def without_image(
 
 def _no_image(geometry: BistaticGeometry, radar: "Radar | None", aperture_time_s: float | None) -> Iterator[Problem]:
     """Problem of a geometry that forms no image."""
-    if all(norm(platform.velocity) < STILL for platform in geometry.both):
+    if all(norm(platform.velocity) < STILL_SPEED_MPS for platform in geometry.both):
         yield Problem("both platforms are still: no aperture", at=("platforms",))
     elif radar and aperture_time_s and (reason := degeneracy(geometry, radar, aperture_time_s)):
         yield Problem(reason, at=("platforms",))
@@ -676,12 +712,12 @@ def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
             yield Problem(f"of the {name}: {undefined}", "accepted: scene", at=("common_motion_error", "frame"))
 
 
-def has_body_axes(state: PlatformState, half: Any, margin: float = 1.0) -> Any:
+def has_body_axes(state: PlatformState, half: PerCase, margin: float = 1.0) -> Booleans:
     """Whether a velocity keeps a direction on the ground within apertures of half-length `half` (cases,) [s].
 
     True for a platform that does not move, whose direction does not matter.
     """
-    times = half * _APERTURE_TIMES
+    times = half * _FINE_APERTURE_TIMES
     u, v, w = (np.broadcast_to(component, times.shape) for component in state.at(times)[1])
     fastest = np.sqrt(u * u + v * v + w * w).max(axis=0)
     is_level = np.hypot(u, v).min(axis=0) > margin * _LEVEL_FRACTION * fastest
@@ -720,19 +756,20 @@ def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: floa
             )
 
 
-def least_baseline(apart: PlatformState, half: Any) -> Any:
+def least_baseline(apart: PlatformState, half: PerCase) -> Floats:
     """Least distance of the platforms over an aperture of half-length `half` [s]. [m]"""
-    return norm(apart.place(half * _APERTURE_TIMES)).min(axis=0)
+    least: Floats = np.asarray(norm(apart.place(half * _FINE_APERTURE_TIMES))).min(axis=0)
+    return least
 
 
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
     """Problem of platforms that come too near each other for a direct path."""
     least, travelled = float(least_baseline(apart, half)[0]), apart.travelled(half)
-    if least < max(LEAST_BASELINE, travelled / FARTHEST_BY):
+    if least < max(MIN_BASELINE_M, travelled / MAX_TRAVEL_RATIO):
         yield Problem(
             f"there is no direct path to follow: the platforms come within {least:.3g} m of each other, and move "
             f"{travelled:.3g} m against each other in half an aperture",
-            f"accepted: at least {LEAST_BASELINE:g} m and a {FARTHEST_BY}rd of that way, or linear",
+            f"accepted: at least {MIN_BASELINE_M:g} m and a {MAX_TRAVEL_RATIO}rd of that way, or linear",
             at=("synchronization", "method"),
         )
 
@@ -746,4 +783,4 @@ def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
     if not state.is_quadratic:
         yield from (half * step / 32 for step in range(-31, 32))
     elif state.acceleration[2] > 0:
-        yield max(-half, min(half, -state.velocity[2] / state.acceleration[2]))
+        yield max(-half, min(half, -float(state.velocity[2]) / float(state.acceleration[2])))

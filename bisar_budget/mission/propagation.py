@@ -1,26 +1,27 @@
 """Delays in the air that remain after correction, on the leg of each platform. Values are SI, 1 sigma."""
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from bisar_budget import units
-from bisar_budget.constants import EARTH_RADIUS
+from bisar_budget.arrays import Floats, PerCase
+from bisar_budget.constants import EARTH_RADIUS_M
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import PlatformState, Vectors
 from bisar_budget.mission.platforms import Platforms
-from bisar_budget.mission.readers import Key, Quantity, Section, Source
+from bisar_budget.mission.readers import Key, Quantity, Section, SectionValues, Source
 
 DELAYS = ("zenith_delay", "zenith_electron_content")
-_TIME = "correlation_time"
+_CORRELATION_TIME_KEY = "correlation_time"
 LEAST_ELEVATION_DEG = 3.0  # at a lower elevation, a delay does not follow from the delay at the zenith
-ABOVE_THE_AIR = 80e3  # height [m]; few free electrons are lower, and little air is higher
+AIR_TOP_M = 80e3  # few free electrons are lower, and little air is higher
 
 _ZENITH_DELAY = Quantity(units.LENGTH, ge=0, le=1e3)
-_ELECTRON_CONTENT = Quantity(units.ELECTRON_CONTENT, ge=0, le=1e20)
+_CONTENT_QUANTITY = Quantity(units.ELECTRON_CONTENT, ge=0, le=1e20)
 _CORRELATION_TIME = Quantity(units.TIME, gt=0, ge=1e-6, le=1e9)  # as of any Gauss-Markov error
-_APERTURE_TIMES = np.linspace(-1.0, 1.0, 9)[:, None]  # in halves of the aperture time
+_COARSE_APERTURE_TIMES = np.linspace(-1.0, 1.0, 9)[:, None]  # in halves of the aperture time
 
 
 class LegDelay(NamedTuple):
@@ -28,7 +29,7 @@ class LegDelay(NamedTuple):
 
     zenith_delay: Annotated[float | None, Key(_ZENITH_DELAY, "Delay of the troposphere.")] = None
     zenith_electron_content: Annotated[
-        float | None, Key(_ELECTRON_CONTENT, "Electron content of the ionosphere; 1 TECU is 1e16/m².")
+        float | None, Key(_CONTENT_QUANTITY, "Electron content of the ionosphere; 1 TECU is 1e16/m².")
     ] = None
     correlation_time: Annotated[
         float | None,
@@ -37,17 +38,19 @@ class LegDelay(NamedTuple):
     source: Source = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Reject a leg without a delay."""
-        if not values.keys() >= {*DELAYS, _TIME} or any(values[delay] is not None for delay in DELAYS):
+        if not values.keys() >= {*DELAYS, _CORRELATION_TIME_KEY} or any(
+            values[delay] is not None for delay in DELAYS
+        ):
             return
-        if values[_TIME] is None:
+        if values[_CORRELATION_TIME_KEY] is None:
             yield Problem("states no delay", f"accepted: {' or '.join(DELAYS)}")
             return
         yield Problem(
-            f"states a {_TIME} and no delay of this leg that changes in it",
+            f"states a {_CORRELATION_TIME_KEY} and no delay of this leg that changes in it",
             f"accepted: {' or '.join(DELAYS)} of this leg beside it. One air over both legs changes in one time, "
-            f"propagation.{_TIME}",
+            f"propagation.{_CORRELATION_TIME_KEY}",
         )
 
 
@@ -62,7 +65,7 @@ class Propagation(NamedTuple):
     ] = None
     zenith_electron_content: Annotated[
         float | None,
-        Key(_ELECTRON_CONTENT, "Electron content of the ionosphere, of one air over both legs; 1 TECU is 1e16/m²."),
+        Key(_CONTENT_QUANTITY, "Electron content of the ionosphere, of one air over both legs; 1 TECU is 1e16/m²."),
     ] = None
     correlation_time: Annotated[
         float | None,
@@ -77,9 +80,9 @@ class Propagation(NamedTuple):
     source: Source = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Reject delays of both legs together with delays of one leg, no delay, and a time without a delay."""
-        if not values.keys() >= {*DELAYS, _TIME, *Platforms._fields}:
+        if not values.keys() >= {*DELAYS, _CORRELATION_TIME_KEY, *Platforms._fields}:
             return
         of_both = [delay for delay in DELAYS if values[delay] is not None]
         of_one = [name for name in Platforms._fields if values[name] is not None]
@@ -88,18 +91,20 @@ class Propagation(NamedTuple):
             yield Problem(f"mixes {of_both[0]} of both legs with {of_one[0]}", accepted, at=(of_one[0],))
         elif not (of_both or of_one):
             problem = (
-                "states no delay" if values[_TIME] is None else f"states a {_TIME} and no delay that changes in it"
+                "states no delay"
+                if values[_CORRELATION_TIME_KEY] is None
+                else f"states a {_CORRELATION_TIME_KEY} and no delay that changes in it"
             )
             yield Problem(problem, accepted)
         elif (
             not of_both
-            and values[_TIME] is not None
+            and values[_CORRELATION_TIME_KEY] is not None
             and all(values[name].correlation_time is not None for name in of_one)
         ):
             yield Problem(
                 "is of no leg: each that states a delay has its own",
-                f"accepted: {_TIME} here, or of each leg its own",
-                at=(_TIME,),
+                f"accepted: {_CORRELATION_TIME_KEY} here, or of each leg its own",
+                at=(_CORRELATION_TIME_KEY,),
                 is_of_key=True,
             )
 
@@ -108,7 +113,7 @@ class Propagation(NamedTuple):
         """Whether the delays are stated once, for the same air over both legs."""
         return self.transmitter is None and self.receiver is None
 
-    def content(self, platform: str) -> Any:
+    def content(self, platform: str) -> float | None:
         """Electron content at the zenith for the leg of a platform; None if the file states none. [1/m²]"""
         leg = self.leg(platform)
         return None if leg is None else leg.zenith_electron_content
@@ -136,27 +141,30 @@ class Propagation(NamedTuple):
 PROPAGATION = Section(Propagation)
 
 
-def height_of(position: Vectors) -> Any:
+def height_of(position: Vectors) -> PerCase:
     """Height of positions (…) above the sphere of the Earth's mean radius that touches the scene. [m]"""
     x, y, z = position
-    return np.sqrt(x * x + y * y + (z + EARTH_RADIUS) ** 2) - EARTH_RADIUS
+    distance: PerCase = np.sqrt(x * x + y * y + (z + EARTH_RADIUS_M) ** 2)
+    return distance - EARTH_RADIUS_M
 
 
-def elevation_deg(position: Vectors) -> Any:
+def elevation_deg(position: Vectors) -> Floats:
     """Elevation of positions (…) seen from the scene centre. [deg]"""
     x, y, z = position
-    return np.degrees(np.arctan2(z, np.hypot(x, y)))
+    elevation: Floats = np.degrees(np.arctan2(z, np.hypot(x, y)))
+    return elevation
 
 
-def least_elevation_deg(path: PlatformState, aperture_time_s: Any) -> Any:
+def least_elevation_deg(path: PlatformState, aperture_time_s: PerCase) -> Floats:
     """Least elevation of a platform over the aperture, seen from the scene centre. [deg]"""
     half = np.asarray(aperture_time_s, dtype=float) / 2
-    return elevation_deg(path.place(_APERTURE_TIMES * half)).min(axis=0)
+    least: Floats = elevation_deg(path.place(_COARSE_APERTURE_TIMES * half)).min(axis=0)
+    return least
 
 
 def least_elevations(
-    propagation: Propagation, paths: Mapping[str, PlatformState], aperture_time_s: Any
-) -> Iterator[tuple[str, str, Any]]:
+    propagation: Propagation, paths: Mapping[str, PlatformState], aperture_time_s: PerCase
+) -> Iterator[tuple[str, str, Floats]]:
     """Platform, figure and least elevation over the aperture [deg], for each stated delay of a leg."""
     for name, path in paths.items():
         leg = propagation.leg(name)
@@ -166,7 +174,7 @@ def least_elevations(
         if leg.zenith_delay is not None:
             yield name, DELAYS[0], least
         if leg.zenith_electron_content is not None:
-            is_below = np.asarray(height_of(path.position)) < ABOVE_THE_AIR
+            is_below = np.asarray(height_of(path.position)) < AIR_TOP_M
             yield name, DELAYS[1], np.where(is_below, 90.0, least)  # the leg does not reach the ionosphere
 
 

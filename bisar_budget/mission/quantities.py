@@ -8,12 +8,15 @@ import math
 import numbers
 from collections.abc import Callable, Mapping, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 
 from bisar_budget import units
+from bisar_budget.arrays import PerCase
 from bisar_budget.faults import Fault, InvalidValueError, Problem, SetValue, fault_words, printable, shown
+from bisar_budget.geometry import Vector
+from bisar_budget.json_types import JsonObject
 from bisar_budget.mission.changes import (
     ACCEPTED_ERRORS,
     apply_changes,
@@ -22,7 +25,7 @@ from bisar_budget.mission.changes import (
     next_name,
     parts_of,
 )
-from bisar_budget.mission.covariance import KINDS, Covariance, error_index
+from bisar_budget.mission.covariance import MOTION_KINDS, Covariance, error_index
 from bisar_budget.mission.instruments import IMU_KINDS, POWERS, Imu, LeverArm
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import MISSION, Mission, Simulation
@@ -37,15 +40,18 @@ from bisar_budget.mission.readers import (
     Quantity,
     Reader,
     Section,
+    SectionValue,
     TextList,
     Triple,
 )
-from bisar_budget.mission.tree import Tree, read_tree
+from bisar_budget.mission.tree import Content, Tree, read_tree
 from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.units import Dimension, parse_quantity
 
-DIGITS = 8  # of values in answers: both sides of a crossing stay within 1e-6
+ANSWER_DIGITS = 8  # of values in answers: both sides of a crossing stay within 1e-6
 _DECADE_RATIO = 10.0
+Measured = Any
+"""A quantity of astropy or pint, which need not be installed, or its magnitude: a number or an array."""
 FACTOR = Quantity(units.RATIO, gt=0, ge=1e-12, le=1e12)
 
 
@@ -95,13 +101,13 @@ class Number(NamedTuple):
         return self.dimension.scales.get(self.unit) or (1.0, 1.0)
 
     def text(self, value: float, *, is_up: bool | None = None) -> str:
-        """Text of a value in the number's unit with `DIGITS` digits, rounded up, down, or (None) to the nearest."""
+        """Value in the number's unit with `ANSWER_DIGITS` digits, rounded up, down, or (None) to the nearest."""
         factor, divisor = self.scale
         number = value / factor * divisor
         if is_up is not None:
-            context = Context(prec=DIGITS, rounding=ROUND_CEILING if is_up else ROUND_FLOOR)
+            context = Context(prec=ANSWER_DIGITS, rounding=ROUND_CEILING if is_up else ROUND_FLOOR)
             number = float(context.create_decimal(repr(number)))
-        return f"{number:.{DIGITS}g}{' ' if self.unit else ''}{self.unit}"
+        return f"{number:.{ANSWER_DIGITS}g}{' ' if self.unit else ''}{self.unit}"
 
     def said_like(self, between: str | None) -> "Number":
         """The number in the unit of a range's upper end, if the file has no value whose unit could be used."""
@@ -121,7 +127,7 @@ class Choices(NamedTuple):
     """
 
     key: str
-    reader: Reader
+    reader: Reader[object]
     value: str | None
     unit: str = ""
     scale: tuple[float, float] = (1.0, 1.0)
@@ -130,15 +136,15 @@ class Choices(NamedTuple):
 Varied = Number | Choices
 
 
-def tree_of(mission: Mission) -> dict[str, Any]:
+def tree_of(mission: Mission) -> JsonObject:
     """Content of a mission's file, changed by the mission's options: texts, lists and mappings."""
     tree = read_tree(mission.data or b"", mission.file)
     apply_changes(tree, mission.changes)
-    root: dict[str, Any] = tree.root
+    root: JsonObject = tree.root
     return root
 
 
-def number_of(tree: dict[str, Any], key: str, of_all: str = "", *, is_for_each: bool = False) -> Number:
+def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool = False) -> Number:
     """The number that a key names; a scalar that holds for each of three axes counts as a number.
 
     Parameters
@@ -176,7 +182,7 @@ def number_of(tree: dict[str, Any], key: str, of_all: str = "", *, is_for_each: 
     return as_number(key, reader, value)
 
 
-def choices_of(tree: dict[str, Any], key: str, text: str) -> Choices | None:
+def choices_of(tree: JsonObject, key: str, text: str) -> Choices | None:
     """The key if a word can be its value; None for a key with a number, or with anything else.
 
     `text` is the new value: for shares of a budget the rule, for parts a list. Raises `QuestionError` if the key does
@@ -195,7 +201,7 @@ def choices_of(tree: dict[str, Any], key: str, text: str) -> Choices | None:
     return Choices(key, reader, value if isinstance(value, str) else None)
 
 
-def as_number(key: str, reader: Quantity, value: Any) -> Number:
+def as_number(key: str, reader: Quantity, value: object) -> Number:
     """A number with the unit of its texts; `value` is the file's value, None if it has none."""
     dimension = reader.dimension
     number = parse_quantity(value, dimension) if isinstance(value, str) else value if type(value) is float else None
@@ -206,15 +212,15 @@ def as_number(key: str, reader: Quantity, value: Any) -> Number:
     return Number(key, reader, number, unit if unit in dimension.scales else "")
 
 
-def _reader_and_value(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
+def _reader_and_value(tree: JsonObject, key: str) -> tuple[Reader[object], Content]:
     """Reader of a key, which may be one of several forms, and the file's value, None if it has none."""
-    reader: Reader = MISSION
-    value: Any = tree
-    parts = parts_of(key)
-    while parts:
+    reader: Reader[object] = MISSION
+    value: Content = tree
+    steps = parts_of(key)
+    while steps:
         reader = form_of(reader, value)
-        name, remaining = next_name(value, parts)
-        child, parts = (parts[0], parts[1:]) if name is None else (str(name), remaining)
+        name, remaining = next_name(value, steps)
+        child, steps = (steps[0], steps[1:]) if name is None else (str(name), remaining)
         inner = reader.below(child)
         if inner is None and isinstance(value, str):
             raise QuestionError(f"{shown(key)}: the file has {shown(value)!r} there, which has no {shown(child)!r}")
@@ -234,7 +240,7 @@ def _reader_and_value(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
     return reader, value
 
 
-def form_of(reader: Reader, value: Any) -> Reader:
+def form_of(reader: Reader[object], value: object) -> Reader[object]:
     """The form of a reader that reads a value."""
     while isinstance(reader, OneOf):
         reader = reader.pick(value)
@@ -285,7 +291,7 @@ def range_of(number: Number, between: str | None) -> Range:
         low, high = (low * (1 + 1e-9) if low == gt else low), (high * (1 - 1e-9) if high == lt else high)
     else:
         option = f"--between {shown(between)}"
-        first, dots, last = (part.strip() for part in between.partition(".."))
+        first, dots, last = (end.strip() for end in between.partition(".."))
         if not dots:
             example = (1.0, 10.0) if number.value is None else (number.value / 2, number.value * 2)
             example_range = "..".join(map(number.text, example)).replace(" ", "")
@@ -308,7 +314,7 @@ def range_of(number: Number, between: str | None) -> Range:
 
 # ---------------------------------------------------------------- numbers of a mission
 # Sections that a file may omit, and keys whose scalar holds for each of three axes.
-_SECTIONS: Mapping[str, Callable[[], Any]] = {
+_OMITTED_SECTIONS: Mapping[str, Callable[[], object]] = {
     "imu": Imu,
     "lever_arm": LeverArm,
     "common_motion_error": CommonMotionError,
@@ -316,7 +322,7 @@ _SECTIONS: Mapping[str, Callable[[], Any]] = {
 }
 _TRIPLES = ("position", "velocity", "acceleration", *IMU_KINDS, "uncertainty")
 # Curves of an oscillator, with the dimension of their abscissas, which name the points.
-_CURVES: Mapping[str, Dimension] = {
+_CURVE_ABSCISSAS: Mapping[str, Dimension] = {
     "phase_noise": units.FREQUENCY,
     "spurs": units.FREQUENCY,
     "allan_deviation": units.TIME,
@@ -324,46 +330,46 @@ _CURVES: Mapping[str, Dimension] = {
 }
 
 
-def with_number(mission: Mission, key: str, number: Any) -> Mission:
+def with_number(mission: Mission, key: str, number: SectionValue) -> Mission:
     """The mission with a number, or an array over cases, as the value of a key."""
     changed_mission: Mission = _with_value(mission, parts_of(key), number)
     return changed_mission
 
 
-def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
+def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue) -> SectionValue:
     """A value with a number at a path below it; at a triple the number goes into all three axes."""
-    if not parts:
+    if not steps:
         return (number, number, number) if isinstance(value, tuple) else number
     if isinstance(value, Covariance):
-        return _with_element(value, parts, number)
-    name, *remaining = parts
+        return _with_element(value, steps, number)
+    name, *remaining = steps
     if name.isdigit():
         index = int(name)
         return (*value[:index], _with_value(value[index], remaining, number), *value[index + 1 :])
-    if name in _CURVES:
+    if name in _CURVE_ABSCISSAS:
         return value._replace(**{name: _with_point(getattr(value, name), name, ".".join(remaining), number)})
     name = POWERS.get(name, name)
     below = getattr(value, name)
     if below is None and remaining:
-        below = _SECTIONS[name]()
+        below = _OMITTED_SECTIONS[name]()
     if below is None and name in _TRIPLES:
         below = ()
     return value._replace(**{name: _with_value(below, remaining, number)})
 
 
-def _with_point(curve: Any, name: str, point: str, number: Any) -> Any:
+def _with_point(curve: SectionValue, name: str, point: str, number: SectionValue) -> SectionValue:
     """A curve with another ordinate at the point that a text names."""
     if isinstance(curve, Spectrum):
         return curve._replace(points=_with_point(curve.points, name, point, number))
-    here = parse_quantity(point, _CURVES[name])
+    here = parse_quantity(point, _CURVE_ABSCISSAS[name])
     return tuple((at, number if at == here else ordinate) for at, ordinate in curve)
 
 
-def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> Covariance:
+def _with_element(covariance: Covariance, steps: Sequence[str], number: SectionValue) -> Covariance:
     """A covariance with another sigma of one axis or of all axes, or with another correlation of a pair."""
-    kind, *remaining = parts
-    if kind in KINDS:
-        first = 3 * KINDS.index(kind)
+    kind, *remaining = steps
+    if kind in MOTION_KINDS:
+        first = 3 * MOTION_KINDS.index(kind)
         changed_indices = [first + int(axis) for axis in remaining] or range(first, first + 3)
         sigmas = tuple(number if index in changed_indices else sigma for index, sigma in enumerate(covariance.sigmas))
         return covariance._replace(sigmas=sigmas)
@@ -375,7 +381,7 @@ def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> 
     return covariance._replace(correlation=tuple(rows))
 
 
-def value_at(mission: Mission, key: str) -> Any:
+def value_at(mission: Mission, key: str) -> SectionValue:
     """The value of a key in a mission, in SI: a number, a tuple of three numbers, or None.
 
     The value of a covariance is the sigma. A figure that comes from a part is the part's figure.
@@ -383,33 +389,33 @@ def value_at(mission: Mission, key: str) -> Any:
     return _value_below(mission, parts_of(key))
 
 
-def _value_below(value: Any, parts: Sequence[str]) -> Any:
+def _value_below(value: SectionValue, steps: Sequence[str]) -> SectionValue:
     """The value at a path below a value; None if there is none."""
-    if not parts or value is None:
+    if not steps or value is None:
         return value
     if isinstance(value, Covariance):
-        return _element(value, parts)
-    name, *remaining = parts
+        return _element(value, steps)
+    name, *remaining = steps
     if name.isdigit():
         return _value_below(value[int(name)], remaining) if int(name) < len(value) else None
-    if name in _CURVES:
+    if name in _CURVE_ABSCISSAS:
         return _point(getattr(value, name), name, ".".join(remaining))
     if isinstance(value, MotionError) and name in ("position", "velocity", "acceleration"):
         return _value_below(value.stated(name), remaining)
     return _value_below(getattr(value, POWERS.get(name, name)), remaining)
 
 
-def _point(curve: Any, name: str, point: str) -> Any:
+def _point(curve: SectionValue, name: str, point: str) -> PerCase | None:
     """Ordinate of a curve at the point that a text names; None if the curve has no such point."""
     points = curve.points if isinstance(curve, Spectrum) else curve or ()
-    here = parse_quantity(point, _CURVES[name])
+    here = parse_quantity(point, _CURVE_ABSCISSAS[name])
     return next((ordinate for at, ordinate in points if at == here), None)
 
 
-def _element(covariance: Covariance, parts: Sequence[str]) -> Any:
+def _element(covariance: Covariance, steps: Sequence[str]) -> float | Vector | None:
     """Sigma of an axis, or the three sigmas, of a covariance; None for a correlation."""
-    kind, *axis = parts
-    if kind not in KINDS:
+    kind, *axis = steps
+    if kind not in MOTION_KINDS:
         return None  # a correlation is no size
     return covariance.of(kind)[int(axis[0])] if axis else covariance.of(kind)
 
@@ -438,25 +444,28 @@ def with_specifications(mission: Mission, tree: Tree) -> Mission:
     return mission._replace(specifications=read)
 
 
-def largest_at(mission: Mission, number: Number) -> Any:
+def largest_at(mission: Mission, number: Number) -> PerCase | None:
     """The size that a mission states for an error, the largest of three axes; None if it states none.
 
     The level of a spectrum that states none is 0 dB.
     """
-    value = value_at(mission, number.key)
+    value: Vector | PerCase | None = value_at(mission, number.key)
     if value is None and parts_of(number.key)[-1] in ("level", "spectrum_level"):
         *section, _ = parts_of(number.key)
         owner = _value_below(mission, section)
         has_curve = owner is not None and (section[-1] == "oscillator" or owner.spectrum is not None)
         return 0.0 if has_curve else None
-    if number.is_level or value is None:
+    if value is None:
+        return None
+    if number.is_level and not isinstance(value, tuple):
         return value
     sizes = [np.abs(size) for size in (value if isinstance(value, tuple) else (value,))]
-    return functools.reduce(np.maximum, sizes)
+    largest: PerCase = functools.reduce(np.maximum, sizes)
+    return largest
 
 
 # ---------------------------------------------------------------- values that a caller gives
-def changed(mission: Mission, values: Mapping[str, Any]) -> Mission:
+def changed(mission: Mission, values: Mapping[str, object]) -> Mission:
     """A mission with values that replace values of the file or are added to them, as with `--set`.
 
     Parameters
@@ -477,7 +486,7 @@ def changed(mission: Mission, values: Mapping[str, Any]) -> Mission:
     return parse_mission(mission.data, mission.file, changes=(*mission.changes, *changes))
 
 
-def _si_of(tree: dict[str, Any], key: str) -> str:
+def _si_of(tree: JsonObject, key: str) -> str:
     """SI unit of a key's numbers; empty if the key has no number with a unit."""
     for number_key in (key, f"{key}.0"):
         try:
@@ -487,7 +496,7 @@ def _si_of(tree: dict[str, Any], key: str) -> str:
     return ""
 
 
-def text_of(si: str, value: Any) -> str:
+def text_of(si: str, value: object) -> str:
     """Text in a mission file for a text, number, quantity, list of them, or None; numbers are in the SI unit.
 
     Raises
@@ -514,19 +523,19 @@ def text_of(si: str, value: Any) -> str:
 
 
 # Quantities of other packages are recognised by their attributes, so that no such package has to be installed.
-def is_quantity(value: Any) -> bool:
+def is_quantity(value: object) -> TypeGuard[Measured]:
     """Whether a value is a quantity of astropy, which has `to_value`, or of pint, which has a magnitude."""
     return hasattr(value, "to_value") or (hasattr(value, "magnitude") and hasattr(value, "units"))
 
 
-def magnitude(value: Any, unit: str) -> Any:
+def magnitude(value: Measured, unit: str) -> Measured:
     """The number or array of a quantity in a unit."""
     if hasattr(value, "to_value"):
         return value.to_value(unit)
     return value.to(unit.replace("^", "**") or "dimensionless").magnitude
 
 
-def _unit_of(value: Any) -> str:
+def _unit_of(value: Measured) -> str:
     """The unit of a quantity, as a mission file writes it."""
     unit = str(value.unit) if hasattr(value, "to_value") else f"{value.units:~}"
     return unit.replace("**", "^").replace(" ", "")

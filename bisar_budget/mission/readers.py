@@ -8,25 +8,47 @@ library would do, in a fifth of the import time: `check` starts in every commit 
 
 import math
 import re
-from collections.abc import Callable, Sized
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Callable, Mapping, Sized
+from enum import Enum
+from typing import TYPE_CHECKING, Annotated, Any, Final, Generic, NamedTuple, TypeGuard, TypeVar
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
+from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.resources import docstring
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
+if TYPE_CHECKING:
+    from datetime import date
+
 MISSING = "is missing"  # problem of a required key
-INVALID: Any = object()  # replaces a value that was reported
+
+
+class Invalid(Enum):
+    """Type of `INVALID`."""
+
+    INVALID = "invalid"
+
+
+INVALID: Final = Invalid.INVALID  # replaces a value that was reported
 Report = Callable[[KeyPath, Problem], None]
+SectionValue = Any
+"""A valid value of a section, or a section: the type is the one that a section annotates the key with."""
+SectionValues = Mapping[str, SectionValue]
+T = TypeVar("T")
+K = TypeVar("K")
+T_co = TypeVar("T_co", covariant=True)
+SizedT = TypeVar("SizedT", bound=Sized)
+Form = TypeVar("Form")
+OtherForm = TypeVar("OtherForm")
 
 _POINT = "A decimal is written with a point, a comma separates"
 _MAX_TEXT_CHARACTERS = 500
-_MAX_ENTRIES = 1000  # of a list of sections
+_MAX_ENTRY_COUNT = 1000  # of a list of sections
 _MAX_POINTS = 100  # of a curve
-_MAX_NAMES = 8  # of a list of names; a platform has no more parts
-_MAX_IDS = 4000  # of a mapping by row ids; the longest lists make fewer rows
-_MAX_WILDCARDS = 20  # of a pattern; an id has four parts, and fifty wildcards take a second
+_MAX_NAME_COUNT = 8  # of a list of names; a platform has no more parts
+_MAX_ID_COUNT = 4000  # of a mapping by row ids; the longest lists make fewer rows
+_MAX_WILDCARD_COUNT = 20  # of a pattern; an id has four parts, and fifty wildcards take a second
 # Controls, line separators, lone surrogates, byte order mark, and the marks that turn the reading direction.
 _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\u202a-\u202e\u2066-\u2069]")
 
@@ -34,17 +56,17 @@ _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\u2
 _NOT_SINGLE = {"type": ["array", "object", "null"]}  # JSON Schema: lists, mappings and null are no single values
 
 
-def date_schema(pattern: str) -> dict[str, Any]:
+def date_schema(pattern: str) -> JsonObject:
     """JSON Schema of a date or an instant: a text, or a type of dates that YAML readers have and JSON has not."""
     return {"not": {"type": ["array", "object", "null", "boolean", "number"]}, "pattern": pattern}
 
 
-class Reader:
+class Reader(Generic[T_co]):
     """Reads one kind of value; `is_word` for words and whole numbers, several of which a sweep can compare."""
 
     is_word = False
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> T_co | Invalid:
         """Return the value, or `INVALID` after a report. `leaf` raises the problem as `InvalidValueError`."""
         try:
             return self.leaf(value)
@@ -52,15 +74,15 @@ class Reader:
             report(path, error.problem)
             return INVALID
 
-    def leaf(self, value: Any) -> Any:
+    def leaf(self, value: object) -> T_co:
         """Return the value; raises `InvalidValueError`."""
         raise NotImplementedError
 
-    def below(self, part: str) -> "Reader | None":
+    def below(self, step: str) -> "Reader[object] | None":
         """Reader of the value at a key or an index within this value; None if there is no such key or index."""
         return None
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema of accepted values; sections add their own schema to `definitions`."""
         raise NotImplementedError
 
@@ -68,11 +90,11 @@ class Reader:
 class Key(NamedTuple):
     """A key of a section: how its value is read and what it means."""
 
-    reader: Reader
+    reader: Reader[object]
     description: str = ""
 
 
-class Quantity(Reader):
+class Quantity(Reader[float]):
     """A number with a unit, within bounds; read as a float in SI. Decibels stay decibels.
 
     The outer bounds keep every later square and quotient finite; nothing real comes near them.
@@ -90,7 +112,7 @@ class Quantity(Reader):
         self.dimension = dimension
         self.bounds = (gt, ge, lt, le)
 
-    def leaf(self, value: Any) -> float:
+    def leaf(self, value: object) -> float:
         """Parse the text of a number, or take a float in SI, and check the bounds."""
         if type(value) is float and math.isfinite(value):
             number = value
@@ -114,11 +136,11 @@ class Quantity(Reader):
             bound_text = f"{math.degrees(bound):.6g} deg"
         raise InvalidValueError(f"must be {words} {bound_text}", hint=self._unit_hint(self._text(value)))
 
-    def _text(self, value: Any) -> Any:
+    def _text(self, value: object) -> object:
         """A float as a file would write it; other values unchanged."""
         return f"{value!r} {self.dimension.si}".rstrip() if type(value) is float else value
 
-    def _unit_hint(self, value: Any) -> str:
+    def _unit_hint(self, value: object) -> str:
         """Hint at the unit that a bare number may lack."""
         text = str(value).strip()
         if not text or not text[-1].isdigit():
@@ -129,20 +151,20 @@ class Quantity(Reader):
             return f"A bare number is a ratio: {text} is {100 * float(text):.6g} %"
         return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: text with a unit, or a bare number within the bounds; an angle without a unit is zero."""
         name = re.sub(r"\W", "", self.dimension.name.partition(" ")[2].title()) + "Quantity"
         if name not in definitions:
             definitions[name] = _quantity_schema(self.dimension)
-        accepted: dict[str, Any] = {"$ref": f"#/definitions/{name}"}
+        accepted: JsonObject = {"$ref": f"#/definitions/{name}"}
         words = ("exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
-        bounds: dict[str, Any] = {}
+        bounds: JsonObject = {}
         if not self.dimension.usual:
             bounds = {word: bound for word, bound in zip(words, self.bounds, strict=True) if math.isfinite(bound)}
         bounds |= self._sides_of_zero()
         return {"allOf": [accepted], **bounds} if bounds else accepted
 
-    def _sides_of_zero(self) -> dict[str, Any]:
+    def _sides_of_zero(self) -> JsonObject:
         """JSON Schema of the sign of a number in any unit, if the bounds exclude a sign or zero."""
         gt, ge, lt, le = self.bounds
         if self.dimension.offsets:  # a unit shifts the zero
@@ -162,7 +184,7 @@ _ZERO = r"[0.]+(?:[eE][+-]?\d+)?(?![\d.eE])"
 _UNIT_ALIASES = ("dps", "mdps", "dph", "micro-g", "milli-g")  # further spellings of units that are read
 
 
-def _quantity_schema(dimension: Dimension) -> dict[str, Any]:
+def _quantity_schema(dimension: Dimension) -> JsonObject:
     """JSON Schema of a kind of quantity: text that begins with a number and has no unit of another kind behind it."""
     number = r"[+-]?(?!0\d)(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
     all_units = {unit for dimension_of_unit in units.DIMENSIONS for unit in dimension_of_unit.units if unit}.union(
@@ -172,40 +194,42 @@ def _quantity_schema(dimension: Dimension) -> dict[str, Any]:
         unit for unit in all_units if dimension.scales.keys().isdisjoint((unit, units.normal_unit(unit)))
     )
     foreign_pattern = "|".join(re.sub(r"([\^$.*+?()|/])", r"\\\1", unit) for unit in foreign)
-    text: dict[str, Any] = {"type": "string", "pattern": rf"^\s*(?!{number}\s*(?:{foreign_pattern})\s*$){number}"}
+    text: JsonObject = {"type": "string", "pattern": rf"^\s*(?!{number}\s*(?:{foreign_pattern})\s*$){number}"}
     words = dimension.accepted.removeprefix("accepted: ")
     return {"description": words, "anyOf": [text, {"const": 0} if dimension.usual else {"type": "number"}]}
 
 
-class Triple(Reader):
+class Triple(Reader[tuple[float, ...]]):
     """Three components; with `or_scalar` a single value stands for each of them."""
 
     def __init__(self, component: Quantity, *, or_scalar: bool = False) -> None:
         self.component = component
         self.or_scalar = or_scalar
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> tuple[float, ...] | Invalid:
         """Read each component; a problem is reported at its own path."""
         bracketed = "" if isinstance(value, list) else self._bracketed(value)
         if self.or_scalar and not isinstance(value, list) and not bracketed:
             scalar = self.component.read(value, path, report)
             return scalar if scalar is INVALID else (scalar, scalar, scalar)
         if not isinstance(value, list) or len(value) != 3:
-            given = f", {len(value)} given" if isinstance(value, list) else ""
+            length_words = f", {len(value)} given" if isinstance(value, list) else ""
             hint = _POINT if isinstance(value, list) and len(value) > 3 else bracketed
-            report(path, Problem(f"must be three components{given}", "accepted: [a, b, c]", hint))
+            report(path, Problem(f"must be three components{length_words}", "accepted: [a, b, c]", hint))
             return INVALID
         components = tuple(
             [read_part(self.component, item, (*path, index), report) for index, item in enumerate(value)]
         )
-        return INVALID if INVALID in components else components
+        return components if are_valid(components) else INVALID
 
-    def _bracketed(self, value: Any) -> str:
+    def _bracketed(self, value: object) -> str:
         """Hint to put brackets around three values; empty if the value is not three values.
 
         Each of the three has a unit or is 0: `1,234,567 m` may be one number, and `1, 2, 3 km` are not three lengths.
         """
-        texts = value.strip(" ()").split(",") if isinstance(value, str) else ()
+        if not isinstance(value, str):
+            return ""
+        texts = value.strip(" ()").split(",")
         if len(texts) != 3 or not any(map(units.unit_behind, texts)):
             return ""
         try:
@@ -218,21 +242,21 @@ class Triple(Reader):
             return "Write brackets, and the unit of each" if value.count(", ") == 2 else ""
         return f"Did you mean [{', '.join(text.strip() for text in texts)}]?"
 
-    def below(self, part: str) -> Reader | None:
+    def below(self, step: str) -> Reader[object] | None:
         """Reader of one component."""
-        return self.component if is_place(part) else None
+        return self.component if is_index(step) else None
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: array of three, or also a single value."""
         single = self.component.schema(definitions)
         triple = {"type": "array", "items": single, "minItems": 3, "maxItems": 3}
         return {"anyOf": [single, triple]} if self.or_scalar else triple
 
 
-class Text(Reader):
+class Text(Reader[str]):
     """One line of printable text."""
 
-    def leaf(self, value: Any) -> str:
+    def leaf(self, value: object) -> str:
         """Refuse empty, long and unprintable texts: control characters could change a terminal or a report."""
         if not isinstance(value, str):
             raise InvalidValueError("must be text")
@@ -244,7 +268,7 @@ class Text(Reader):
             raise InvalidValueError("must be one line of printable text, without control characters")
         return value
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema of any single value: YAML readers make a number of 007, true of `yes`, a date of 2026-06-01."""
         pattern = r"^(?=.*\S)[^\u0000-\u001f\u007f-\u009f\u2028\u2029\ufeff\u202a-\u202e\u2066-\u2069]*$"
         words = {"description": "One line of text."}
@@ -263,15 +287,15 @@ class Reference(Text):
 class Glob(Text):
     """An id, or a pattern of ids with `*`, `?` and `[...]`."""
 
-    def leaf(self, value: Any) -> str:
-        """Refuse a pattern with more than `_MAX_WILDCARDS` wildcards, which takes long to match."""
+    def leaf(self, value: object) -> str:
+        """Refuse a pattern with more than `_MAX_WILDCARD_COUNT` wildcards, which takes long to match."""
         pattern = super().leaf(value)
-        if sum(map(pattern.count, "*?[")) > _MAX_WILDCARDS:
-            raise InvalidValueError(f"must have at most {_MAX_WILDCARDS} wildcards")
+        if sum(map(pattern.count, "*?[")) > _MAX_WILDCARD_COUNT:
+            raise InvalidValueError(f"must have at most {_MAX_WILDCARD_COUNT} wildcards")
         return pattern
 
 
-class Choice(Reader):
+class Choice(Reader[str]):
     """One of a few words; `accepted` lists words for messages, by default all."""
 
     is_word = True
@@ -279,14 +303,14 @@ class Choice(Reader):
     def __init__(self, *names: str, accepted: str = "") -> None:
         self.names, self.accepted = names, accepted or ", ".join(names)
 
-    def leaf(self, value: Any) -> str:
+    def leaf(self, value: object) -> str:
         """Refuse unknown words, with a hint at the nearest known word."""
         if isinstance(value, str) and value in self.names:
             return value
         near = did_you_mean(value, self.names)
         raise InvalidValueError("is not a known choice", f"accepted: {self.accepted}", near)
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: enumeration."""
         return {"enum": list(self.names)}
 
@@ -294,33 +318,33 @@ class Choice(Reader):
 _YES_NO = {word: word.lower() == "true" for word in ("true", "True", "TRUE", "false", "False", "FALSE")}
 
 
-class YesNo(Reader):
+class YesNo(Reader[bool]):
     """True or false."""
 
     is_word = True
     accepted = "true or false"
 
-    def leaf(self, value: Any) -> bool:
+    def leaf(self, value: object) -> bool:
         """Read true or false, in the spellings of YAML 1.2; options may have a boolean already."""
         boolean = value if isinstance(value, bool) else _YES_NO.get(value) if isinstance(value, str) else None
         if boolean is None:
             raise InvalidValueError("must be true or false", "accepted: true, false")
         return boolean
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: boolean, or its word."""
         return {"enum": [True, False, *_YES_NO]}
 
 
-class Words(Reader):
+class Words(Reader[tuple[str, ...]]):
     """A list of known words, each at most once."""
 
     def __init__(self, *names: str, accepted: str) -> None:
-        self.word: Reader = Choice(*names, accepted=accepted)
+        self.word: Reader[str] = Choice(*names, accepted=accepted)
         self.problem = Problem("must be a list", f"accepted: some of {accepted}")
         self.fewest, self.most = 0.0, math.inf
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> tuple[str, ...] | Invalid:
         """Read each word; a problem is reported at its own path."""
         if not isinstance(value, list) or not self.fewest <= len(value) <= self.most:
             report(path, self.problem)
@@ -330,33 +354,33 @@ class Words(Reader):
             if word is not INVALID and word in words[:index]:
                 report((*path, index), Problem("is in the list twice"))
                 return INVALID
-        return INVALID if INVALID in words else words
+        return words if are_valid(words) else INVALID
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: array of the words."""
         return {"type": "array", "items": self.word.schema(definitions), "uniqueItems": True}
 
 
 class TextList(Words):
-    """A list of 1 to `_MAX_NAMES` names of parts, each at most once."""
+    """A list of 1 to `_MAX_NAME_COUNT` names of parts, each at most once."""
 
     is_word = True
 
     def __init__(self) -> None:
         self.word = Reference()
-        self.problem = Problem(f"must be a list of 1 to {_MAX_NAMES} names")
-        self.fewest, self.most = 1, _MAX_NAMES
+        self.problem = Problem(f"must be a list of 1 to {_MAX_NAME_COUNT} names")
+        self.fewest, self.most = 1, _MAX_NAME_COUNT
 
-    def below(self, part: str) -> Reader | None:
+    def below(self, step: str) -> Reader[object] | None:
         """Reader of one name."""
-        return self.word if is_place(part) else None
+        return self.word if is_index(step) else None
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: array of text."""
         return {"type": "array", "items": self.word.schema(definitions), "minItems": 1, "maxItems": self.most}
 
 
-class Whole(Reader):
+class Whole(Reader[int]):
     """A whole number within bounds."""
 
     is_word = True
@@ -364,7 +388,7 @@ class Whole(Reader):
     def __init__(self, low: int, high: int) -> None:
         self.low, self.high = low, high
 
-    def leaf(self, value: Any) -> int:
+    def leaf(self, value: object) -> int:
         """Read decimal digits; a leading zero is refused, because YAML 1.1 reads it as octal."""
         if isinstance(value, str) and re.fullmatch(r"0|-?[1-9]\d{0,17}", value.strip(), re.ASCII):
             number = int(value)
@@ -372,30 +396,30 @@ class Whole(Reader):
                 return number
         raise InvalidValueError(f"must be a whole number from {self.low} to {self.high}")
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: integer, or its digits in quotes."""
         number = {"type": "integer", "minimum": self.low, "maximum": self.high}
         return {"anyOf": [number, {"type": "string", "pattern": r"^\s*(?:0|-?[1-9]\d{0,17})\s*$"}]}
 
 
-class Version(Reader):
+class Version(Reader[int]):
     """The schema version."""
 
-    def leaf(self, value: Any) -> int:
+    def leaf(self, value: object) -> int:
         """Accept 1."""
         if value != "1":
             raise InvalidValueError("is not a schema version this tool reads", "accepted: 1")
         return 1
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: constant, in quotes or not."""
         return {"enum": [1, "1"]}
 
 
-class Day(Reader):
+class Day(Reader["date"]):
     """A calendar date."""
 
-    def leaf(self, value: Any) -> Any:
+    def leaf(self, value: object) -> "date":
         """Read 2027-03-31."""
         from datetime import date
 
@@ -406,46 +430,46 @@ class Day(Reader):
         except ValueError:
             raise InvalidValueError("must be a calendar date", "accepted: 2027-03-31 and the like") from None
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: date as text, or as the type that YAML readers make of it."""
         return date_schema(r"^\d{4}-\d\d-\d\d$")
 
 
 def _is_few(
-    value: Any, kind: type[Sized] | tuple[type[Sized], ...], kind_problem: str, path: KeyPath, report: Report
-) -> bool:
-    """Whether a value is of a kind and has at most `_MAX_IDS` entries; reports the problem if not."""
+    value: object, kind: type[SizedT] | tuple[type[SizedT], ...], kind_problem: str, path: KeyPath, report: Report
+) -> TypeGuard[SizedT]:
+    """Whether a value is of a kind and has at most `_MAX_ID_COUNT` entries; reports the problem if not."""
     if not isinstance(value, kind):
         report(path, Problem(kind_problem))
         return False
-    if len(value) > _MAX_IDS:
-        report(path, Problem(f"must have at most {_MAX_IDS} entries, has {len(value)}"))
+    if len(value) > _MAX_ID_COUNT:
+        report(path, Problem(f"must have at most {_MAX_ID_COUNT} entries, has {len(value)}"))
         return False
     return True
 
 
-class TextMap(Reader):
+class TextMap(Reader[dict[str, str]]):
     """A mapping of any key to text; `of` names the kind of the keys."""
 
     def __init__(self, of: str = "row id") -> None:
         self.of = of
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> dict[str, str] | Invalid:
         """Read each value; a problem is reported at its own path."""
         if not _is_few(value, dict, "must be a mapping of keys to values", path, report):
             return INVALID
         result = {key: read_part(Text(), text, (*path, key), report) for key, text in value.items()}
-        return INVALID if any(text is INVALID for text in result.values()) else result
+        return result if has_valid_values(result) else INVALID
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: object."""
-        return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_IDS}
+        return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_ID_COUNT}
 
 
-class SizeMap(Reader):
+class SizeMap(Reader[dict[str, object]]):
     """A mapping of keys of the file to sizes, which are read later: a size has the reader of its key."""
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> dict[str, object] | Invalid:
         """Refuse sizes that are lists or mappings."""
         if not _is_few(value, dict, "must be a mapping of keys of errors to sizes", path, report):
             return INVALID
@@ -454,43 +478,44 @@ class SizeMap(Reader):
             report((*path, key), Problem("must be one size, which holds for each axis", "accepted: such as 2 mm/s"))
         return INVALID if nested or INVALID in value.values() else value
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: object of quantities."""
         size = {"type": ["string", "number"]}
-        return {"type": "object", "additionalProperties": size, "maxProperties": _MAX_IDS}
+        return {"type": "object", "additionalProperties": size, "maxProperties": _MAX_ID_COUNT}
 
 
 _WEIGHT = Quantity(units.RATIO, gt=0, ge=1e-6, le=1e6)
+_WEIGHED_OR_LISTED: tuple[type[dict[str, object] | list[object]], ...] = (dict, list)
 
 
-class Weights(Reader):
+class Weights(Reader[dict[str, float]]):
     """Keys of the file with positive weights, or a list of keys with weights of 1."""
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> dict[str, float] | Invalid:
         """Read each key and weight; a problem is reported at its own path."""
-        if not _is_few(value, (dict, list), "must be keys with their weights, or a list of keys", path, report):
+        if not _is_few(value, _WEIGHED_OR_LISTED, "must be keys with their weights, or a list of keys", path, report):
             return INVALID
         if isinstance(value, list):
-            names = [read_part(Text(), name, (*path, index), report) for index, name in enumerate(value)]
+            names = tuple([read_part(Text(), name, (*path, index), report) for index, name in enumerate(value)])
             repeated = [index for index, name in enumerate(names) if name in names[:index]]
             for index in repeated:
                 report((*path, index), Problem("stands twice", "accepted: each key once"))
-            return INVALID if repeated or any(name is INVALID for name in names) else dict.fromkeys(names, 1.0)
+            return dict.fromkeys(names, 1.0) if are_valid(names) and not repeated else INVALID
         weights = {key: read_part(_WEIGHT, weight, (*path, key), report) for key, weight in value.items()}
-        return INVALID if any(weight is INVALID for weight in weights.values()) else weights
+        return weights if has_valid_values(weights) else INVALID
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: object of numbers, or array of text."""
         label, weight = Text().schema(definitions), _WEIGHT.schema(definitions)
         return {
             "anyOf": [
-                {"type": "object", "additionalProperties": weight, "maxProperties": _MAX_IDS},
-                {"type": "array", "items": label, "maxItems": _MAX_IDS},
+                {"type": "object", "additionalProperties": weight, "maxProperties": _MAX_ID_COUNT},
+                {"type": "array", "items": label, "maxItems": _MAX_ID_COUNT},
             ]
         }
 
 
-class Section(Reader):
+class Section(Reader[T_co]):
     """A mapping with known keys, read into a `NamedTuple`; an unknown key is an error.
 
     The method `problems(values)` of a section yields problems between its values. It gets the valid values with
@@ -499,19 +524,19 @@ class Section(Reader):
     that its `any_of()` lists; `problems` and the schema check it.
     """
 
-    def __init__(self, kind: type[Any]) -> None:
+    def __init__(self, kind: Callable[..., T_co]) -> None:
         self.kind = kind
         self.keys: dict[str, Key] = {
             name: annotation.__metadata__[0]
             for name, annotation in kind.__annotations__.items()
             if hasattr(annotation, "__metadata__")
         }
-        self.defaults: dict[str, Any] = kind._field_defaults
+        self.defaults: dict[str, object] = vars(kind)["_field_defaults"]
         self.required = [name for name in self.keys if name not in self.defaults]
         self.problems = getattr(kind, "problems", None)
         self.any_of: tuple[str, ...] = getattr(kind, "any_of", tuple)()
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> T_co | Invalid:
         """Read every key, report every fault."""
         if not isinstance(value, dict):
             report(path, Problem("must be a mapping of keys to values", f"accepted: {', '.join(self.keys)}"))
@@ -544,7 +569,7 @@ class Section(Reader):
                 is_valid = False
         return self.kind(**values) if is_valid else INVALID
 
-    def each(self, value: Any) -> dict[str, Any]:
+    def each(self, value: object) -> dict[str, object]:
         """Value of each known key, read by itself without a report; `INVALID` for an invalid value."""
         items = value.items() if isinstance(value, dict) else ()
         return {
@@ -553,11 +578,11 @@ class Section(Reader):
             if name in self.keys
         }
 
-    def below(self, part: str) -> Reader | None:
+    def below(self, step: str) -> Reader[object] | None:
         """Reader of a key."""
-        return self.keys[part].reader if part in self.keys else None
+        return self.keys[step].reader if step in self.keys else None
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: reference to a definition, which is made on first use."""
         name = self.kind.__name__
         if name not in definitions:
@@ -565,7 +590,7 @@ class Section(Reader):
             definitions[name] = self.definition(definitions)
         return {"$ref": f"#/definitions/{name}"}
 
-    def definition(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def definition(self, definitions: Definitions) -> JsonObject:
         """JSON Schema of the section itself."""
         properties = {}
         for name, key in self.keys.items():
@@ -588,43 +613,43 @@ class Section(Reader):
         }
 
 
-class ListOf(Reader):
+class ListOf(Reader[tuple[T_co, ...]]):
     """A list of sections, of one kind or of several forms."""
 
-    def __init__(self, kind: "type[Any] | Reader") -> None:
-        self.section: Reader = kind if isinstance(kind, Reader) else Section(kind)
+    def __init__(self, kind: "Callable[..., T_co] | Reader[T_co]") -> None:
+        self.section: Reader[T_co] = kind if isinstance(kind, Reader) else Section(kind)
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> tuple[T_co, ...] | Invalid:
         """Read each entry; a problem is reported at its own path."""
         if not isinstance(value, list):
             report(path, Problem("must be a list"))
             return INVALID
-        if len(value) > _MAX_ENTRIES:
-            report(path, Problem(f"must have at most {_MAX_ENTRIES} entries, has {len(value)}"))
+        if len(value) > _MAX_ENTRY_COUNT:
+            report(path, Problem(f"must have at most {_MAX_ENTRY_COUNT} entries, has {len(value)}"))
             return INVALID
         entries = tuple([read_part(self.section, entry, (*path, index), report) for index, entry in enumerate(value)])
-        return INVALID if INVALID in entries else entries
+        return entries if are_valid(entries) else INVALID
 
-    def below(self, part: str) -> Reader | None:
+    def below(self, step: str) -> Reader[object] | None:
         """Reader of one entry."""
-        return self.section if is_place(part) else None
+        return self.section if is_index(step) else None
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: array of the section."""
-        return {"type": "array", "items": self.section.schema(definitions), "maxItems": _MAX_ENTRIES}
+        return {"type": "array", "items": self.section.schema(definitions), "maxItems": _MAX_ENTRY_COUNT}
 
 
-class OneOf(Reader):
+class OneOf(Reader[T_co]):
     """One of several forms of a value; `pick` takes the value and returns the reader of its form."""
 
-    def __init__(self, pick: Callable[[Any], Reader], forms: tuple[Reader, ...]) -> None:
+    def __init__(self, pick: Callable[[object], Reader[T_co]], forms: tuple[Reader[T_co], ...]) -> None:
         self.pick, self.forms = pick, forms
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> T_co | Invalid:
         """Read the value by the reader of its form."""
         return self.pick(value).read(value, path, report)
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: any of the forms."""
         return {"anyOf": [form.schema(definitions) for form in self.forms]}
 
@@ -636,21 +661,22 @@ class SortedPoints(tuple[tuple[float, float], ...]):
     """Points of a curve in rising order that the file has in another order; rows that use them carry a note."""
 
 
-class CurveReader(Reader):
-    """A mapping of abscissas to ordinates, read in rising order; `SortedPoints` if the file has another order."""
+class PointsReader(Reader[T_co]):
+    """A mapping of abscissas to ordinates."""
 
     def __init__(self, abscissa: Quantity, ordinate: Quantity, accepted: str, fewest: int) -> None:
         self.abscissa, self.ordinate, self.accepted, self.fewest = abscissa, ordinate, accepted, fewest
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read each point; a problem is reported at its own path."""
+    def points(self, value: object, path: KeyPath, report: Report) -> Points | Invalid:
+        """Read each point, in rising order; a problem is reported at its own path."""
         if not isinstance(value, dict) or not self.fewest <= len(value) <= _MAX_POINTS:
-            given = f", {len(value)} given" if isinstance(value, dict) else ""
+            length_words = f", {len(value)} given" if isinstance(value, dict) else ""
             report(
-                path, Problem(f"must be {self.fewest} to {_MAX_POINTS} points{given}", f"accepted: {self.accepted}")
+                path,
+                Problem(f"must be {self.fewest} to {_MAX_POINTS} points{length_words}", f"accepted: {self.accepted}"),
             )
             return INVALID
-        points = {}
+        points: dict[float, float | Invalid] = {}
         is_valid = True
         for key, item in value.items():
             here = (*path, key)
@@ -664,16 +690,16 @@ class CurveReader(Reader):
                 report(here, Problem("is in the list twice"))
                 is_valid = False
             points[abscissa] = read_part(self.ordinate, item, here, report)
-        if INVALID in points.values() or not is_valid:
+        if not is_valid or not has_valid_values(points):
             return INVALID
         sorted_points = sorted(points.items())
         return tuple(sorted_points) if sorted_points == list(points.items()) else SortedPoints(sorted_points)
 
-    def below(self, part: str) -> Reader | None:
+    def below(self, part: str) -> Reader[object] | None:
         """Reader of an ordinate."""
         return self.ordinate
 
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+    def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: object of points."""
         return {
             "type": "object",
@@ -683,26 +709,44 @@ class CurveReader(Reader):
         }
 
 
-def either(kind: type, form: Reader, other: Reader) -> OneOf:
+class CurveReader(PointsReader[Points]):
+    """A mapping of abscissas to ordinates, read in rising order; `SortedPoints` if the file has another order."""
+
+    def read(self, value: object, path: KeyPath, report: Report) -> Points | Invalid:
+        """Read each point; a problem is reported at its own path."""
+        return self.points(value, path, report)
+
+
+def either(kind: type, form: Reader[Form], other: Reader[OtherForm]) -> OneOf[Form | OtherForm]:
     """Reader of two forms: `form` for values of type `kind`, a list or a mapping, and `other` for other values."""
     return OneOf(lambda value: form if isinstance(value, kind) else other, (other, form))
 
 
-def is_empty(item: Any) -> bool:
+def is_empty(item: object) -> bool:
     """Whether an item of a file is a section or a list that is empty, or has only empty sections and lists."""
     if isinstance(item, dict):
         return all(map(is_empty, item.values()))
     return isinstance(item, list) and all(map(is_empty, item))
 
 
-def is_place(part: str) -> bool:
-    """Whether a part of a key is the index of an entry."""
-    return part.isascii() and part.isdigit() and len(part) < 9
+def is_index(step: str) -> bool:
+    """Whether a step of a path is the index of an entry."""
+    return step.isascii() and step.isdigit() and len(step) < 9
 
 
-def read_part(reader: Reader, value: Any, path: KeyPath, report: Report) -> Any:
+def read_part(reader: Reader[T], value: object, path: KeyPath, report: Report) -> T | Invalid:
     """Read an item of a list or a mapping; an item that was reported stays `INVALID`."""
     return INVALID if value is INVALID else reader.read(value, path, report)
+
+
+def are_valid(items: tuple[T | Invalid, ...]) -> TypeGuard[tuple[T, ...]]:
+    """Whether no item of a list was reported."""
+    return INVALID not in items
+
+
+def has_valid_values(mapping: Mapping[K, T | Invalid]) -> TypeGuard[dict[K, T]]:
+    """Whether no value of a mapping was reported."""
+    return INVALID not in mapping.values()
 
 
 def _ignore_problem(path: KeyPath, problem: Problem) -> None:
@@ -719,17 +763,17 @@ def did_you_mean(word: object, known_words: tuple[str, ...]) -> str:
 
 # ---------------------------------------------------------------------- bounds
 # Real values stay far inside these bounds, and squares stay finite.
-FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
+RADAR_FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
 VIBRATION_FREQUENCY = Quantity(units.FREQUENCY, gt=0, le=1e9)
 DURATION = Quantity(units.TIME, gt=0, ge=1e-6, le=1e6)
 COORDINATE = Quantity(units.LENGTH, ge=-1e9, le=1e9)
 RANGE = Quantity(units.LENGTH, gt=0, le=1e9)
 SIZE = Quantity(units.LENGTH, ge=0, le=1e9)
 VELOCITY = Quantity(units.SPEED, ge=-1e6, le=1e6)
-SPEED = Quantity(units.SPEED, ge=0, le=1e6)
-ACCELERATION = Quantity(units.ACCELERATION, ge=-1e6, le=1e6)
-JERK = Quantity(units.JERK, ge=-1e6, le=1e6)
-SNAP = Quantity(units.SNAP, ge=-1e6, le=1e6)
+GROUND_SPEED = Quantity(units.SPEED, ge=0, le=1e6)
+ACCELERATION_COMPONENT = Quantity(units.ACCELERATION, ge=-1e6, le=1e6)
+JERK_COMPONENT = Quantity(units.JERK, ge=-1e6, le=1e6)
+SNAP_COMPONENT = Quantity(units.SNAP, ge=-1e6, le=1e6)
 DIRECTION = Quantity(units.ANGLE, ge=-2 * math.pi, le=2 * math.pi)
 LATITUDE = Quantity(units.ANGLE, ge=-math.pi / 2, le=math.pi / 2)
 HEIGHT = Quantity(units.LENGTH, ge=-1e4, le=1e9)
@@ -740,5 +784,5 @@ PHASE_REQUIREMENT = Quantity(units.ANGLE, gt=0, ge=1e-6, le=2 * math.pi)
 SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
 SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)
 DISTRIBUTION = Choice("normal", "uniform", "bound")
-DISTRIBUTIONS = "normal: the values are one sigma; uniform, bound: they are not exceeded."
+DISTRIBUTION_TEXT = "normal: the values are one sigma; uniform, bound: they are not exceeded."
 Source = Annotated[str | None, Key(Text(), "Source of the values; shown as evidence.")]

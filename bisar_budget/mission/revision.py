@@ -193,7 +193,7 @@ class _Object:
     top: str = ""
 
 
-_MISSING = _Object(b"missing")
+_MISSING_OBJECT = _Object(b"missing")
 
 
 def _object(top: str, commit: str, inside: str) -> _Object:
@@ -238,9 +238,11 @@ def _object_of_lines(top: str, commit: str, inside: str) -> _Object:
         if mode == _LINK or length == len(parts):
             is_read, content, _ = _git(top, "cat-file", kind.decode(), hash.decode())
             return (
-                _Object(b"symlink" if mode == _LINK else kind, content, hash.decode(), top) if is_read else _MISSING
+                _Object(b"symlink" if mode == _LINK else kind, content, hash.decode(), top)
+                if is_read
+                else _MISSING_OBJECT
             )
-    return _MISSING
+    return _MISSING_OBJECT
 
 
 def _existing(path: str) -> tuple[str, str]:

@@ -5,19 +5,21 @@ A number that differs between the missions becomes an array with one element per
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields, is_dataclass
 from functools import partial
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.arrays import PerCase
 from bisar_budget.mission.model import Document, Mission
 from bisar_budget.mission.platforms import FlownPath
+from bisar_budget.mission.readers import SectionValue, SectionValues
 
 
 def picked(mission: Mission, cases: NDArray[np.intp]) -> Mission:
     """The mission with some of the cases of its arrays; `cases` are their indices."""
 
-    def of_cases(leaf: Any) -> Any:
+    def of_cases(leaf: object) -> object:
         return leaf[cases] if isinstance(leaf, np.ndarray) and leaf.ndim else leaf
 
     return cast(Mission, _with_leaves(mission, of_cases))
@@ -30,7 +32,7 @@ def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.i
     their numbers is the same: keys, words, lengths of lists. A mission of arrays has no sources and no positions in
     its file, because calculations with arrays never read them.
     """
-    shapes: dict[Any, tuple[Mission, list[int], list[list[float]]]] = {}
+    shapes: dict[object, tuple[Mission, list[int], list[list[float]]]] = {}
     for index, mission in enumerate(map(_bare, missions)):
         numbers: list[float] = []
         _, indices, rows = shapes.setdefault(_shape(mission, numbers), (mission, [], []))
@@ -41,7 +43,7 @@ def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.i
         yield _with_leaves(mission, partial(_next_of, iter(columns))), np.array(indices)
 
 
-def _next_of(numbers: Iterator[Any], leaf: Any) -> Any:
+def _next_of(numbers: Iterator[PerCase], leaf: object) -> object:
     """The next number for a leaf that is a number; a word unchanged."""
     return next(numbers) if isinstance(leaf, float) else leaf
 
@@ -62,11 +64,11 @@ def _bare(mission: Mission) -> Mission:
             )
             platforms = mission.platforms._replace(**{name: platform._replace(path=path)})
             mission = mission._replace(platforms=platforms)
-    no_sources: dict[str, Any] = {"file": "", "places": {}, "data": b"", "changes": (), "parts": (), "taken": ()}
+    no_sources: SectionValues = {"file": "", "places": {}, "data": b"", "changes": (), "parts": (), "taken": ()}
     return mission._replace(name="", document=Document(), requirement_ids={}, **no_sources)
 
 
-def _children(value: Any) -> Any:
+def _children(value: SectionValue) -> tuple[object, ...] | None:
     """Values that a value is made of; None for a number, an array or a word."""
     if isinstance(value, tuple):
         return value
@@ -75,7 +77,7 @@ def _children(value: Any) -> Any:
     return tuple(getattr(value, field.name) for field in fields(value)) if is_dataclass(value) else None
 
 
-def _shape(value: Any, numbers: list[float]) -> Any:
+def _shape(value: SectionValue, numbers: list[float]) -> object:
     """Everything of a value but its numbers, which are appended to a list."""
     if isinstance(value, float):
         numbers.append(value)
@@ -87,7 +89,7 @@ def _shape(value: Any, numbers: list[float]) -> Any:
     return (names, *[_shape(child, numbers) for child in children])
 
 
-def _with_leaves(value: Any, put: Callable[[Any], Any]) -> Any:
+def _with_leaves(value: SectionValue, put: Callable[[object], object]) -> SectionValue:
     """The value with `put(leaf)` for each number, array or word in it."""
     children = _children(value)
     if children is None:

@@ -12,18 +12,31 @@ from typing import Any
 import yaml
 from yaml import AliasEvent, MappingEndEvent, ScalarEvent
 
-from bisar_budget.faults import Fault, KeyPath, MissionError, Problem, SetValue, file_fault, printable, shown, upwards
+from bisar_budget.faults import (
+    Fault,
+    KeyPath,
+    MissionError,
+    ParserEvent,
+    Problem,
+    SetValue,
+    file_fault,
+    printable,
+    shown,
+    upwards,
+)
 from bisar_budget.mission.readers import INVALID, MISSING
 from bisar_budget.units import unit_behind
 
 MAX_BYTES = 1 << 20  # of a file; a mission file has a few kilobytes
-MAX_DEPTH = 20  # containers inside each other; the schema needs 9
-TOO_DEEP = f"is nested more than {MAX_DEPTH} deep"
-MAX_VALUES = 100_000  # of a file; the longest lists that the schema accepts have a third of it
-MAX_FAULTS = 200  # of a file; nobody mends more at once, and each fault costs a line of every report
+MAX_NESTING_LEVEL = 20  # containers inside each other; the schema needs 9
+TOO_DEEP = f"is nested more than {MAX_NESTING_LEVEL} deep"
+MAX_FILE_VALUE_COUNT = 100_000  # of a file; the longest lists that the schema accepts have a third of it
+MAX_FAULT_COUNT = 200  # of a file; nobody mends more at once, and each fault costs a line of every report
 
 _PARSER = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 _NUMERAL = re.compile(r"[+-]?\.?\d", re.ASCII)  # begins a number
+Content = Any
+"""Content of a file: texts, lists, mappings, numbers of a sweep, `INVALID`. The readers of `readers` test it."""
 NULLS = ("", "~", "null", "Null", "NULL")
 
 
@@ -67,9 +80,9 @@ class Tree:
 
     def __init__(self, file_kind: str = "mission") -> None:
         self.file_kind = file_kind
-        self.root: Any = INVALID
-        self.keys: dict[KeyPath, Any] = {}
-        self.values: dict[KeyPath, Any] = {}
+        self.root: Content = INVALID
+        self.keys: dict[KeyPath, ParserEvent] = {}
+        self.values: dict[KeyPath, ParserEvent] = {}
         self.faults: list[Fault] = []
         self.changes: dict[KeyPath, SetValue] = {}
 
@@ -80,9 +93,9 @@ class Tree:
         tree.keys, tree.values, tree.changes = dict(self.keys), dict(self.values), dict(self.changes)
         return tree
 
-    def fault(self, mark: Any, path: KeyPath, problem: str, **details: str) -> None:
+    def fault(self, mark: ParserEvent, path: KeyPath, problem: str, **details: str) -> None:
         """Note a fault at a mark of the file, or at the start of the file without a mark.
-        Raises `UnusableError` when the file has `MAX_FAULTS` faults.
+        Raises `UnusableError` when the file has `MAX_FAULT_COUNT` faults.
         """
         change = self._change_at(path)
         if change is not None:
@@ -93,8 +106,8 @@ class Tree:
         else:
             line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
             self.faults.append(Fault(line=line, column=column, key=_dotted(path), problem=problem, **details))
-        if len(self.faults) >= MAX_FAULTS:
-            self.faults.append(file_fault(f"has {MAX_FAULTS} faults or more; what follows them was not read"))
+        if len(self.faults) >= MAX_FAULT_COUNT:
+            self.faults.append(file_fault(f"has {MAX_FAULT_COUNT} faults or more; what follows them was not read"))
             raise UnusableError
 
     def _change_at(self, path: KeyPath) -> SetValue | None:
@@ -108,7 +121,7 @@ class Tree:
     def report(self, path: KeyPath, problem: Problem) -> None:
         """Note a problem that a reader reports: at the value, or else at the nearest key above it."""
         path = (*path, *problem.at)
-        value: Any = self.root
+        value: Content = self.root
         for name in path:
             try:
                 value = value[name]
@@ -122,12 +135,12 @@ class Tree:
         given = shown(value) if isinstance(value, str) and not is_key and not problem.names_value else ""
         self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
 
-    def document(self, text: str, path: KeyPath, accepted: str) -> Any:
+    def document(self, text: str, path: KeyPath, accepted: str) -> Content:
         """Read the only document of a text into the tree at a path; `INVALID` for an empty text.
 
         `accepted` completes the sentence for a second document. Raises `yaml.YAMLError` too.
         """
-        next_event: Callable[[], Any] = _PARSER(text).get_event
+        next_event: Callable[[], ParserEvent] = _PARSER(text).get_event
         while type(event := next_event()) is not yaml.DocumentStartEvent:
             if type(event) is yaml.StreamEndEvent:
                 return INVALID
@@ -138,16 +151,18 @@ class Tree:
                 raise UnusableError
         return value
 
-    def node(self, next_event: Callable[[], Any], event: Any, path: KeyPath) -> Any:
-        """Read one value; the depth of the recursion is bounded by `MAX_DEPTH`."""
+    def node(self, next_event: Callable[[], ParserEvent], event: ParserEvent, path: KeyPath) -> Content:
+        """Read one value; the depth of the recursion is bounded by `MAX_NESTING_LEVEL`."""
         self.values[path] = event
-        if len(self.values) > MAX_VALUES:
-            self.faults.append(file_fault(f"has more than {MAX_VALUES} values, so no {self.file_kind} file"))
+        if len(self.values) > MAX_FILE_VALUE_COUNT:
+            self.faults.append(
+                file_fault(f"has more than {MAX_FILE_VALUE_COUNT} values, so no {self.file_kind} file")
+            )
             raise UnusableError
         mark = event.start_mark
         kind = type(event)
         if kind is ScalarEvent:
-            value: Any = event.value
+            value: object = event.value
             if not event.style and value in NULLS:  # plain: "" from libyaml, None from pure Python
                 hint = "Give it one" + ("" if self._change_at(path) else ", or remove the key")
                 self.fault(mark, path, "has no value", hint=hint)
@@ -155,14 +170,14 @@ class Tree:
         elif kind is AliasEvent:
             self.fault(mark, path, "is an alias (*)", accepted="write the value out")
             return INVALID
-        elif len(path) >= MAX_DEPTH:
+        elif len(path) >= MAX_NESTING_LEVEL:
             self.fault(mark, (), TOO_DEEP)
             raise UnusableError
         elif kind is yaml.MappingStartEvent:
             value = self._mapping(next_event, path, is_flow=bool(event.flow_style))
         else:
             value = []
-            items: list[Any] = []
+            items: list[ParserEvent] = []
             while type(item := next_event()) is not yaml.SequenceEndEvent:
                 items.append(item)
                 value.append(self.node(next_event, item, (*path, len(value))))
@@ -173,7 +188,7 @@ class Tree:
             return INVALID
         return value
 
-    def _decimal_commas(self, items: list[Any], path: KeyPath) -> None:
+    def _decimal_commas(self, items: list[ParserEvent], path: KeyPath) -> None:
         """Refuse `[0,5 m, 1 m, 2 m]` and `[0,5 m, 1 m]`, which YAML reads as four values and as three.
 
         A decimal comma shows by the blank that follows the other commas of the list and not this one.
@@ -195,9 +210,9 @@ class Tree:
                 )
                 self.fault(item.start_mark, (*path, index), problem, given=given, accepted=accepted)
 
-    def _mapping(self, next_event: Callable[[], Any], path: KeyPath, *, is_flow: bool) -> dict[str, Any]:
+    def _mapping(self, next_event: Callable[[], ParserEvent], path: KeyPath, *, is_flow: bool) -> dict[str, Content]:
         """Read the keys and values of a mapping; its first event has been read."""
-        mapping: dict[str, Any] = {}
+        mapping: dict[str, Content] = {}
         split: dict[str, list[str]] = {}  # by key: texts that commas of a flow mapping separate from its value
         name = ""
         while type(event := next_event()) is not MappingEndEvent:
@@ -238,7 +253,7 @@ class Tree:
         self.fault(self.values[path].start_mark, path, "has commas", given=given, accepted=accepted, hint=hint)
 
 
-def _is_bare(key: Any, item: Any) -> bool:
+def _is_bare(key: ParserEvent, item: ParserEvent) -> bool:
     """Whether a key of a mapping is a number, with a unit or without, that has no value."""
     is_empty = type(item) is ScalarEvent and not item.style and not item.value
     return is_empty and not key.style and bool(_NUMERAL.match(key.value))
@@ -285,7 +300,7 @@ def read_tree(data: bytes | str, file: str, file_kind: str = "mission") -> Tree:
     return tree
 
 
-def _copied(value: Any) -> Any:
+def _copied(value: Content) -> Content:
     """A copy of nested mappings and lists."""
     if isinstance(value, dict):
         return {key: _copied(item) for key, item in value.items()}

@@ -1,24 +1,28 @@
 """Vibration of a mission file: sinusoids, wideband noise and spectra, of displacement or of acceleration."""
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Iterator
+from typing import Annotated, NamedTuple
 
 from bisar_budget import units
+from bisar_budget.arrays import PerCase
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem, sentences
 from bisar_budget.geometry import Vector
 from bisar_budget.mission.readers import (
     INVALID,
     VIBRATION_FREQUENCY,
-    CurveReader,
+    Invalid,
     Key,
     ListOf,
     OneOf,
     Points,
+    PointsReader,
     Quantity,
     Reader,
     Report,
     Section,
+    SectionValue,
+    SectionValues,
     Triple,
     either,
 )
@@ -34,7 +38,7 @@ class _Displacement(Quantity):
         super().__init__(units.LENGTH, ge=0, le=1e9)
         self.of_acceleration, self.also = of_acceleration, also
 
-    def leaf(self, value: Any) -> float:
+    def leaf(self, value: object) -> float:
         """Parse and check the bounds; a velocity or an acceleration gets a hint."""
         try:
             return super().leaf(value)
@@ -52,15 +56,18 @@ class _Displacement(Quantity):
 _ACCELERATION_SIZE = Quantity(units.ACCELERATION, ge=0, le=1e6)
 _AMPLITUDE = _Displacement("Write it in g or m/s^2", "; or its acceleration in g, mg, ug, m/s^2")
 _RMS = _Displacement("Noise of acceleration is a spectrum, in g^2/Hz")
-_DISPLACEMENT = either(list, Triple(_AMPLITUDE), _AMPLITUDE)
-_NOISE = either(list, Triple(_RMS), _RMS)
-_ACCELERATION = either(list, Triple(_ACCELERATION_SIZE), _ACCELERATION_SIZE)
+_DISPLACEMENT_BY_AXIS = either(list, Triple(_AMPLITUDE), _AMPLITUDE)
+_NOISE_BY_AXIS = either(list, Triple(_RMS), _RMS)
+_ACCELERATION_BY_AXIS = either(list, Triple(_ACCELERATION_SIZE), _ACCELERATION_SIZE)
 _ALONG = "along the line of sight; a vector: along each axis"
 
 
-def _of_all(value: Any, number: Any) -> Any:
+def _of_all(value: float | Vector, number: float) -> float | Vector:
     """An amplitude, single or of three axes, multiplied by a number."""
-    return tuple(component * number for component in value) if isinstance(value, tuple) else value * number
+    if isinstance(value, tuple):
+        a, b, c = value
+        return a * number, b * number, c * number
+    return value * number
 
 
 class Sinusoid(NamedTuple):
@@ -69,24 +76,24 @@ class Sinusoid(NamedTuple):
     amplitude: Annotated[
         float | Vector,
         Key(
-            _DISPLACEMENT,
+            _DISPLACEMENT_BY_AXIS,
             "0 to peak, along the line of sight; a vector: along each axis of the frame. In g it is an acceleration.",
         ),
     ]
     frequency: Annotated[float, Key(VIBRATION_FREQUENCY)]
 
     @property
-    def scale(self) -> Any:
+    def scale(self) -> float:
         """Displacement per unit of the amplitude. [m/m]"""
         return 1.0
 
     @property
-    def displacement(self) -> Any:
+    def displacement(self) -> float | Vector:
         """Amplitude of the displacement, single or along each axis. [m]"""
         return self.amplitude
 
     @property
-    def acceleration(self) -> Any:
+    def acceleration(self) -> float | Vector:
         """Amplitude of the acceleration, single or along each axis. [m/s²]"""
         return _of_all(self.amplitude, (2 * math.pi * self.frequency) ** 2)
 
@@ -94,21 +101,23 @@ class Sinusoid(NamedTuple):
 class AcceleratedSinusoid(NamedTuple):
     """One sinusoidal vibration by its acceleration, which is constant if the frequency changes."""
 
-    amplitude: Annotated[float | Vector, Key(_ACCELERATION, f"Amplitude of the acceleration, 0 to peak, {_ALONG}.")]
+    amplitude: Annotated[
+        float | Vector, Key(_ACCELERATION_BY_AXIS, f"Amplitude of the acceleration, 0 to peak, {_ALONG}.")
+    ]
     frequency: Annotated[float, Key(VIBRATION_FREQUENCY)]
 
     @property
-    def scale(self) -> Any:
+    def scale(self) -> float:
         """Displacement per unit of the amplitude: 1/(2πf)². [s²]"""
         return 1 / (2 * math.pi * self.frequency) ** 2
 
     @property
-    def displacement(self) -> Any:
+    def displacement(self) -> float | Vector:
         """Amplitude of the displacement, single or along each axis. [m]"""
         return _of_all(self.amplitude, self.scale)
 
     @property
-    def acceleration(self) -> Any:
+    def acceleration(self) -> float | Vector:
         """Amplitude of the acceleration, single or along each axis. [m/s²]"""
         return self.amplitude
 
@@ -116,7 +125,7 @@ class AcceleratedSinusoid(NamedTuple):
 _SINUSOID, _ACCELERATED = Section(Sinusoid), Section(AcceleratedSinusoid)
 
 
-def _form_of_sinusoid(value: Any) -> Reader:
+def _form_of_sinusoid(value: object) -> Reader[Sinusoid | AcceleratedSinusoid]:
     """Reader of a sinusoid in g, or else in metres, by the unit of its amplitude."""
     amplitude = value.get("amplitude") if isinstance(value, dict) else None
     components = amplitude if isinstance(amplitude, list) else [amplitude]
@@ -130,7 +139,7 @@ SINUSOIDS = ListOf(OneOf(_form_of_sinusoid, (_SINUSOID, _ACCELERATED)))
 class Wideband(NamedTuple):
     """Noise-like vibration."""
 
-    rms: Annotated[float | Vector, Key(_NOISE, f"Root mean square, {_ALONG}.")]
+    rms: Annotated[float | Vector, Key(_NOISE_BY_AXIS, f"Root mean square, {_ALONG}.")]
 
 
 class Spectrum(NamedTuple):
@@ -142,12 +151,13 @@ class Spectrum(NamedTuple):
     points: Points
     is_accelerated: bool
 
-    def times(self, power: Any) -> "Spectrum":
+    def times(self, power: PerCase) -> "Spectrum":
         """The spectrum with each density multiplied by a factor of power."""
-        return self._replace(points=tuple((f, density * power) for f, density in self.points))
+        points: SectionValue = tuple((f, density * power) for f, density in self.points)
+        return self._replace(points=points)
 
 
-class _SpectrumReader(CurveReader):
+class _SpectrumReader(PointsReader[Spectrum]):
     """A mapping of frequencies to densities, all of acceleration or all of displacement."""
 
     def __init__(self, dimension: Dimension, example: str) -> None:
@@ -155,9 +165,9 @@ class _SpectrumReader(CurveReader):
         super().__init__(frequency, Quantity(dimension, gt=0, ge=1e-60, le=1e15), f"{example} and the like", 2)
         self.is_accelerated = dimension is units.ACCELERATION_DENSITY
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> Spectrum | Invalid:
         """Read the points as a spectrum of acceleration or displacement."""
-        points = super().read(value, path, report)
+        points = self.points(value, path, report)
         return INVALID if points is INVALID else Spectrum(points, self.is_accelerated)
 
 
@@ -167,7 +177,7 @@ _SPECTRA = (
 )
 
 
-def _form_of_spectrum(value: Any) -> Reader:
+def _form_of_spectrum(value: object) -> Reader[Spectrum]:
     """Reader of the dimension that most points have; of acceleration if both have equally many."""
     texts = [item for item in value.values() if isinstance(item, str)] if isinstance(value, dict) else []
     accelerations, displacements = (
@@ -196,7 +206,7 @@ class Vibration(NamedTuple):
     spectrum_level: Annotated[float | None, Key(LEVEL, "Shifts the spectrum.")] = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Refuse a level without a spectrum."""
         if values.get("spectrum_level") is not None and "spectrum" in values and values["spectrum"] is None:
             problem = "shifts a spectrum, and there is none"
@@ -218,7 +228,7 @@ class FeltVibration(NamedTuple):
     spectrum_level: Annotated[float | None, Key(LEVEL, "Shifts the spectrum.")] = None
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(values: SectionValues) -> Iterator[Problem]:
         """Refuse a level without a spectrum."""
         yield from Vibration.problems(values)
 

@@ -5,6 +5,7 @@ __all__ = [
     "accuracy",
     "earth",
     "flight",
+    "free_fall",
     "instant",
     "log_places",
     "orientation",

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2
 from bisar_budget.geometry import Vector
-from bisar_budget.paths.earth import ROTATION_RATE, Floats
+from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S, Floats
 from bisar_budget.paths.instant import Instant, utc
 
 Matrix = tuple[tuple[float, ...], ...]
@@ -132,6 +133,11 @@ def held_to_covariance(values: Floats) -> Floats:
 
 
 # ---------------------------------------------------------------------- covariances of an orbit
+def turns_with_orbit(name: str) -> bool:
+    """Whether a name of CCSDS for axes of an orbit says that velocities are those in axes that turn with it."""
+    return name.endswith("_ROTATING")
+
+
 def local_axes(name: str) -> str | None:
     """`RTN` or `TNW` from a name of CCSDS for axes that turn with an orbit; None for any further name."""
     for suffix in _AXES_SUFFIXES:
@@ -145,13 +151,15 @@ class EpochCovariance:
     """Covariance (6, 6) of position and velocity at an epoch of TAI. [m², m²/s, m²/s²]
 
     `axes` are `RTN` or `TNW`, `earth` for axes that are fixed to the Earth, or `stars` for axes that `turn` turns to
-    the Earth. None means unknown axes: then only the total variance counts.
+    the Earth. None means unknown axes: then only the total variance counts. Velocities in axes of an orbit are
+    against the stars, or in axes that turn with the orbit if `is_rotating`.
     """
 
     epoch: Instant
     values: Floats
     axes: str | None
     turn: Callable[[Vector, Instant], Vector] | None = None
+    is_rotating: bool = False
 
 
 class OrbitState(NamedTuple):
@@ -168,6 +176,16 @@ class OrbitState(NamedTuple):
         first = (position if name == "RTN" else velocity) / np.linalg.norm(position if name == "RTN" else velocity)
         return np.array((first, np.cross(across, first), across))
 
+    def rate(self, name: str) -> float:
+        """Rate at which `RTN` or `TNW` turn about the orbit's normal, against the stars. [rad/s]"""
+        position, velocity = np.array(self.position), np.array(self.velocity)
+        momentum = float(np.linalg.norm(np.cross(position, velocity)))
+        if name == "RTN":
+            return momentum / float(position @ position)
+        # The velocity turns by gravity across it: |v × a|/v² with a = −μr/r³.
+        turned = EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 * momentum / float(np.linalg.norm(position)) ** 3
+        return turned / float(velocity @ velocity)
+
 
 def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: tuple[Instant, Instant]) -> OrbitState:
     """State of an orbit from its Earth-fixed positions near an instant of a span, by a central difference."""
@@ -175,16 +193,17 @@ def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: t
     last = min(instant.after(_VELOCITY_STEP_S), span[1])
     position_before, position, position_after = (np.array(position_at(time)) for time in (first, instant, last))
     velocity = (position_after - position_before) / last.since(first)
-    against_stars = velocity + np.cross((0.0, 0.0, ROTATION_RATE), position)
+    against_stars = velocity + np.cross((0.0, 0.0, ROTATION_RATE_RAD_PER_S), position)
     (x, y, z), (u, v, w) = position.tolist(), against_stars.tolist()
     return OrbitState((x, y, z), (u, v, w))
 
 
-def _turning(sign: float) -> Floats:
-    """Matrix (6, 6) that adds the Earth's rotation to velocities (sign 1), or removes it (sign -1)."""
+def with_rate(covariance: Floats, rate: Sequence[float] | Floats) -> Floats:
+    """Covariance (6, 6) in axes that turn less by a rate [rad/s]: δv becomes δv + rate × δr."""
+    x, y, z = rate
     matrix = np.eye(6)
-    matrix[3:, :3] = sign * ROTATION_RATE * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    return matrix
+    matrix[3:, :3] = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
+    return np.asarray(matrix @ covariance @ matrix.T)
 
 
 def stated_of_orbit(
@@ -223,18 +242,19 @@ def stated_of_orbit(
         interpolated = at_epochs[0]
     state = state_of(place, instant, span)
     along_stars = block_turned(interpolated, state.axes("RTN").T)
-    back = _turning(-1.0)
-    return StatedAccuracy(words, as_matrix(back @ along_stars @ back.T))
+    return StatedAccuracy(words, as_matrix(with_rate(along_stars, (0.0, 0.0, -ROTATION_RATE_RAD_PER_S))))
 
 
 def _covariance_along_orbit(covariance: EpochCovariance, state: OrbitState, instant: Instant) -> Floats:
     """A covariance along radial, in-track and cross-track, for a velocity against the stars."""
     if covariance.axes in LOCAL_AXES:
-        fixed = block_turned(covariance.values, state.axes(covariance.axes).T)
+        values = covariance.values
+        if covariance.is_rotating:
+            values = with_rate(values, (0.0, 0.0, state.rate(covariance.axes)))
+        fixed = block_turned(values, state.axes(covariance.axes).T)
     elif covariance.turn is not None:
         turned_axes = [covariance.turn(axis, instant) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
         fixed = block_turned(covariance.values, np.array(turned_axes).T)
     else:
-        turning = _turning(1.0)
-        fixed = turning @ covariance.values @ turning.T
+        fixed = with_rate(covariance.values, (0.0, 0.0, ROTATION_RATE_RAD_PER_S))
     return block_turned(fixed, state.axes("RTN"))

@@ -13,13 +13,13 @@ from bisar_budget import units
 from bisar_budget.faults import InvalidValueError
 
 UNCLEAR = "unclear"  # looks like an accuracy, of which nothing says what it is
-ACCEPTED = (
+ACCEPTED_ACCURACIES = (
     "accepted: one sigma as sigma_east, sigma_north, sigma_up [m], or sigma_x, sigma_y, sigma_z [m], or cov_ee, "
     "cov_nn, cov_uu [m^2], or horizontal accuracy, vertical accuracy [m], or position accuracy [m]"
 )
-BESIDE = "covariance"  # between two axes of a level frame, of which the sigmas are enough
+CROSS_COVARIANCE = "covariance"  # between two axes of a level frame, of which the sigmas are enough
 
-_AXES = {
+_AXIS_WORDS = {
     "east": ("e", "east", "easting", "lon", "long", "lng", "longitude"),
     "north": ("n", "north", "northing", "lat", "latitude"),
     "up": ("u", "up", "d", "down", "alt", "altitude", "height", "hgt", "elevation", "ele"),
@@ -27,15 +27,17 @@ _AXES = {
     "y": ("y",),
     "z": ("z",),
 }
-_AXIS_OF = {name: axis for axis, names in _AXES.items() for name in names}
+_AXIS_OF = {name: axis for axis, names in _AXIS_WORDS.items() for name in names}
 _HORIZONTAL = frozenset(("horizontal", "horiz", "hor", "2d", "planimetric", "level"))
 _VERTICAL = frozenset(("vertical", "vert", "ver", "v"))
-_SIGMAS = frozenset(("sigma", "sd", "std", "stdev", "accuracy", "uncertainty", "rms", "rmse"))
+_SIGMA_WORDS = frozenset(("sigma", "sd", "std", "stdev", "accuracy", "uncertainty", "rms", "rmse"))
 _VARIANCES = frozenset(("cov", "covariance", "var", "variance"))
 _WEAK = frozenset(("rms", "rmse", "sd"))  # of other things as often: residuals, noise, a card
-_ERRORS = frozenset(("error", "err", "precision", "confidence"))  # of a position: of which probability nobody says
+_ERROR_WORDS = frozenset(
+    ("error", "err", "precision", "confidence")
+)  # of a position: of which probability nobody says
 _PLACE = frozenset(("position", "pos", "positional", "location"))
-_POSITION = _PLACE | {"3d", "spherical", "p"}
+_POSITION_WORDS = _PLACE | {"3d", "spherical", "p"}
 _FILLING = frozenset(
     (
         "gps",
@@ -56,7 +58,7 @@ _FILLING = frozenset(
     )
 )
 # Circles and spheres that hold a share of the errors, or whatever the receiver's maker takes.
-_UNCLEAR = re.compile(
+_UNCLEAR_MEASURES = re.compile(
     r"(?:[23]?drms|2?d?cep\d*|sep\d*|mrse|r\d\d|epe|ehpe|evpe|ehe|epx|epy|hpe|vpe|[ce]e\d\d|le\d\d)"
 )
 _LOOKS_LIKE = re.compile(r"sigma|accura|uncertain|covar|varianc|stdev|(?:^|_)(?:std|sd)(?:_|$)")
@@ -68,7 +70,7 @@ _OTHERS = re.compile(  # what else has an accuracy
     r"rate|imu|terrain|ground|distance|dist|lidar|radar|camera|image|gimbal|battery|voltage|"
     r"current|climb|age|ambiguity|ratio|residual|residuals|geoid|undulation"
 )
-_VELOCITY = re.compile(r"v[enuxyzdh]")
+_VELOCITY_PATTERN = re.compile(r"v[enuxyzdh]")
 _TAILS = {
     ("m", "s"): "m/s",
     ("mps",): "m/s",
@@ -84,7 +86,7 @@ _TAILS = {
 _OF_POSITIONS = (units.LENGTH, units.POSITION_VARIANCE)
 _OTHER = "other"  # an accuracy of something that is no position
 _CAMELS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
-_SPELLINGS = (
+_COLUMN_SPELLINGS = (
     (re.compile(r"[^a-z0-9σ]+"), "_"),
     (re.compile(r"standard_?dev(?:iations?)?|std_?dev(?:iations?)?|st_?dev|σ"), "_sigma_"),
     (re.compile(r"(?:1|one)_?sigma"), "_sigma_"),
@@ -102,32 +104,32 @@ _SPELLINGS = (
 
 
 def meaning_of(name: str, unit: str | None) -> tuple[str | None, str | None]:
-    """Meaning of a column, and its unit, as it is given or by the end of its name.
+    """Meaning of a column, and its unit, as stated or by the end of its name.
 
     It is `sigma_east` or of another axis, `variance_east`, `horizontal_accuracy`, `vertical_accuracy`,
-    `position_accuracy` without a direction, `sigma_h` where another column has to say what h is, `BESIDE`, `UNCLEAR`,
-    or None of a column that is no accuracy of a position.
+    `position_accuracy` without a direction, `sigma_h` where another column has to say what h is, `CROSS_COVARIANCE`,
+    `UNCLEAR`, or None of a column that is no accuracy of a position.
     """
     split, lower = _tokens(_CAMELS.sub("_", name)), _tokens(name)
-    given = unit
-    if not given:
+    stated_unit = unit
+    if not stated_unit:
         for tail, its_unit in _TAILS.items():
             if tuple(split[-len(tail) :]) == tail and len(split) > len(tail):
-                given, split, lower = its_unit, split[: -len(tail)], _without(lower, tail)
+                stated_unit, split, lower = its_unit, split[: -len(tail)], _without(lower, tail)
                 break
     # `SDn` is sdn, `SDHeight` is sd height: of both readings the one that is plain counts.
     meanings = [_of_tokens(tokens) for tokens in (split, lower)]
-    meaning = next((known for known in meanings if known not in (None, UNCLEAR, _OTHER)), None)
+    meaning = next((candidate for candidate in meanings if candidate not in (None, UNCLEAR, _OTHER)), None)
     if meaning is None and _OTHER not in meanings and UNCLEAR in meanings:
         meaning = UNCLEAR
-    if meaning is not None and given and not _may_be_of_positions(meaning, given):
+    if meaning is not None and stated_unit and not _may_be_of_positions(meaning, stated_unit):
         meaning = None
-    return meaning, given
+    return meaning, stated_unit
 
 
 def _tokens(name: str) -> list[str]:
     text = name.strip().lower()
-    for pattern, spelling in _SPELLINGS:
+    for pattern, spelling in _COLUMN_SPELLINGS:
         text = pattern.sub(spelling, text)
     return [token for token in text.split("_") if token]
 
@@ -138,44 +140,54 @@ def _without(tokens: list[str], tail: Sequence[str]) -> list[str]:
 
 def _of_tokens(tokens: Sequence[str]) -> str | None:
     """Meaning of a name by its words; None where it looks like no accuracy."""
-    words = [token for token in tokens if token in _SIGMAS | _VARIANCES]
-    is_unclear = any(_UNCLEAR.fullmatch(token) for token in tokens) or _LOOKS_LIKE.search("_".join(tokens))
-    is_error = not words and not _ERRORS.isdisjoint(tokens)
+    words = [token for token in tokens if token in _SIGMA_WORDS | _VARIANCES]
+    is_unclear = any(_UNCLEAR_MEASURES.fullmatch(token) for token in tokens) or _LOOKS_LIKE.search("_".join(tokens))
+    is_error = not words and not _ERROR_WORDS.isdisjoint(tokens)
     if not words and not is_unclear and not is_error:
         return None
-    if any(_OTHERS.fullmatch(token) or _VELOCITY.fullmatch(token) for token in tokens) or _is_velocity(tokens):
+    if any(_OTHERS.fullmatch(token) or _VELOCITY_PATTERN.fullmatch(token) for token in tokens) or _is_velocity(
+        tokens
+    ):
         return _OTHER if _PLACE.isdisjoint(tokens) else UNCLEAR
-    is_position = not _POSITION.isdisjoint(tokens)
-    rest = [token for token in tokens if token not in _SIGMAS | _VARIANCES | _ERRORS | _POSITION | _FILLING | {"ep"}]
-    if any(_UNCLEAR.fullmatch(token) for token in rest):
+    is_position = not _POSITION_WORDS.isdisjoint(tokens)
+    axis_tokens = [
+        token
+        for token in tokens
+        if token not in _SIGMA_WORDS | _VARIANCES | _ERROR_WORDS | _POSITION_WORDS | _FILLING | {"ep"}
+    ]
+    if any(_UNCLEAR_MEASURES.fullmatch(token) for token in axis_tokens):
         return UNCLEAR
-    is_of_axis = len(rest) == 1 and (rest[0] in _AXIS_OF or rest[0] in _HORIZONTAL | _VERTICAL)
+    is_of_axis = len(axis_tokens) == 1 and (axis_tokens[0] in _AXIS_OF or axis_tokens[0] in _HORIZONTAL | _VERTICAL)
     if is_error:
-        return UNCLEAR if is_of_axis or (not rest and is_position) else None
+        return UNCLEAR if is_of_axis or (not axis_tokens and is_position) else None
     if not _VARIANCES.isdisjoint(words):
-        return _of_variance(rest)
-    if is_of_axis and rest[0] in _AXIS_OF:
-        return f"sigma_{_AXIS_OF[rest[0]]}"
+        return _of_variance(axis_tokens)
+    if is_of_axis and axis_tokens[0] in _AXIS_OF:
+        return f"sigma_{_AXIS_OF[axis_tokens[0]]}"
     if is_of_axis:
-        return "horizontal_accuracy" if rest[0] in _HORIZONTAL else "vertical_accuracy"
-    if rest == ["h"]:
+        return "horizontal_accuracy" if axis_tokens[0] in _HORIZONTAL else "vertical_accuracy"
+    if axis_tokens == ["h"]:
         return "horizontal_accuracy" if "accuracy" in words else "sigma_h"
-    if len(rest) == 1 and _is_cross(rest[0]):
-        return BESIDE
-    if not rest and (is_position or _WEAK.isdisjoint(words)):
+    if len(axis_tokens) == 1 and _is_cross(axis_tokens[0]):
+        return CROSS_COVARIANCE
+    if not axis_tokens and (is_position or _WEAK.isdisjoint(words)):
         return "position_accuracy" if is_position or "accuracy" not in words else "horizontal_accuracy"
     return None if _WEAK.issuperset(words) else UNCLEAR
 
 
-def _of_variance(rest: Sequence[str]) -> str:
+def _of_variance(axis_tokens: Sequence[str]) -> str:
     """Meaning of a variance or a covariance by the names of its axes: `ee`, `e`, `e e`, `east`."""
-    pair = list(rest[0]) if len(rest) == 1 and re.fullmatch(r"[enudxyz]{2}", rest[0]) else list(rest)
+    pair = (
+        list(axis_tokens[0])
+        if len(axis_tokens) == 1 and re.fullmatch(r"[enudxyz]{2}", axis_tokens[0])
+        else list(axis_tokens)
+    )
     axes = {_AXIS_OF.get(axis) for axis in pair}
     if None in axes or len(pair) > 2 or not axes:
         return UNCLEAR
     if len(axes) == 1:
         return f"variance_{axes.pop()}"
-    return BESIDE if axes <= {"east", "north", "up"} else UNCLEAR
+    return CROSS_COVARIANCE if axes <= {"east", "north", "up"} else UNCLEAR
 
 
 def _is_cross(token: str) -> bool:
@@ -193,10 +205,10 @@ def _may_be_of_positions(meaning: str, unit: str) -> bool:
 
     A length and an area do. An angle is refused where an axis of the place has it, as one that nobody knows.
     """
-    dimension = next((known for known in units.DIMENSIONS if _is_unit_of(unit, known)), None)
+    dimension = next((candidate for candidate in units.DIMENSIONS if _is_unit_of(unit, candidate)), None)
     if dimension in _OF_POSITIONS or dimension is None:
         return True
-    return dimension is units.ANGLE and meaning not in (UNCLEAR, BESIDE, "sigma_h", "vertical_accuracy")
+    return dimension is units.ANGLE and meaning not in (UNCLEAR, CROSS_COVARIANCE, "sigma_h", "vertical_accuracy")
 
 
 def _is_unit_of(unit: str, dimension: units.Dimension) -> bool:

@@ -5,21 +5,22 @@ Earth-fixed axes: x through Greenwich on the equator, z through the north pole. 
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
-from bisar_budget.geometry import Axes, Vector, cross, dot, unit
+from bisar_budget.arrays import PerCase
+from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2, EARTH_RADIUS_M
+from bisar_budget.geometry import Axes, Vector, Vectors, cross, dot, unit
 
 Floats = NDArray[np.float64]
 
 # NGA.STND.0036, table 3.1
 EQUATORIAL_RADIUS_M = 6378137.0  # m
-FLATTENING = 1 / 298.257223563
-ROTATION_RATE = 7.292115e-5  # rad/s
-_ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
+FLATTENING_RATIO = 1 / 298.257223563
+ROTATION_RATE_RAD_PER_S = 7.292115e-5
+_SQUARED_ECCENTRICITY_RATIO = FLATTENING_RATIO * (2 - FLATTENING_RATIO)
 _RUNGE_KUTTA_STEPS = 4
 _MAX_CHANGE_RAD = 1e-15  # a metre on the ground is 1.6e-7
 
@@ -52,22 +53,34 @@ class SceneAxes:
         turned: Floats = (earth_fixed - np.array(self.origin)) @ np.array(self.axes).T
         return turned
 
-    def turned(self, earth_fixed: Vector) -> Vector:
+    @overload
+    def turned(self, earth_fixed: Vector) -> Vector: ...
+    @overload
+    def turned(self, earth_fixed: Vectors) -> Vectors: ...
+    def turned(self, earth_fixed: Vectors) -> Vectors:
         """A direction or velocity in the scene's axes."""
         east, north, up = self.axes
         return (dot(east, earth_fixed), dot(north, earth_fixed), dot(up, earth_fixed))
 
-    def earth_fixed(self, position: Vector) -> Vector:
+    @overload
+    def earth_fixed(self, position: Vector) -> Vector: ...
+    @overload
+    def earth_fixed(self, position: Vectors) -> Vectors: ...
+    def earth_fixed(self, position: Vectors) -> Vectors:
         """A position in the scene in Earth-fixed axes. [m]"""
         x, y, z = self.turned_back(position)
         return (x + self.origin[0], y + self.origin[1], z + self.origin[2])
 
-    def turned_back(self, vector: Vector) -> Vector:
+    @overload
+    def turned_back(self, vector: Vector) -> Vector: ...
+    @overload
+    def turned_back(self, vector: Vectors) -> Vectors: ...
+    def turned_back(self, vector: Vectors) -> Vectors:
         """A direction or velocity of the scene in Earth-fixed axes."""
         x, y, z = (dot(axis, vector) for axis in zip(*self.axes, strict=True))
         return (x, y, z)
 
-    def radial(self, position: Vector, velocity: Vector) -> Axes:
+    def radial(self, position: Vectors, velocity: Vectors) -> Axes:
         """Axes of the `ric` frame of a platform, in the scene's axes.
 
         Radial: away from the Earth's centre. Cross-track: normal of the plane of the position and of the velocity
@@ -76,13 +89,17 @@ class SceneAxes:
         """
         r = self.earth_fixed(position)
         x, y, z = self.turned_back(velocity)
-        against_stars = (x - ROTATION_RATE * r[1], y + ROTATION_RATE * r[0], z)
+        against_stars = (x - ROTATION_RATE_RAD_PER_S * r[1], y + ROTATION_RATE_RAD_PER_S * r[0], z)
         radial = unit(r)
         across = unit(cross(r, against_stars))
         return self.turned(radial), self.turned(cross(across, radial)), self.turned(across)
 
 
-def free_fall(position: Vector, velocity: Vector, axes: SceneAxes | None) -> Vector:
+@overload
+def free_fall(position: Vector, velocity: Vector, axes: SceneAxes | None) -> Vector: ...
+@overload
+def free_fall(position: Vectors, velocity: Vectors, axes: SceneAxes | None) -> Vectors: ...
+def free_fall(position: Vectors, velocity: Vectors, axes: SceneAxes | None) -> Vectors:
     """Acceleration of a body in free fall, in the axes of a scene. [m/s²]
 
     Parameters
@@ -100,36 +117,36 @@ def free_fall(position: Vector, velocity: Vector, axes: SceneAxes | None) -> Vec
     """
     if axes is None:
         x, y, up = position
-        z = up + EARTH_RADIUS
-        factor = -EARTH_GRAVITATIONAL_PARAMETER / (x * x + y * y + z * z) ** 1.5
+        z = up + EARTH_RADIUS_M
+        factor = -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / (x * x + y * y + z * z) ** 1.5
         return (factor * x, factor * y, factor * z)
     x, y, z = axes.earth_fixed(position)
     u, v, _ = axes.turned_back(velocity)
     square = x * x + y * y + z * z
-    factor = -EARTH_GRAVITATIONAL_PARAMETER / square**1.5
+    factor = -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / square**1.5
     flat, polar = 1.5 * J2_FACTOR * EQUATORIAL_RADIUS_M**2 / square, z * z / square
-    level = factor * (1 + flat * (1 - 5 * polar)) + ROTATION_RATE**2
+    level = factor * (1 + flat * (1 - 5 * polar)) + ROTATION_RATE_RAD_PER_S**2
     return axes.turned(
         (
-            level * x + 2 * ROTATION_RATE * v,
-            level * y - 2 * ROTATION_RATE * u,
+            level * x + 2 * ROTATION_RATE_RAD_PER_S * v,
+            level * y - 2 * ROTATION_RATE_RAD_PER_S * u,
             factor * (1 + flat * (3 - 5 * polar)) * z,
         )
     )
 
 
-def earth_fixed_places(latitude: Any, longitude: Any, height: Any) -> Floats:
+def earth_fixed_places(latitude: PerCase, longitude: PerCase, height: PerCase) -> Floats:
     """Earth-fixed coordinates (..., 3) [m] of geodetic places, each (...), [rad], [rad], [m]."""
     sine, cosine = np.sin(latitude), np.cos(latitude)
     _, normal = curvature_radii(sine)
     level = (normal + height) * cosine
-    polar = (normal * (1 - _ECCENTRICITY_SQUARED) + height) * sine
+    polar = (normal * (1 - _SQUARED_ECCENTRICITY_RATIO) + height) * sine
     return np.stack([level * np.cos(longitude), level * np.sin(longitude), polar], axis=-1)
 
 
-def earth_fixed(place: Geodetic) -> Vector:
-    """Earth-fixed coordinates of a geodetic place, or of those of many cases. [m]"""
-    return _vector(earth_fixed_places(*np.broadcast_arrays(*place)))
+def earth_fixed(position: Geodetic) -> Vector:
+    """Earth-fixed coordinates of a geodetic position, or of positions of many cases. [m]"""
+    return _vector(earth_fixed_places(*np.broadcast_arrays(*position)))
 
 
 def _vector(coordinates: Floats) -> Vector:
@@ -138,13 +155,13 @@ def _vector(coordinates: Floats) -> Vector:
     return (x, y, z)
 
 
-def curvature_radii(sine: Any) -> tuple[Any, Any]:
+def curvature_radii(sine: PerCase) -> tuple[PerCase, PerCase]:
     """Radii of curvature along the meridian and across it, by the sine of the latitude. [m]"""
-    across = EQUATORIAL_RADIUS_M / np.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
-    return across**3 * (1 - _ECCENTRICITY_SQUARED) / EQUATORIAL_RADIUS_M**2, across
+    across = EQUATORIAL_RADIUS_M / np.sqrt(1 - _SQUARED_ECCENTRICITY_RATIO * sine * sine)
+    return across**3 * (1 - _SQUARED_ECCENTRICITY_RATIO) / EQUATORIAL_RADIUS_M**2, across
 
 
-def geodetic_places(points: Floats) -> tuple[Any, Any, Any]:
+def geodetic_places(points: Floats) -> tuple[Floats, Floats, Floats]:
     """Latitude and longitude [rad] and height [m] of Earth-fixed coordinates (..., 3), each (...).
 
     Bowring's iteration, on the reduced latitude; for places more than a few kilometres from the Earth's centre.
@@ -152,19 +169,21 @@ def geodetic_places(points: Floats) -> tuple[Any, Any, Any]:
     x, y, z = np.moveaxis(points, -1, 0)
     level = np.hypot(x, y)
     with np.errstate(divide="ignore", invalid="ignore"):
-        tangent = np.where(level > 0, z / (level * (1 - FLATTENING)), np.copysign(np.inf, z))
+        tangent = np.where(level > 0, z / (level * (1 - FLATTENING_RATIO)), np.copysign(np.inf, z))
     latitude = np.arctan2(z, level)
     for _ in range(10):
         reduced = np.arctan(tangent)
-        up = z + _ECCENTRICITY_SQUARED / (1 - FLATTENING) * EQUATORIAL_RADIUS_M * np.sin(reduced) ** 3
-        out = level - _ECCENTRICITY_SQUARED * EQUATORIAL_RADIUS_M * np.cos(reduced) ** 3
+        up = z + _SQUARED_ECCENTRICITY_RATIO / (1 - FLATTENING_RATIO) * EQUATORIAL_RADIUS_M * np.sin(reduced) ** 3
+        out = level - _SQUARED_ECCENTRICITY_RATIO * EQUATORIAL_RADIUS_M * np.cos(reduced) ** 3
         previous, latitude = latitude, np.arctan2(up, out)
         if np.max(np.abs(latitude - previous)) < _MAX_CHANGE_RAD:
             break
-        tangent = (1 - FLATTENING) * np.tan(latitude)
+        tangent = (1 - FLATTENING_RATIO) * np.tan(latitude)
     sine = np.sin(latitude)
     height = (
-        level * np.cos(latitude) + z * sine - EQUATORIAL_RADIUS_M * np.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
+        level * np.cos(latitude)
+        + z * sine
+        - EQUATORIAL_RADIUS_M * np.sqrt(1 - _SQUARED_ECCENTRICITY_RATIO * sine * sine)
     )
     return latitude, np.arctan2(y, x), height
 
@@ -175,7 +194,7 @@ def geodetic(point: Vector) -> Geodetic:
     return Geodetic(latitude, longitude, height)
 
 
-def _directions(latitude: Any, longitude: Any) -> Floats:
+def _directions(latitude: PerCase, longitude: PerCase) -> Floats:
     """East, north and up (3, ..., 3) at places, each (...)."""
     sine, cosine, zero = np.sin(latitude), np.cos(latitude), np.zeros_like(longitude)
     sine_l, cosine_l = np.sin(longitude), np.cos(longitude)
@@ -185,18 +204,23 @@ def _directions(latitude: Any, longitude: Any) -> Floats:
     return np.stack([np.stack(direction, axis=-1) for direction in (east, north, up)])
 
 
-def axes_at(place: Geodetic) -> SceneAxes:
-    """East, north and up at a place, or at those of many cases."""
-    east, north, up = map(_vector, _directions(*np.broadcast_arrays(place.latitude, place.longitude)))
-    return SceneAxes(earth_fixed(place), (east, north, up))
+def axes_at_places(latitude: Floats, longitude: Floats) -> Floats:
+    """East, north and up at places, each (n,): (3, 3, n), by axis, Earth-fixed component and place."""
+    return np.ascontiguousarray(np.moveaxis(_directions(latitude, longitude), -1, 1))
 
 
-def flown(place: Geodetic, heading: float, speed: float, climb: float, times_s: Any) -> Floats:
-    """Earth-fixed places (..., 3) after flights along the geodesic, at a height that `climb` changes. [m]
+def axes_at(position: Geodetic) -> SceneAxes:
+    """East, north and up at a position, or at positions of many cases."""
+    east, north, up = map(_vector, _directions(*np.broadcast_arrays(position.latitude, position.longitude)))
+    return SceneAxes(earth_fixed(position), (east, north, up))
+
+
+def flown(position: Geodetic, heading: float, speed: float, climb: float, times_s: PerCase) -> Floats:
+    """Earth-fixed positions (..., 3) after flights along the geodesic, at a height that `climb` changes. [m]
 
     Parameters
     ----------
-    place : Geodetic
+    position : Geodetic
         At the beginning.
     heading : float
         There, from north, clockwise. [rad]
@@ -210,7 +234,7 @@ def flown(place: Geodetic, heading: float, speed: float, climb: float, times_s: 
     Derived here. The direction turns with the ellipsoid's normal alone, at speed over radius of curvature, which is
     Euler's formula. Runge and Kutta's fourth order, in Earth-fixed axes: there a pole is a place like others.
     """
-    axes = axes_at(place)
+    axes = axes_at(position)
     start = np.array(axes.origin)
     step = np.asarray(times_s, dtype=float)[..., None] / _RUNGE_KUTTA_STEPS
 
@@ -233,5 +257,5 @@ def flown(place: Geodetic, heading: float, speed: float, climb: float, times_s: 
         rates_3 = rates(state + step / 2 * rates_2)
         rates_4 = rates(state + step * rates_3)
         state = state + step / 6 * (rates_1 + 2 * rates_2 + 2 * rates_3 + rates_4)
-    places: Floats = start + state[0]
-    return places
+    positions: Floats = start + state[0]
+    return positions

@@ -20,14 +20,13 @@ from calendar import isleap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 from bisar_budget.extras import install_command
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.accuracy import EpochCovariance, StatedAccuracy, stated_of_orbit
 from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample, interpolate
-from bisar_budget.paths.instant import DAY, Instant, day_of_year, later, tai, tai_less_utc
+from bisar_budget.paths.instant import DAY_S, Instant, day_of_year, later, tai, tai_less_utc
 from bisar_budget.paths.messages import (
     FIRST_ORBIT_DAY,
     LAST_ORBIT_DAY,
@@ -120,7 +119,7 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
     except ImportError:
         raise PathFileError(f"{elements.where}: needs the package sgp4: {install_command('orbits')}") from None
     satellite = Satrec()
-    epoch = elements.epoch.day - _SGP4_EPOCH_DAY + elements.epoch.seconds / DAY
+    epoch = elements.epoch.day - _SGP4_EPOCH_DAY + elements.epoch.seconds / DAY_S
     # SGP4 does not use the derivatives of the mean motion, nor the catalogue number.
     shape = (elements.eccentricity, elements.perigee, elements.inclination, elements.anomaly)
     satellite.sgp4init(WGS72, "i", 0, epoch, elements.drag, 0.0, 0.0, *shape, elements.mean_motion, elements.node)
@@ -129,7 +128,7 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
 
     def place(instant: Instant) -> Vector:
         elapsed = instant.since(elements.epoch) + tai_less_utc(instant.day) - tai_less_utc(elements.epoch.day)
-        if abs(elapsed) > _MAX_AGE_DAYS * DAY:
+        if abs(elapsed) > _MAX_AGE_DAYS * DAY_S:
             raise PathFileError(
                 f"{elements.where}: the elements of {elements.object} are of {elements.epoch.as_text()}, more than a"
                 " century from the aperture"
@@ -202,12 +201,12 @@ def orbit_of(
     inertial(elements.epoch)  # raises now if SGP4 refuses the elements
 
     def doubt(instant: Instant) -> PathDoubt:
-        days = abs(instant.since(elements.epoch)) / DAY
+        days = abs(instant.since(elements.epoch)) / DAY_S
         words = f"elements {days:.3g} days from their epoch: {_EPOCH_ERROR_KM} km there, {_DAILY_ERROR_KM:g} km a day"
         return PathDoubt(1e3 * (_EPOCH_ERROR_KM + _DAILY_ERROR_KM * days), words)
 
     def doubts(instant: Instant) -> Sequence[str]:
-        days = instant.since(elements.epoch) / DAY
+        days = instant.since(elements.epoch) / DAY_S
         if abs(days) <= _MAX_FRESH_DAYS:
             return ()
         smallest_km, largest_km = (_EPOCH_ERROR_KM + abs(days) * daily_km for daily_km in _DAILY_ERRORS_KM)
@@ -409,7 +408,7 @@ def _epoch(line: str, location: str) -> Instant:
     julian_day = day_of_year(year, int(day))
     if julian_day is None:
         raise PathFileError(f"{location}: {quantity} must be from 1 to {365 + isleap(year)} (got {day}.{fraction})")
-    return Instant(julian_day, float(f"0.{fraction}") * DAY)
+    return Instant(julian_day, float(f"0.{fraction}") * DAY_S)
 
 
 def _drag(line: str, location: str) -> float:
@@ -430,7 +429,7 @@ class _Message:
     """Keywords and values of a message, the fault of its form, and whether it must have all mandatory keywords."""
 
     where: str
-    leaves: Mapping[str, Any]
+    leaves: Mapping[str, object]
     problem: str = ""
     is_complete: bool = False  # by the standard; JSON and CSV of CelesTrak leave out keywords with one possible value
 
@@ -552,7 +551,7 @@ _COVARIANCE_KEYWORD = re.compile(r"C[XYZ](_DOT)?_[XYZ](_DOT)?", re.ASCII)
 
 
 def _covariance(
-    record: Mapping[str, Any], epoch: Instant, orientation: Orientation, location: str
+    record: Mapping[str, object], epoch: Instant, orientation: Orientation, location: str
 ) -> EpochCovariance | None:
     """The covariance that a message states at the epoch of its elements; None for a message without covariance."""
     elements = {key: str(value).strip() for key, value in record.items() if _COVARIANCE_KEYWORD.fullmatch(key)}
@@ -563,14 +562,14 @@ def _covariance(
     return read_covariance(block, tai(epoch), "TEME", orientation, location)
 
 
-def _value(record: Mapping[str, Any], key: str, location: str) -> Any:
+def _value(record: Mapping[str, object], key: str, location: str) -> object:
     value = record.get(key)
     if value is None or value == "":
         raise PathFileError(f"{location}: has no {key}")
     return value
 
 
-def _from_message(record: Mapping[str, Any], location: str) -> Elements:
+def _from_message(record: Mapping[str, object], location: str) -> Elements:
     for key, accepted in _ACCEPTED_VALUES.items():
         value = record.get(key)
         if value not in (None, "") and str(value).strip().upper() not in accepted:

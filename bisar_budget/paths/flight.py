@@ -10,7 +10,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
@@ -19,19 +19,19 @@ from numpy.typing import NDArray
 from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
 from bisar_budget.paths.accuracy import Matrix, PathNoise, StatedAccuracy, as_matrix
 from bisar_budget.paths.earth import Floats
-from bisar_budget.paths.instant import DAY, Instant, gps_week
-from bisar_budget.paths.splines import ORDER, SplineFit
+from bisar_budget.paths.instant import DAY_S, Instant, gps_week
+from bisar_budget.paths.splines import SPLINE_ORDER, SplineFit
 from bisar_budget.paths.splines import basis as spline_basis
 
-_INTERPOLATION_NODES = 15  # Chebyshev points of an interpolation
+_CHEBYSHEV_NODES = 15  # of an interpolation
 _MIN_WINDOW_S = 10.0  # in a shorter window the rounding of an Earth-fixed position, 1e-9 m, is an acceleration
 _MAX_INTERPOLATION_ERROR_M = (
     5e-3  # farther from its polynomial, a path is not smooth; messages have positions to 1 mm
 )
 _ROUNDING_M = 1e-7  # a coefficient that moves the path by less is rounding
-_ROUNDING_FACTOR = 1 + 1e-6  # on an interval whose ends are rounded
-_MAX_GAP_RATIO = 5  # of a gap between fixes to the median interval
-_NAMED_TRACKS = 3  # tracks that an error names
+_INTERVAL_ROUNDING_FACTOR = 1 + 1e-6  # on an interval whose ends are rounded
+_MAX_FIX_GAP_RATIO = 5  # of a gap between fixes to the median interval
+_LISTED_TRACK_COUNT = 3  # in an error
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class SmoothingSettings:
     min_stray_m: float = 1e-3
 
 
-_SETTINGS = SmoothingSettings()
+_SMOOTHING = SmoothingSettings()
 
 
 NO_MATRIX: Matrix = ((0.0,) * 3,) * 3
@@ -310,12 +310,12 @@ def interpolated(
         Longest time around the middle in which positions are known. [s]
     """
     half = min(max(aperture_time_s, _MIN_WINDOW_S), widest_s) / 2
-    nodes = chebyshev.chebpts1(_INTERPOLATION_NODES)
-    basis = chebyshev.chebvander(nodes, _INTERPOLATION_NODES - 1)
+    nodes = chebyshev.chebpts1(_CHEBYSHEV_NODES)
+    basis = chebyshev.chebvander(nodes, _CHEBYSHEV_NODES - 1)
     series: Floats = np.asarray(np.linalg.solve(basis, positions_at(half * nodes)), dtype=float)
     series[np.abs(series) <= _ROUNDING_M] = 0.0  # high powers of the window would magnify rounding
     state = path_of(powers_of(series, half, chebyshev.cheb2poly))
-    times = aperture_time_s / 2 * np.cos(math.pi * np.arange(_INTERPOLATION_NODES + 1) / _INTERPOLATION_NODES)
+    times = aperture_time_s / 2 * np.cos(math.pi * np.arange(_CHEBYSHEV_NODES + 1) / _CHEBYSHEV_NODES)
     distances = np.linalg.norm(np.stack(state.place(times), axis=1) - positions_at(times), axis=1)
     farthest, rms = float(distances.max()), math.sqrt(float(np.mean(distances**2)))
     doubts: tuple[str, ...] = ()
@@ -329,7 +329,7 @@ def stretch_around(times: Floats, aperture_time_s: float) -> float:
 
     The time is the aperture, or longer until it holds nine fixes: a log at 1 Hz has three fixes in 3 s.
     """
-    distances = np.sort(np.abs(times))[: _SETTINGS.noise_fixes]
+    distances = np.sort(np.abs(times))[: _SMOOTHING.noise_fixes]
     return max(aperture_time_s, 2 * float(distances.max(initial=0.0)))
 
 
@@ -369,7 +369,7 @@ class _SmoothFit:
 
     @property
     def order(self) -> int:
-        return len(self.series) - 1 if self.spline is None else ORDER
+        return len(self.series) - 1 if self.spline is None else SPLINE_ORDER
 
     @property
     def pieces(self) -> int:
@@ -423,7 +423,7 @@ class _SmoothFit:
 
     def sample_times(self, aperture_time_s: float) -> Floats:
         """Slow times over an aperture at which the error of the path is sampled. [s]"""
-        count = max(_SETTINGS.min_samples, _SETTINGS.samples_per_piece * self.pieces + 1)
+        count = max(_SMOOTHING.min_samples, _SMOOTHING.samples_per_piece * self.pieces + 1)
         return np.asarray(aperture_time_s / 2 * np.linspace(-1, 1, count))
 
     def noise(self, times: Floats, left_out: Floats) -> float:
@@ -451,12 +451,13 @@ class _SmoothFit:
     def path_noise(self, aperture_time_s: float, excess: float) -> PathNoise:
         """The error of the path over the aperture by noise of the fixes, with its variance times `excess`."""
         sample_times, half_s = self.sample_times(aperture_time_s), aperture_time_s / 2
-        through = np.linalg.pinv(legendre.legvander(sample_times / half_s, _SETTINGS.max_order)) @ self.basis(
+        through = np.linalg.pinv(legendre.legvander(sample_times / half_s, _SMOOTHING.max_order)) @ self.basis(
             sample_times
         )
         shapes, sizes, _ = np.linalg.svd(through @ self.root, full_matrices=False)
         shapes = (
-            shapes[:, sizes > _SETTINGS.mode_fraction * sizes[0]] * sizes[sizes > _SETTINGS.mode_fraction * sizes[0]]
+            shapes[:, sizes > _SMOOTHING.mode_fraction * sizes[0]]
+            * sizes[sizes > _SMOOTHING.mode_fraction * sizes[0]]
         )
         sigmas = np.sqrt(excess * len(self.residuals) / self.independent * self.variances)
         modes = []
@@ -485,7 +486,7 @@ def _fit(times: Floats, log_positions: Floats, half_s: float, *, may_have_pieces
     inside = np.abs(times) <= half_s * (1 + 1e-9)
     times_inside, positions, count = times[inside], log_positions[inside], int(inside.sum())
     normalised_times = times_inside / half_s
-    max_order = min(_SETTINGS.max_order, (count - 1) // 2)
+    max_order = min(_SMOOTHING.max_order, (count - 1) // 2)
     fits = [least_squares(normalised_times, positions, order) for order in range(2, max_order + 1)]
     independent = _independent(fits[-1][1])
     series, residuals = min(fits, key=lambda fit: _information(fit[1], len(fit[0]), independent))
@@ -501,13 +502,13 @@ def _in_pieces(fit: _SmoothFit, positions: Floats) -> _SmoothFit:
     """
     best = newest = fit
     edges: Floats | None = np.array([-fit.half_s, fit.half_s])
-    while edges is not None and best.rms > _SETTINGS.clean_rms_m:
+    while edges is not None and best.rms > _SMOOTHING.clean_rms_m:
         motion, motion_sigma = newest.common_motion
-        if motion <= _SETTINGS.white_sigmas * motion_sigma:
+        if motion <= _SMOOTHING.white_sigmas * motion_sigma:
             break
-        coefficients = len(edges) - 1 + ORDER
-        tried_coefficients = max(_SETTINGS.tried_coefficients, _SETTINGS.tried_ratio * len(best.series))
-        max_coefficients = min(tried_coefficients, _SETTINGS.max_pieces + ORDER, len(positions) // 2)
+        coefficients = len(edges) - 1 + SPLINE_ORDER
+        tried_coefficients = max(_SMOOTHING.tried_coefficients, _SMOOTHING.tried_ratio * len(best.series))
+        max_coefficients = min(tried_coefficients, _SMOOTHING.max_pieces + SPLINE_ORDER, len(positions) // 2)
         if coefficients > max_coefficients:
             break
         spline = SplineFit.of(fit.times, positions, edges)
@@ -540,17 +541,17 @@ def _widened(
     line_projection, no_projection = straight @ straight.T, np.zeros((sample_times.size, sample_times.size))
     projections = (line_projection, no_projection)  # for the error beyond a straight line, and for the whole error
     max_half_s = min(
-        widest_s / 2, max(abs(float(times[0])), abs(float(times[-1]))), _SETTINGS.widest_ratio * narrowest.half_s
+        widest_s / 2, max(abs(float(times[0])), abs(float(times[-1]))), _SMOOTHING.widest_ratio * narrowest.half_s
     )
     if has_pieces:  # noise of distant fixes does not reach the aperture: only its ends gain
-        max_half_s = min(max_half_s, _SETTINGS.stretch_ratio * narrowest.half_s)
+        max_half_s = min(max_half_s, _SMOOTHING.stretch_ratio * narrowest.half_s)
     half_s = narrowest.half_s
     candidates = [(narrowest, [narrowest.noise(sample_times, projection) for projection in projections])]
     best, least_error = narrowest, candidates[0][1][0]
     residual = _residual_within(narrowest, aperture_time_s)
-    while least_error > _SETTINGS.negligible_noise_m**2 and half_s < max_half_s * (1 - 1e-9):
-        half_s = min(half_s * _SETTINGS.stretch_ratio, max_half_s)
-        if np.searchsorted(times, half_s, "right") - np.searchsorted(times, -half_s) > _SETTINGS.max_fitted_fixes:
+    while least_error > _SMOOTHING.negligible_noise_m**2 and half_s < max_half_s * (1 - 1e-9):
+        half_s = min(half_s * _SMOOTHING.stretch_ratio, max_half_s)
+        if np.searchsorted(times, half_s, "right") - np.searchsorted(times, -half_s) > _SMOOTHING.max_fitted_fixes:
             break
         fit = _fit(times, positions, half_s, may_have_pieces=has_pieces)
         noises = [fit.noise(sample_times, projection) for projection in projections]
@@ -559,12 +560,12 @@ def _widened(
             differences = fit.places(sample_times) - candidate.places(sample_times)
             for index, projection in enumerate(projections):
                 square = float(np.mean(np.sum((differences - projection @ differences) ** 2, axis=1)))
-                chance = _SETTINGS.chance_factor * max(candidate_noises[index] - noises[index], 0.0)
+                chance = _SMOOTHING.chance_factor * max(candidate_noises[index] - noises[index], 0.0)
                 smears[index] = max(smears[index], square - chance)
         candidates.append((fit, noises))
         errors = [noise + smear for noise, smear in zip(noises, smears, strict=True)]
-        grows = _residual_within(fit, aperture_time_s) > _SETTINGS.residual_ratio**2 * residual
-        if grows or errors[0] > _SETTINGS.hopeless_ratio * least_error:
+        grows = _residual_within(fit, aperture_time_s) > _SMOOTHING.residual_ratio**2 * residual
+        if grows or errors[0] > _SMOOTHING.hopeless_ratio * least_error:
             break
         if errors[0] < least_error and errors[1] <= candidates[0][1][1]:
             best, least_error = fit, errors[0]
@@ -575,7 +576,7 @@ def _widened(
 def _residual_within(fit: _SmoothFit, aperture_time_s: float) -> float:
     """Mean square of the residuals in the aperture, or of all residuals if the aperture has too few fixes. [m²]"""
     inside = np.abs(fit.times) <= aperture_time_s / 2 * (1 + 1e-9)
-    residuals = fit.residuals[inside] if inside.sum() >= _SETTINGS.noise_fixes else fit.residuals
+    residuals = fit.residuals[inside] if inside.sum() >= _SMOOTHING.noise_fixes else fit.residuals
     count, coefficients = len(fit.residuals), len(fit.series)
     return float(np.mean(np.sum(residuals**2, axis=1))) * count / max(count - coefficients, 1)
 
@@ -619,9 +620,9 @@ def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s:
     """
     half = stretch_around(times, aperture_time_s) / 2
     count = int((np.abs(times) <= half * (1 + 1e-9)).sum())
-    if count < _SETTINGS.min_fixes:
+    if count < _SMOOTHING.min_fixes:
         raise PathFileError(
-            f"has {count} fixes around the aperture of {aperture_time_s:g} s, at least {_SETTINGS.min_fixes} are "
+            f"has {count} fixes around the aperture of {aperture_time_s:g} s, at least {_SMOOTHING.min_fixes} are "
             "needed; keep more of the log"
         )
     fit, excess = _widened(
@@ -632,7 +633,7 @@ def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s:
     distances = np.linalg.norm(residuals, axis=1)
     farthest, median_distance = float(distances.max()), float(np.median(distances))
     doubts: tuple[str, ...] = ()
-    if farthest > _SETTINGS.stray_ratio * median_distance + _SETTINGS.min_stray_m:
+    if farthest > _SMOOTHING.stray_ratio * median_distance + _SMOOTHING.min_stray_m:
         stray_time = float(times_used[distances.argmax()])
         doubts = (
             f"a fix of the log, {stray_time:+.4g} s from mid-aperture, is {farthest:.3g} m from the smooth path; "
@@ -732,7 +733,7 @@ def slow_times(
     steps = np.diff(near_times)
     # A gap that is as long as the aperture is the only step in it, so the median step of the log counts too.
     usual_step = min(float(np.median(steps)), float(np.median(np.diff(slow)))) if steps.size else 0.0
-    longest_step = usual_step * _ROUNDING_FACTOR
+    longest_step = usual_step * _INTERVAL_ROUNDING_FACTOR
     if slow[0] > -half + longest_step or slow[-1] < half - longest_step:
         is_own_clock = start is None and center_seconds is None
         raise PathFileError(
@@ -741,11 +742,11 @@ def slow_times(
             + cause(0 if slow[0] > -half + longest_step else len(slow)),
             hint="trajectory.center says which time of the log is the middle of the aperture" if is_own_clock else "",
         )
-    if steps.size and steps.max() > _MAX_GAP_RATIO * longest_step:
+    if steps.size and steps.max() > _MAX_FIX_GAP_RATIO * longest_step:
         gap = int(steps.argmax())
         raise PathFileError(
             f"{name}: has a gap of {steps[gap]:.4g} s after {time_text(float(near_times[gap]))}, in the aperture; "
-            f"{usual_step:.4g} s is usual, at most {_MAX_GAP_RATIO * usual_step:.4g} s are bridged"
+            f"{usual_step:.4g} s is usual, at most {_MAX_FIX_GAP_RATIO * usual_step:.4g} s are bridged"
             + cause(int(np.searchsorted(slow, near_times[gap], "right")))
         )
     return slow
@@ -775,7 +776,7 @@ def dated(log: Log, center: Instant | None) -> Log:
     if log.clock != "day" or log.start is not None or center is None:
         return log
     middle_time = float(log.times[len(log.times) // 2])
-    midnight = Instant(center.day + round((center.seconds - middle_time) / DAY), 0.0)
+    midnight = Instant(center.day + round((center.seconds - middle_time) / DAY_S), 0.0)
     words = f"{log.words}, date by collection.center_time: {midnight.as_text()[:10]}"
     return replace(log, start=midnight, words=words)
 
@@ -805,16 +806,16 @@ def track_around(
     if len(covering) == 1:
         return covering[0]
     if covering:
-        ellipsis = "; …" * (len(covering) > _NAMED_TRACKS)
-        listed = "; ".join(track.words for track in covering[:_NAMED_TRACKS]) + ellipsis
+        ellipsis = "; …" * (len(covering) > _LISTED_TRACK_COUNT)
+        listed = "; ".join(track.words for track in covering[:_LISTED_TRACK_COUNT]) + ellipsis
         raise PathFileError(
             f"{name}: has {len(covering)} tracks that cover the aperture: {listed}",
             "accepted: trajectory.track: the name or the number of one",
         )
     raise PathFileError(
         f"{name}: has {len(log.tracks)} tracks, and none covers the aperture; "
-        + "; ".join(fault.removeprefix(f"{name}: ") for fault in faults[:_NAMED_TRACKS])
-        + "; …" * (len(faults) > _NAMED_TRACKS)
+        + "; ".join(fault.removeprefix(f"{name}: ") for fault in faults[:_LISTED_TRACK_COUNT])
+        + "; …" * (len(faults) > _LISTED_TRACK_COUNT)
     )
 
 
@@ -865,7 +866,9 @@ def widest_stretch(log: Log, times: Floats, aperture_time_s: float) -> float:
     """
     steps = np.diff(times)
     is_gap = (
-        steps > _MAX_GAP_RATIO * _ROUNDING_FACTOR * float(np.median(steps)) if steps.size else np.zeros(0, dtype=bool)
+        steps > _MAX_FIX_GAP_RATIO * _INTERVAL_ROUNDING_FACTOR * float(np.median(steps))
+        if steps.size
+        else np.zeros(0, dtype=bool)
     )
     earlier, later = times[:-1][is_gap], times[1:][is_gap]
     if log.left_out is not None:
@@ -873,7 +876,7 @@ def widest_stretch(log: Log, times: Floats, aperture_time_s: float) -> float:
         earlier = np.concatenate([earlier, edges[log.left_out.before]])
         later = np.concatenate([later, edges[log.left_out.before + 1]])
     # A fix at the edge of a gap is left out too, so that rounding cannot put it inside.
-    reach = np.maximum(earlier, -later) / _ROUNDING_FACTOR
+    reach = np.maximum(earlier, -later) / _INTERVAL_ROUNDING_FACTOR
     return max(stretch_around(times, aperture_time_s), 2 * float(reach.min(initial=np.inf)))
 
 
@@ -911,7 +914,9 @@ def least_squares(normalised_times: Floats, positions: Floats, order: int) -> tu
     return coefficients, positions - basis @ coefficients
 
 
-def powers_of(coefficients: Floats, half_s: float, convert: Callable[..., Any] = legendre.leg2poly) -> Floats:
+def powers_of(
+    coefficients: Floats, half_s: float, convert: Callable[[Floats], NDArray[np.floating]] = legendre.leg2poly
+) -> Floats:
     """Coefficients (order + 1, 3) of τ⁰, τ¹, … of a series over -`half_s` … `half_s`. [m], [m/s], …
 
     `convert` turns coefficients of the series into coefficients of powers; omitted: from a Legendre series.

@@ -21,17 +21,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Any, NamedTuple, NoReturn
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, fault_words, shown
-from bisar_budget.paths.accuracy_columns import ACCEPTED, BESIDE, UNCLEAR, meaning_of
-from bisar_budget.paths.earth import Floats, Geodetic, axes_at, earth_fixed_places, geodetic_places
+from bisar_budget.paths.accuracy_columns import ACCEPTED_ACCURACIES, CROSS_COVARIANCE, UNCLEAR, meaning_of
+from bisar_budget.paths.earth import Floats, axes_at_places, earth_fixed_places, geodetic_places
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
-from bisar_budget.paths.instant import DAY, GPS_EPOCH_DAY, SCALES, WEEK_S, Instant, parse_instant
+from bisar_budget.paths.instant import DAY_S, GPS_EPOCH_DAY, SCALES, WEEK_S, Instant, parse_instant
 from bisar_budget.paths.log_places import (
     NO_KEYS,
     LogKeys,
@@ -56,19 +56,21 @@ _CHUNK_LINES = 1 << 16  # lines that are text and numbers at once
 _FARTHEST_M = 1e9  # of a place; beyond the Moon
 _LATEST_S = 1e11  # of a time; 3000 years, so that Unix time is one
 _DEEPEST_M = 6.2e6  # m from the Earth's centre; the poles are at 6.357e6
-_RIGHT_ANGLE = math.pi / 2 * (1 + 1e-12)  # 90 deg, rounded
+_MAX_LATITUDE_RAD = math.pi / 2 * (1 + 1e-12)  # 90 deg, rounded
 _GEODETIC = ("latitude", "longitude", "height")
-_KINDS = (_GEODETIC, ("x", "y", "z"), ("east", "north", "up"))
+_POSITION_COLUMNS = (_GEODETIC, ("x", "y", "z"), ("east", "north", "up"))
 _STAMPS = {"utc": "utc", "gpst": "gps", "gps": "gps", "tai": "tai"}  # names of columns, or units of a time
 _SPARE = ("altitude", "geoid_separation")
-_LEVEL = ("horizontal_accuracy", "vertical_accuracy")
+_LEVEL_ACCURACIES = ("horizontal_accuracy", "vertical_accuracy")
 _TOTAL = "position_accuracy"  # without a direction: along any axis
-_SIGMAS = tuple(tuple(f"sigma_{axis}" for axis in kind) for kind in (_KINDS[2], _KINDS[1]))
+_SIGMA_COLUMNS = tuple(
+    tuple(f"sigma_{axis}" for axis in kind) for kind in (_POSITION_COLUMNS[2], _POSITION_COLUMNS[1])
+)
 _VARIANCE = "variance_"
-_NOT_GIVEN = frozenset(("", "nan", "n/a", "na", "null", "none", "-", "--"))
+_EMPTY_CELLS = frozenset(("", "nan", "n/a", "na", "null", "none", "-", "--"))
 _NO_NUMBER = -math.inf  # of a cell of an accuracy that cannot be read
-_DIMENSIONS = {"latitude": units.ANGLE, "longitude": units.ANGLE, "time": units.TIME}
-_HEADER = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?")
+_COLUMN_DIMENSIONS = {"latitude": units.ANGLE, "longitude": units.ANGLE, "time": units.TIME}
+_COLUMN_HEADER_PATTERN = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?")
 _QUOTED = re.compile('"').search
 _IN_NUMBERS = b"0123456789+-.eE \t"
 _SECOND = r"(?:[0-5]\d(?:[.,]\d{1,12})?|60(?:[.,]0{1,12})?)"  # 60.00 is what 59.996 is rounded to
@@ -76,7 +78,7 @@ _ZONED = re.compile(_SECOND + r"(?:Z|\+00:?00)", re.ASCII).fullmatch
 _BARE = re.compile(_SECOND, re.ASCII).fullmatch
 _EITHER = re.compile(_SECOND + r"(?:Z|\+00:?00)?", re.ASCII).fullmatch
 _DATUM = re.compile(r"#\W*(?:geodetic )?(?:datum|crs|reference (?:frame|system))\s*[:=]\s*(\S.*)", re.IGNORECASE)
-_LEAST_SEARCHED = 64  # rows that are looked at one by one
+_MAX_SCANNED_ROWS = 64  # looked at one by one
 _EXAMPLE = "2026-06-01T05:20:31.250Z"
 _CLOCKS_APART_S = 1.0  # of an exporter's two clocks, beyond the second to which one is written
 
@@ -91,7 +93,7 @@ class _Column(NamedTuple):
     name: str
     unit: str = ""
     scale: float = 1.0
-    place: int = -1
+    cell_index: int = -1
 
 
 class _Vendor(NamedTuple):
@@ -136,9 +138,9 @@ class _Header:
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the three coordinates."""
-        return next((kind for kind in _KINDS if kind[1] in self.names), _GEODETIC)
+        return next((kind for kind in _POSITION_COLUMNS if kind[1] in self.names), _GEODETIC)
 
-    def place(self, name: str) -> int | None:
+    def index_of(self, name: str) -> int | None:
         """Place of a column in a table; None where there is none."""
         return self.names.index(name) if name in self.names else None
 
@@ -158,10 +160,10 @@ class _Table(NamedTuple):
 def is_csv(data: bytes) -> bool:
     """Whether the first line that says something names columns of places."""
     head = data[:100_000].decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    line = next(filter(_is_said, _dataflash_as_csv(head)), "")
+    line = next(filter(_has_content, _dataflash_as_csv(head)), "")
     cells = line.split(max(",;\t", key=line.count))
     names = {_name_of(cell)[0] for cell in cells}
-    return _vendor_of(cells) is not None or any(names.issuperset(kind[:2]) for kind in _KINDS)
+    return _vendor_of(cells) is not None or any(names.issuperset(kind[:2]) for kind in _POSITION_COLUMNS)
 
 
 def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
@@ -172,14 +174,14 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
     lines = _dataflash_as_csv(_text(data, name).split("\n"))
     header = _header(lines, name, keys)
     _hold_to_datum(lines[: header.line], name)
-    found = _all_rows(lines, header, name)
-    table, without_fix = _with_fix(found.table, header, keys, name)
-    records = LogRecords(name, len(table.lines), table.lines, found.broken)
+    rows = _all_rows(lines, header, name)
+    table, without_fix = _with_fix(rows.table, header, keys, name)
+    records = LogRecords(name, len(table.lines), table.lines, rows.broken)
     times, start, clock_words = _times(table, header, records)
-    places = _places(table, header, records, keys)
+    positions = _positions(table, header, records, keys)
     words = header.vendor.words if header.vendor else f"CSV of {', '.join(header.axes)}"
     words += "" if keys.instance is None else f", instance {keys.instance}"
-    is_earth_fixed = header.axes != _KINDS[2]
+    is_earth_fixed = header.axes != _POSITION_COLUMNS[2]
     figures, figure_words = _figures(table, header, records)
     log = usable_log(
         records,
@@ -187,15 +189,15 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
         times,
         start,
         header.scale,
-        lambda kept: _earth_fixed(places[:, kept], header),
+        lambda kept: _earth_fixed(positions[:, kept], header),
         clock_words=clock_words,
         is_earth_fixed=is_earth_fixed,
-        sigmas=_sigmas(figures, header, places),
-        geodetic=tuple(places) if header.axes == _GEODETIC else None,
+        sigmas=_sigmas(figures, header, positions),
+        geodetic=tuple(positions) if header.axes == _GEODETIC else None,
     )
-    without_fix += found.empty
-    said = f", {counted(without_fix, 'row')} without a fix left out" if without_fix else ""
-    return replace(log, words=log.words + said + figure_words)
+    without_fix += rows.empty
+    fix_words = f", {counted(without_fix, 'row')} without a fix left out" if without_fix else ""
+    return replace(log, words=log.words + fix_words + figure_words)
 
 
 def _with_fix(table: _Table, header: _Header, keys: LogKeys, name: str) -> tuple[_Table, int]:
@@ -203,13 +205,13 @@ def _with_fix(table: _Table, header: _Header, keys: LogKeys, name: str) -> tuple
 
     Rows of several receivers are refused where the mission file does not choose one of them.
     """
-    receiver = header.place("receiver")
+    receiver = header.index_of("receiver")
     if keys.instance is not None and receiver is None:
         raise PathFileError(f"{name}: has no column that numbers receivers", key="instance")
     if header.vendor is None:
         return table, 0
     numbers = table.numbers
-    fix, unix = header.place("fix"), header.place("unix")
+    fix, unix = header.index_of("fix"), header.index_of("unix")
     latitude, longitude = (header.names.index(axis) for axis in _GEODETIC[:2])
     has_place = (numbers[:, latitude] != 0) | (numbers[:, longitude] != 0)
     if fix is not None:
@@ -239,16 +241,16 @@ def _hold_to_datum(lines: Sequence[str], name: str) -> None:
 
 def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats, Instant | None, str]:
     """Times [s], day and seconds of the scale from which they count, and how well that is known."""
-    own = header.place("time")
+    time_index = header.index_of("time")
     counted_s = np.zeros(len(table.lines))
-    if own is not None:
-        column, raw = header.numbers[own], table.numbers[:, own]
+    if time_index is not None:
+        column, raw = header.numbers[time_index], table.numbers[:, time_index]
         with np.errstate(over="ignore"):
             counted_s = raw * column.scale
         records.leave_out(
             np.abs(counted_s) > _LATEST_S, lambda i: f"time {raw[i]:.10g} {column.unit} is beyond {_LATEST_S:g} s"
         )
-    unix, week = header.place("unix"), header.place("week")
+    unix, week = header.index_of("unix"), header.index_of("week")
     if unix is not None:
         raw = table.numbers[:, unix]
         scale = header.numbers[unix].scale
@@ -267,7 +269,7 @@ def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats,
     if header.stamp is None:
         return counted_s, None, ""
     minutes, seconds = table.minutes, table.seconds
-    if own is not None:
+    if time_index is not None:
         return _by_two_clocks(counted_s, minutes + seconds, records)
     start = Instant(0, 0.0).after(float(minutes[0])).after(float(seconds[0]))
     return (minutes - minutes[0]) + (seconds - seconds[0]), start, ""
@@ -279,17 +281,17 @@ def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> 
     An instant is cut to its second: the start is at or behind every instant less its time, and less than a second
     behind. Between the latest and the earliest such bound it is taken in the middle.
     """
-    is_said = np.isfinite(instants) & records.is_usable
-    if not is_said.any():
+    has_instant = np.isfinite(instants) & records.is_usable
+    if not has_instant.any():
         raise PathFileError(f"{records.name}: has no instant of UTC")
     apart = instants - counted_s
-    usual = float(np.median(apart[is_said]))
+    usual = float(np.median(apart[has_instant]))
     off = np.abs(apart - usual)
     records.leave_out(
-        is_said & (off > 1.0 + _CLOCKS_APART_S),
+        has_instant & (off > 1.0 + _CLOCKS_APART_S),
         lambda i: f"its clocks, time(millisecond) and datetime(utc), drift apart by {off[i]:.3g} s",
     )
-    behind = apart[is_said & records.is_usable]
+    behind = apart[has_instant & records.is_usable]
     earliest, latest = float(behind.max()), float(behind.min()) + 1.0
     if earliest - latest > _CLOCKS_APART_S:
         raise PathFileError(
@@ -301,19 +303,19 @@ def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> 
     return counted_s - counted_s[0], start, f", UTC to {abs(latest - earliest) / 2:.2g} s by whole seconds"
 
 
-def _places(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) -> Floats:
+def _positions(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) -> Floats:
     """Coordinates (3, n) of the header's axes, a height above the ellipsoid; those that cannot be are left out."""
     kind = header.axes
     is_geodetic = kind == _GEODETIC
     is_above_sea = is_geodetic and "height" not in header.names
-    own = kind if not is_above_sea else (*_GEODETIC[:2], "altitude")
-    found = []
-    for axis in own:
+    columns = kind if not is_above_sea else (*_GEODETIC[:2], "altitude")
+    coordinates = []
+    for axis in columns:
         at = header.names.index(axis)
         column, raw = header.numbers[at], table.numbers[:, at]
         with np.errstate(over="ignore"):
             values = raw * column.scale
-        limit = {"latitude": _RIGHT_ANGLE, "longitude": 2 * math.pi * (1 + 1e-12)}.get(axis, _FARTHEST_M)
+        limit = {"latitude": _MAX_LATITUDE_RAD, "longitude": 2 * math.pi * (1 + 1e-12)}.get(axis, _FARTHEST_M)
         at_most = {"latitude": "90 deg", "longitude": "360 deg"}.get(axis, f"{_FARTHEST_M:g} m")
         records.leave_out(
             np.abs(values) > limit,
@@ -321,13 +323,13 @@ def _places(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) 
                 f"{column.name} {raw[i]:.10g} {column.unit} is beyond {at_most}"
             ),
         )
-        found.append(values)
+        coordinates.append(values)
     if not is_above_sea:
         hold_to_ellipsoid(
             keys, records.name, "has heights above the ellipsoid" if is_geodetic else f"has {', '.join(kind)}"
         )
     else:
-        at_separation = header.place("geoid_separation")
+        at_separation = header.index_of("geoid_separation")
         separations = None
         if at_separation is not None:
             column, raw = header.numbers[at_separation], table.numbers[:, at_separation]
@@ -335,9 +337,9 @@ def _places(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) 
             records.leave_out(
                 np.abs(separations) > 200, lambda i: f"geoid_separation {raw[i]:.10g} {column.unit} is beyond 200 m"
             )
-        found[2] = from_sea_level(found[2], separations, keys, records.name)
-    if kind == _KINDS[1]:
-        radius = np.sqrt(sum(axis**2 for axis in found))
+        coordinates[2] = from_sea_level(coordinates[2], separations, keys, records.name)
+    if kind == _POSITION_COLUMNS[1]:
+        radius = np.sqrt(sum(axis**2 for axis in coordinates))
         records.leave_out(
             radius < _DEEPEST_M,
             lambda i: (
@@ -345,7 +347,7 @@ def _places(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) 
                 "positions of the scene are named east, north, up"
             ),
         )
-    return np.array(found)
+    return np.array(coordinates)
 
 
 def _earth_fixed(coordinates: Floats, header: _Header) -> Floats:
@@ -368,39 +370,38 @@ def _figures(table: _Table, header: _Header, records: LogRecords) -> tuple[dict[
         )
         negative += int(np.count_nonzero(values[records.is_usable] < 0))
         with np.errstate(over="ignore", invalid="ignore"):
-            own = values * column.scale
-            sigmas = np.sqrt(own) if column.name.startswith(_VARIANCE) else own
+            scaled = values * column.scale
+            sigmas = np.sqrt(scaled) if column.name.startswith(_VARIANCE) else scaled
         name = column.name.replace(_VARIANCE, "sigma_")
         figures[name] = np.fmax(figures[name], sigmas) if name in figures else sigmas
     words = f", {counted(negative, 'figure')} of accuracy that cannot be used left out" if negative else ""
     return figures, words
 
 
-def _sigmas(figures: Mapping[str, Floats], header: _Header, places: Floats) -> Floats | None:
+def _sigmas(figures: Mapping[str, Floats], header: _Header, positions: Floats) -> Floats | None:
     """One-sigma errors (n, 3) east, north, up of places (3, n), NaN where none is stated; None without any. [m]
 
     Of what several columns state of the same axis the largest counts.
     """
     local, fixed = (
         known_sigmas(np.column_stack([figures[name] for name in names])) if figures.keys() >= set(names) else None
-        for names in _SIGMAS
+        for names in _SIGMA_COLUMNS
     )
     if fixed is not None:
-        fixed = _level_axes(filled_sigmas(fixed), header, places)
-    level = level_sigmas(*(figures.get(name) for name in _LEVEL))
+        fixed = _level_axes(filled_sigmas(fixed), header, positions)
+    level = level_sigmas(*(figures.get(name) for name in _LEVEL_ACCURACIES))
     total = level_sigmas(figures.get(_TOTAL), None)
     stated = [sigmas for sigmas in (local, fixed, level, total) if sigmas is not None]
     return None if not stated else known_sigmas(np.fmax.reduce(stated))
 
 
-def _level_axes(fixed: Floats, header: _Header, places: Floats) -> Floats:
+def _level_axes(fixed: Floats, header: _Header, positions: Floats) -> Floats:
     """Sigmas (n, 3) east, north, up from independent ones along the axes of the Earth. [m]"""
     if header.axes == _GEODETIC:
-        latitude, longitude = places[:2]
+        latitude, longitude = positions[:2]
     else:
-        latitude, longitude, _ = geodetic_places(places.T)
-    where: Any = (latitude, longitude, np.zeros_like(latitude))
-    axes: Floats = np.moveaxis(np.array(axes_at(Geodetic(*where)).axes), -1, 0)
+        latitude, longitude, _ = geodetic_places(positions.T)
+    axes: Floats = np.moveaxis(axes_at_places(latitude, longitude), -1, 0)
     squares: Floats = np.einsum("nij,nj->ni", axes**2, fixed**2)
     return np.sqrt(squares)
 
@@ -419,8 +420,8 @@ def _text(data: bytes, name: str) -> str:
         at = error.start
         # The codec that skips the mark counts from behind it.
         at += 3 if data.startswith(b"\xef\xbb\xbf") and error.object != data else 0
-        said = f"has the byte 0x{data[at]:02x}, which is not UTF-8; save it in UTF-8"
-        raise PathFileError(f"{name}:{_line_of(data, at)}: {said}") from None
+        fault = f"has the byte 0x{data[at]:02x}, which is not UTF-8; save it in UTF-8"
+        raise PathFileError(f"{name}:{_line_of(data, at)}: {fault}") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -429,7 +430,7 @@ def _line_of(data: bytes, byte: int) -> int:
     return before.count(b"\n") + before.count(b"\r") + 1
 
 
-def _is_said(line: str) -> bool:
+def _has_content(line: str) -> bool:
     """Whether a line is neither blank nor a comment."""
     text = line.lstrip()
     return bool(text) and text[0] != "#"
@@ -444,7 +445,7 @@ def _name_of(cell: str) -> tuple[str, str | None]:
 def _written_name(cell: str) -> tuple[str, str | None]:
     """The same in the letters of the file."""
     cell = cell.strip()
-    match = _HEADER.fullmatch(cell)
+    match = _COLUMN_HEADER_PATTERN.fullmatch(cell)
     name = (match[1] if match else re.split(r"[\[(]", cell)[0]).strip().strip('"')
     return name, match[2].strip() if match and match[2] is not None else None
 
@@ -453,22 +454,22 @@ def _accuracy_columns(
     cells: Sequence[str],
     kind: Sequence[str],
     refuse: Callable[[str], NoReturn],
-    known: Mapping[str, _Column] = MappingProxyType({}),
+    level_columns: Mapping[str, _Column] = MappingProxyType({}),
 ) -> tuple[_Column, ...]:
-    """Columns of the errors of places of a kind, those that are `known` first."""
-    columns = dict(known)
-    is_beside = False
+    """Columns of the errors of places of a kind, those that are `level_columns` first."""
+    columns = dict(level_columns)
+    has_covariance = False
     for index, cell in enumerate(cells):
         column, unit = _written_name(cell)
         in_brackets = re.search(r"\(([^()]*)\)", cell)
         meaning, unit = meaning_of(column, unit or (in_brackets[1] if in_brackets else None))
-        is_beside |= meaning == BESIDE
+        has_covariance |= meaning == CROSS_COVARIANCE
         if meaning == UNCLEAR:
             refuse(
                 f"{shown(column)} looks like an accuracy of the positions, but is not a known one: name it as what "
-                f"it is, or leave it out where it is of something else; {ACCEPTED}"
+                f"it is, or leave it out where it is of something else; {ACCEPTED_ACCURACIES}"
             )
-        if meaning in (None, BESIDE):
+        if meaning in (None, CROSS_COVARIANCE):
             continue
         if meaning in columns:
             refuse(f"has two columns of {meaning}")
@@ -477,15 +478,15 @@ def _accuracy_columns(
         columns[meaning] = _measured(column, index, unit, refuse, dimension)._replace(name=meaning)
     columns = _with_plain_heights(columns, refuse)
     stated = {name.replace(_VARIANCE, "sigma_") for name in columns}
-    for names in _SIGMAS:
+    for names in _SIGMA_COLUMNS:
         missing = [name for name in names if name not in stated]
         if 0 < len(missing) < len(names):
             has = next(name for name in names if name in stated)
             refuse(f"has {has} and no {missing[0]}; write all of {', '.join(names)}")
-    if is_beside and not stated.issuperset(_SIGMAS[0]):
-        refuse(f"has a covariance of two axes and no sigmas of them; {ACCEPTED}")
-    if kind == _KINDS[2] and _SIGMAS[1][0] in stated:
-        refuse(f"has {_SIGMAS[1][0]} beside east; write {', '.join(_SIGMAS[0])}")
+    if has_covariance and not stated.issuperset(_SIGMA_COLUMNS[0]):
+        refuse(f"has a covariance of two axes and no sigmas of them; {ACCEPTED_ACCURACIES}")
+    if kind == _POSITION_COLUMNS[2] and _SIGMA_COLUMNS[1][0] in stated:
+        refuse(f"has {_SIGMA_COLUMNS[1][0]} beside east; write {', '.join(_SIGMA_COLUMNS[0])}")
     return tuple(columns.values())
 
 
@@ -494,13 +495,13 @@ def _with_plain_heights(columns: dict[str, _Column], refuse: Callable[[str], NoR
 
     The error of a height without those of east and north is a vertical one.
     """
-    level, vertical = _LEVEL
+    level, vertical = _LEVEL_ACCURACIES
     if "sigma_h" in columns:
         of_h = columns.pop("sigma_h")
         is_height = "sigma_east" in columns and "sigma_up" not in columns and vertical not in columns
         meaning = level if vertical in columns else "sigma_up" if is_height else ""
         if not meaning or meaning in columns:
-            refuse(f"has an error of h, which may be the height or horizontal; {ACCEPTED}")
+            refuse(f"has an error of h, which may be the height or horizontal; {ACCEPTED_ACCURACIES}")
         columns[meaning] = of_h._replace(name=meaning)
     is_alone = "sigma_up" in columns and "sigma_east" not in columns and "sigma_north" not in columns
     if is_alone and vertical not in columns and level in columns:
@@ -510,7 +511,7 @@ def _with_plain_heights(columns: dict[str, _Column], refuse: Callable[[str], NoR
 
 def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
     """Columns that the first line names."""
-    at = next((n for n, line in enumerate(lines) if _is_said(line)), None)
+    at = next((n for n, line in enumerate(lines) if _has_content(line)), None)
     if at is None:
         raise PathFileError(f"{name}:1: is empty; its first line names columns, like 'time [s], x [m], y [m], z [m]'")
 
@@ -524,47 +525,48 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
     vendor = _vendor_of(cells)
     if vendor is not None:
         return _vendor_header(vendor, cells, delimiter, at + 1, f"{name}:{at + 1}", keys)
-    found: dict[str, tuple[int, str | None]] = {}
+    headings: dict[str, tuple[int, str | None]] = {}
     for index, cell in enumerate(cells):
         column, unit = _name_of(cell)
-        if column not in ("time", *_STAMPS, *_SPARE, *(axis for kind in _KINDS for axis in kind)):
+        if column not in ("time", *_STAMPS, *_SPARE, *(axis for kind in _POSITION_COLUMNS for axis in kind)):
             continue
-        if column in found:
+        if column in headings:
             refuse(f"has two columns {column}")
-        found[column] = (index, unit)
-    kinds = [kind for kind in _KINDS if any(axis in found for axis in kind)]
+        headings[column] = (index, unit)
+    kinds = [kind for kind in _POSITION_COLUMNS if any(axis in headings for axis in kind)]
     if not kinds:
         refuse("names no position; the first line names columns, like 'latitude [deg]', 'x [m]' or 'east [m]'")
     if len(kinds) > 1:
-        one, other = (next(axis for axis in kind if axis in found) for kind in kinds[:2])
-        refuse(f"mixes {one} with {other}; positions are {', or '.join(', '.join(kind) for kind in _KINDS)}")
+        first_axis, second_axis = (next(axis for axis in kind if axis in headings) for kind in kinds[:2])
+        listed = ", or ".join(", ".join(kind) for kind in _POSITION_COLUMNS)
+        refuse(f"mixes {first_axis} with {second_axis}; positions are {listed}")
     kind = kinds[0]
-    if kind == _GEODETIC and "altitude" in found:
-        if "height" in found:
+    if kind == _GEODETIC and "altitude" in headings:
+        if "height" in headings:
             refuse("has both height and altitude; keep one")
         kind = (*_GEODETIC[:2], "altitude")
-    missing = [axis for axis in kind if axis not in found]
+    missing = [axis for axis in kind if axis not in headings]
     if missing:
         refuse(f"has no column {missing[0]}")
-    times = [column for column in ("time", *_STAMPS) if column in found]
+    times = [column for column in ("time", *_STAMPS) if column in headings]
     if len(times) > 1:
         refuse(f"has both {times[0]} and {times[1]}; keep one")
     if not times:
         refuse("has no column of time; write 'time [s]' or 'utc'")
-    axes = [_measured(axis, *found[axis], refuse) for axis in kind]
+    axes = [_measured(axis, *headings[axis], refuse) for axis in kind]
     alike = axes[:2] if kind[0] == "latitude" else axes
     other_unit = next((axis for axis in alike if axis.scale != alike[0].scale), None)
     if other_unit:
         refuse(f"mixes units: {alike[0].name} [{alike[0].unit}] and {other_unit.name} [{other_unit.unit}]")
-    if kind[-1] == "altitude" and "geoid_separation" in found:
-        axes.append(_measured("geoid_separation", *found["geoid_separation"], refuse))
+    if kind[-1] == "altitude" and "geoid_separation" in headings:
+        axes.append(_measured("geoid_separation", *headings["geoid_separation"], refuse))
     elif kind[-1] == "altitude" and keys.geoid_separation is None:
         raise needs_separation(
             f"{name}:{at + 1}: altitude counts from mean sea level, and there is no column geoid_separation; "
             "a height counts from the ellipsoid of WGS-84"
         )
     accuracy = _accuracy_columns(cells, kind, refuse)
-    index, unit = found[times[0]]
+    index, unit = headings[times[0]]
     scale = _STAMPS.get(times[0]) or _STAMPS.get((unit or "").lower())
     if times[0] in _STAMPS and unit and _STAMPS.get(unit.lower()) != scale:
         refuse(f"{times[0]} has the unit {shown(unit)!r}; stamps like {_example(str(scale))} need none")
@@ -577,7 +579,7 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
             refuse(f"time counts in {time.unit}; trajectory.time_scale says of instants in which scale they are")
         return _Header(at + 1, delimiter, len(cells), (time, *axes), accuracy=accuracy)
     hold_to_scale(scale, keys, f"{name}:{at + 1}")
-    stamp = _Column(times[0], place=index)
+    stamp = _Column(times[0], cell_index=index)
     return _Header(at + 1, delimiter, len(cells), tuple(axes), stamp, scale, zone, accuracy=accuracy)
 
 
@@ -587,9 +589,9 @@ def _vendor_header(
     """Columns that an exporter names."""
     columns: dict[str, _Column] = {}
     for index, cell in enumerate(cells):
-        known = vendor.columns.get(cell.strip().lower())
-        if known is not None:
-            columns.setdefault(known.name, known._replace(place=index))
+        column = vendor.columns.get(cell.strip().lower())
+        if column is not None:
+            columns.setdefault(column.name, column._replace(cell_index=index))
     if "height" not in columns and "altitude" not in columns:
         raise PathFileError(
             f"{where}: {vendor.words} has no height above the sea or the ellipsoid; one above take-off is no position"
@@ -607,9 +609,9 @@ def _vendor_header(
         raise PathFileError(f"{where}: {says}")
 
     # What somebody has added to an exporter's columns counts like that of a plain log.
-    others = ["" if cell.strip().lower() in vendor.columns else cell for cell in cells]
-    level = {name: columns.pop(name) for name in _LEVEL if name in columns}
-    accuracy = _accuracy_columns(others, _GEODETIC, refuse, level)
+    added_cells = ["" if cell.strip().lower() in vendor.columns else cell for cell in cells]
+    level = {name: columns.pop(name) for name in _LEVEL_ACCURACIES if name in columns}
+    accuracy = _accuracy_columns(added_cells, _GEODETIC, refuse, level)
     numbers = tuple(columns.values())
     return _Header(line, delimiter, len(cells), numbers, stamp, scale, _EITHER, vendor, accuracy)
 
@@ -626,7 +628,7 @@ def _measured(
     dimension: units.Dimension | None = None,
 ) -> _Column:
     """A column of numbers, whose unit is known and of the right dimension."""
-    dimension = dimension or _DIMENSIONS.get(name, units.LENGTH)
+    dimension = dimension or _COLUMN_DIMENSIONS.get(name, units.LENGTH)
     example = (
         "time [s]', 'time [UTC]' or 'time [GPST]" if dimension is units.TIME else f"{name} [{_usual(dimension)}]"
     )
@@ -662,7 +664,7 @@ def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
     is_any = False
     for first in range(header.line, len(lines), _CHUNK_LINES):
         chunk = lines[first : first + _CHUNK_LINES]
-        kept = [n for n, line in enumerate(chunk) if line[:1] > "#" or _is_said(line)]  # numbers begin behind #
+        kept = [n for n, line in enumerate(chunk) if line[:1] > "#" or _has_content(line)]  # numbers begin behind #
         if kept:
             is_any = True
             _read_rows([chunk[n] for n in kept], np.array(kept) + first + 1, header, name, rows)
@@ -680,14 +682,14 @@ def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name
         if instants is not None:
             rows.tables.append(_Table(lines, numbers, *instants))
             return
-    if len(texts) > _LEAST_SEARCHED:
+    if len(texts) > _MAX_SCANNED_ROWS:
         half = len(texts) // 2
         _read_rows(texts[:half], lines[:half], header, name, rows)
         _read_rows(texts[half:], lines[half:], header, name, rows)
         return
     is_sound = []
     for text, line in zip(texts, lines.tolist(), strict=True):
-        is_empty = header.vendor is not None and not _is_whole(text, header)  # before the first fix
+        is_empty = header.vendor is not None and not _is_complete(text, header)  # before the first fix
         fault = None if is_empty else _row_fault(text, header)
         rows.empty += is_empty
         if fault is not None:
@@ -705,12 +707,12 @@ def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name
         _read_rows([texts[n] for n in sound], lines[sound], header, name, rows)
 
 
-def _is_whole(text: str, header: _Header) -> bool:
+def _is_complete(text: str, header: _Header) -> bool:
     """Whether no number of a row is left out; what is wrong otherwise is said elsewhere."""
     cells = _cells(text, header.delimiter)
     if isinstance(cells, str) or len(cells) != header.width:
         return True
-    return all(cells[column.place].strip() for column in header.numbers)
+    return all(cells[column.cell_index].strip() for column in header.numbers)
 
 
 def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
@@ -723,16 +725,16 @@ def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] |
             texts,
             delimiter=delimiter,
             comments=None,
-            usecols=[one.place for one in header.columns],
-            converters={one.place: _or_nan for one in header.accuracy} or None,
+            usecols=[column.cell_index for column in header.columns],
+            converters={column.cell_index: _or_nan for column in header.accuracy} or None,
             ndmin=2,
         )
     except ValueError:
         return None
     if header.stamp is None:
         return numbers, None
-    place = header.stamp.place
-    return numbers, [text.split(delimiter, place + 1)[place].strip() for text in texts]
+    stamp_index = header.stamp.cell_index
+    return numbers, [text.split(delimiter, stamp_index + 1)[stamp_index].strip() for text in texts]
 
 
 def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
@@ -741,14 +743,14 @@ def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] 
         rows = list(csv.reader(texts, delimiter=header.delimiter, skipinitialspace=True))
         if len(rows) != len(texts) or set(map(len, rows)) != {header.width}:
             return None
-        cells = [[row[column.place] for row in rows] for column in header.numbers]
+        cells = [[row[column.cell_index] for row in rows] for column in header.numbers]
         if any("".join(column).encode().translate(None, _IN_NUMBERS) for column in cells):
             return None
-        errors = [[_or_nan(row[column.place]) for row in rows] for column in header.accuracy]
+        errors = [[_or_nan(row[column.cell_index]) for row in rows] for column in header.accuracy]
         numbers = np.array([list(map(float, column)) for column in cells] + errors).T
     except (csv.Error, ValueError):
         return None
-    return numbers, None if header.stamp is None else [row[header.stamp.place].strip() for row in rows]
+    return numbers, None if header.stamp is None else [row[header.stamp.cell_index].strip() for row in rows]
 
 
 def _or_nan(cell: str) -> float:
@@ -756,8 +758,8 @@ def _or_nan(cell: str) -> float:
     try:
         return float(cell)
     except ValueError:
-        given = cell.strip().strip('"').lower()
-        return (-1.0 if given else math.nan) if given in _NOT_GIVEN else _NO_NUMBER
+        content = cell.strip().strip('"').lower()
+        return (-1.0 if content else math.nan) if content in _EMPTY_CELLS else _NO_NUMBER
 
 
 def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None:
@@ -765,11 +767,11 @@ def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None
 
     NaN where an exporter leaves one out.
     """
-    is_said = [bool(text) or header.vendor is None for text in texts]
-    minutes = [_minute(text[:17]) if said else math.nan for text, said in zip(texts, is_said, strict=True)]
-    seconds = [text[17:] if said else "00" for text, said in zip(texts, is_said, strict=True)]
+    has_text = [bool(text) or header.vendor is None for text in texts]
+    minutes = [_minute(text[:17]) if is_stated else math.nan for text, is_stated in zip(texts, has_text, strict=True)]
+    seconds = [text[17:] if is_stated else "00" for text, is_stated in zip(texts, has_text, strict=True)]
     if None in minutes or not all(
-        header.zone(text) if said else True for text, said in zip(seconds, is_said, strict=True)
+        header.zone(text) if is_stated else True for text, is_stated in zip(seconds, has_text, strict=True)
     ):
         return None
     numbers = [text.replace("Z", "").partition("+")[0].replace(",", ".") for text in seconds]
@@ -780,7 +782,7 @@ def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None
 def _minute(text: str) -> float | None:
     """Seconds since MJD 0 of the beginning of a stamp, which is that of many rows; None if it is none."""
     instant = parse_instant(f"{text}00Z")
-    return None if instant is None else instant.day * DAY + instant.seconds
+    return None if instant is None else instant.day * DAY_S + instant.seconds
 
 
 def _usual(dimension: units.Dimension) -> str:
@@ -802,7 +804,7 @@ def _row_fault(text: str, header: _Header) -> str | None:
         return cells
     if len(cells) != header.width:
         return f"has {counted(len(cells), 'cell')}, the header has {header.width}"
-    stamp = "" if header.stamp is None else cells[header.stamp.place].strip()
+    stamp = "" if header.stamp is None else cells[header.stamp.cell_index].strip()
     is_left_out = header.vendor is not None and not stamp
     if header.stamp is not None and not is_left_out and (_minute(stamp[:17]) is None or not header.zone(stamp[17:])):
         scale = SCALES[header.scale]
@@ -810,7 +812,7 @@ def _row_fault(text: str, header: _Header) -> str | None:
             f"{header.stamp.name} must be an instant of {scale} like {_example(header.scale)} (got {shown(stamp)!r})"
         )
     for column in header.numbers:
-        cell = cells[column.place].strip(" \t")
+        cell = cells[column.cell_index].strip(" \t")
         if not cell:
             return f"{column.name} is empty"
         try:
@@ -837,16 +839,19 @@ def _row_fault(text: str, header: _Header) -> str | None:
 # that Mission Planner and mavlogdump write, whose FMT rows name the columns. Alt is above mean sea level. Source:
 # ardupilot libraries/AP_GPS/LogStructure.h (LOG_STRUCTURE_FROM_GPS; a Status of 3 is a fix in three dimensions) and
 # AP_GPS.h (undulation), pymavlink/tools/mavlogdump.py.
-_DEGREE = math.pi / 180
+_DEGREE_RAD = math.pi / 180
 
 
 def _vendor(words: str, signs: str, least_fix: int = 0, **columns: _Column) -> _Vendor:
     return _Vendor(words, frozenset(signs.split()), columns, least_fix)
 
 
-_LATITUDE, _LONGITUDE = _Column("latitude", "deg", _DEGREE), _Column("longitude", "deg", _DEGREE)
+_LATITUDE_COLUMN, _LONGITUDE_COLUMN = (
+    _Column("latitude", "deg", _DEGREE_RAD),
+    _Column("longitude", "deg", _DEGREE_RAD),
+)
 _FIX = _Column("fix")
-_HORIZONTAL, _VERTICAL = (_Column(name, "m") for name in _LEVEL)
+_HORIZONTAL, _VERTICAL = (_Column(name, "m") for name in _LEVEL_ACCURACIES)
 _UNIX = _Column("unix", "us", 1e-6)
 _VENDORS = (
     _Vendor(
@@ -855,8 +860,8 @@ _VENDORS = (
         {
             "time(millisecond)": _Column("time", "ms", 1e-3),
             "datetime(utc)": _Column("utc"),
-            "latitude": _LATITUDE,
-            "longitude": _LONGITUDE,
+            "latitude": _LATITUDE_COLUMN,
+            "longitude": _LONGITUDE_COLUMN,
             "altitude_above_sealevel(feet)": _Column("altitude", "ft", 0.3048),
             "altitude_above_sealevel(meters)": _Column("altitude", "m"),
         },
@@ -866,8 +871,8 @@ _VENDORS = (
         "time_utc_usec lat lon fix_type",
         3,
         time_utc_usec=_UNIX,
-        lat=_Column("latitude", "1e-7 deg", 1e-7 * _DEGREE),
-        lon=_Column("longitude", "1e-7 deg", 1e-7 * _DEGREE),
+        lat=_Column("latitude", "1e-7 deg", 1e-7 * _DEGREE_RAD),
+        lon=_Column("longitude", "1e-7 deg", 1e-7 * _DEGREE_RAD),
         alt_ellipsoid=_Column("height", "mm", 1e-3),
         alt=_Column("altitude", "mm", 1e-3),
         fix_type=_FIX,
@@ -879,8 +884,8 @@ _VENDORS = (
         "time_utc_usec latitude_deg longitude_deg fix_type",
         3,
         time_utc_usec=_UNIX,
-        latitude_deg=_LATITUDE,
-        longitude_deg=_LONGITUDE,
+        latitude_deg=_LATITUDE_COLUMN,
+        longitude_deg=_LONGITUDE_COLUMN,
         altitude_ellipsoid_m=_Column("height", "m"),
         altitude_msl_m=_Column("altitude", "m"),
         fix_type=_FIX,
@@ -893,8 +898,8 @@ _VENDORS = (
         1,
         lat_lon_valid=_FIX,
         timestamp=_Column("time", "us", 1e-6),
-        lat=_LATITUDE,
-        lon=_LONGITUDE,
+        lat=_LATITUDE_COLUMN,
+        lon=_LONGITUDE_COLUMN,
         alt_ellipsoid=_Column("height", "m"),
         alt=_Column("altitude", "m"),
         eph=_HORIZONTAL,
@@ -906,8 +911,8 @@ _VENDORS = (
         3,
         gwk=_Column("week"),
         gms=_Column("time", "ms", 1e-3),
-        lat=_LATITUDE,
-        lng=_LONGITUDE,
+        lat=_LATITUDE_COLUMN,
+        lng=_LONGITUDE_COLUMN,
         alt=_Column("altitude", "m"),
         status=_FIX,
         i=_Column("receiver"),
@@ -920,7 +925,7 @@ _VENDORS = (
 def _vendor_of(cells: Sequence[str]) -> _Vendor | None:
     """Whose columns these are; None where they are nobody's."""
     names = [cell.strip().lower() for cell in cells]
-    return next((one for one in _VENDORS if one.signs.issubset(names)), None)
+    return next((vendor for vendor in _VENDORS if vendor.signs.issubset(names)), None)
 
 
 def _dataflash_as_csv(lines: list[str]) -> list[str]:
@@ -940,7 +945,7 @@ def _dataflash_as_csv(lines: list[str]) -> list[str]:
             row = dict(zip(names["GPA"], cells[1:], strict=False))
             accuracies[_time_and_receiver(row)] = f",{row['HAcc']},{row['VAcc']}"
     more = ",HAcc,VAcc" if accuracies else ""
-    found = []
+    csv_lines = []
     header = ""
     for line in lines:
         kept = ""
@@ -951,8 +956,8 @@ def _dataflash_as_csv(lines: list[str]) -> list[str]:
                 kept = line.rstrip() + accuracies.get(_time_and_receiver(row), ",,")
         elif line.startswith("FMT,") and not header and line.split(",")[3].strip() == "GPS":
             kept = header = ",".join(["GPS", *names["GPS"]]) + more
-        found.append(kept)
-    return found
+        csv_lines.append(kept)
+    return csv_lines
 
 
 def _time_and_receiver(row: Mapping[str, str]) -> tuple[str, ...]:

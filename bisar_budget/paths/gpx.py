@@ -35,7 +35,7 @@ _STAMP_WITH_OFFSET = re.compile(
     r"([\d-]{10}T[\d:.]{8,21})([+-])(\d\d)(?::?([0-5]\d))?", re.ASCII
 )  # extended, or basic form of ISO 8601
 _FIXES_WITHOUT_HEIGHT = ("none", "2d")
-_NAMED_TRACKS = 10  # tracks that an error names
+_SHOWN_TRACK_COUNT = 10  # in an error
 
 
 def is_gpx(data: bytes) -> bool:
@@ -80,8 +80,8 @@ def _chosen(tracks: Sequence[MessageElement], track_name: str, name: str) -> int
     matches = [number for number, track in enumerate(tracks) if _name_of(track) == track_name.strip()]
     if len(matches) == 1:
         return matches[0]
-    listed = ", ".join(_track_words(tracks, number) for number in range(min(len(tracks), _NAMED_TRACKS)))
-    listed += ", …" * (len(tracks) > _NAMED_TRACKS)
+    listed = ", ".join(_track_words(tracks, number) for number in range(min(len(tracks), _SHOWN_TRACK_COUNT)))
+    listed += ", …" * (len(tracks) > _SHOWN_TRACK_COUNT)
     if matches:
         raise PathFileError(
             f"{name}: has {len(matches)} tracks of that name: {listed}; choose by number", key="track"

@@ -6,7 +6,7 @@ from calendar import isleap
 from datetime import UTC, date, datetime, timedelta
 from typing import NamedTuple
 
-DAY = 86400.0  # s
+DAY_S = 86400.0
 WEEK_S = 604800.0  # s
 GPS_EPOCH_DAY = 44244  # MJD of 1980-01-06
 UNIX_EPOCH_DAY = 40587  # MJD of 1970-01-01
@@ -26,19 +26,19 @@ class Instant(NamedTuple):
 
     def after(self, seconds: float) -> "Instant":
         """The instant after a number of seconds, without leap seconds."""
-        days, remainder = divmod(self.seconds + seconds, DAY)
+        days, remainder = divmod(self.seconds + seconds, DAY_S)
         return Instant(self.day + int(days), remainder)
 
     def since(self, other: "Instant") -> float:
         """Seconds since another instant, without leap seconds. [s]"""
-        return (self.day - other.day) * DAY + (self.seconds - other.seconds)
+        return (self.day - other.day) * DAY_S + (self.seconds - other.seconds)
 
     def as_text(self) -> str:
         """2026-06-01T05:20:31.250Z, to a millisecond; a modified Julian day outside the years 1 to 9999."""
         try:
             moment = Instant(self.day, round(self.seconds, 3)).as_datetime()
         except OverflowError:
-            return f"MJD {self.day + self.seconds / DAY:.5f}"
+            return f"MJD {self.day + self.seconds / DAY_S:.5f}"
         return moment.strftime("%Y-%m-%dT%H:%M:%S.") + f"{moment.microsecond // 1000:03d}Z"
 
     def as_datetime(self) -> datetime:
@@ -137,5 +137,5 @@ def utc(tai_instant: Instant) -> Instant:
     instant = tai_instant.after(-tai_less_utc(tai_instant.day))
     earlier = tai_instant.after(-tai_less_utc(instant.day))
     if earlier.day > instant.day:
-        return Instant(instant.day, earlier.seconds + DAY)
+        return Instant(instant.day, earlier.seconds + DAY_S)
     return earlier

@@ -4,11 +4,12 @@ import re
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from bisar_budget.arrays import Booleans
 from bisar_budget.paths.earth import Floats, earth_fixed_places
 from bisar_budget.paths.flight import NO_MATRIX, LeftOut, Log, PathFileError
 from bisar_budget.paths.instant import SCALES, TAI_LESS, UNIX_EPOCH_DAY, Instant, tai_less_utc, utc
@@ -22,7 +23,7 @@ _WGS84 = re.compile(
 _FIRST_UNKNOWN_LEAP_DAY = 61587  # MJD, 2027-07-01: Bulletin C 72 has no leap second before
 _MIN_FIXES_PER_STAMP = 1.5  # with fewer, the recorder has not cut the fractions of seconds
 _WHOLE_SECOND_ERROR_S = 1e-6
-_MAX_SIGMA_M = 1e6  # a receiver without a fix writes more
+_MAX_LOG_SIGMA_M = 1e6  # a receiver without a fix writes more
 _MIN_HEIGHT_M, _MAX_HEIGHT_M = -12e3, 100e3  # from the deepest trench to the border of space
 
 
@@ -46,14 +47,14 @@ NO_KEYS = LogKeys()
 
 
 _RECORDS_PER_FAULT = 100  # one record in a hundred may be unusable
-_ONE_FAULT_RECORDS = 20  # length of a log from which one record may be left out
-_NAMED_RECORDS = 3  # records that the words of a log name
+_ONE_FAULT_RECORD_COUNT = 20  # length of a log from which one record may be left out
+_NAMED_RECORD_COUNT = 3  # in the words of a log
 _NO_FAULTS: Mapping[int, str] = MappingProxyType({})
 
 
 def most_left_out(count: int) -> int:
     """Largest number of records that a log may leave out: 1 % of its records, or one record if it has 20 to 199."""
-    return max(count // _RECORDS_PER_FAULT, int(count >= _ONE_FAULT_RECORDS))
+    return max(count // _RECORDS_PER_FAULT, int(count >= _ONE_FAULT_RECORD_COUNT))
 
 
 class LogRecords:
@@ -80,7 +81,12 @@ class LogRecords:
     """
 
     def __init__(
-        self, name: str, count: int, lines: Any = None, broken: Mapping[int, str] = _NO_FAULTS, lost: int = 0
+        self,
+        name: str,
+        count: int,
+        lines: ArrayLike | None = None,
+        broken: Mapping[int, str] = _NO_FAULTS,
+        lost: int = 0,
     ) -> None:
         self.name, self._is_in_lines = name, lines is not None
         self._numbers: NDArray[np.int64] = np.arange(1, count + 1) if lines is None else np.asarray(lines)
@@ -107,7 +113,7 @@ class LogRecords:
         """The record in a sentence."""
         return f"{'line' if self._is_in_lines else 'record'} {self._numbers[index]}"
 
-    def leave_out(self, is_unusable: Any, reason: Callable[[int], str]) -> None:
+    def leave_out(self, is_unusable: Booleans | np.bool_, reason: Callable[[int], str]) -> None:
         """Leave out records (count,) that cannot be used; `reason` gives the reason for the record of an index."""
         indices = np.flatnonzero(is_unusable & self.is_usable)
         if indices.size:
@@ -169,7 +175,7 @@ class LogRecords:
             return ""
         numbers = sorted(self._faults)
         noun = ("line" if self._is_in_lines else "record") + "s" * (len(numbers) > 1)
-        listed = ", ".join(map(str, numbers[:_NAMED_RECORDS])) + ", …" * (len(numbers) > _NAMED_RECORDS)
+        listed = ", ".join(map(str, numbers[:_NAMED_RECORD_COUNT])) + ", …" * (len(numbers) > _NAMED_RECORD_COUNT)
         return f", {counted(len(numbers), 'record')} that cannot be used left out ({noun} {listed})"
 
     def _add(self, faults: Mapping[int, str], count: int) -> None:
@@ -220,7 +226,7 @@ def _whole_seconds(times: Floats, start: Instant | None) -> str:
     seconds = times + (start.seconds if start else 0.0)
     fixes_per_stamp = len(times) / max(len(np.unique(times)), 1)
     if (
-        len(times) < _ONE_FAULT_RECORDS
+        len(times) < _ONE_FAULT_RECORD_COUNT
         or fixes_per_stamp < _MIN_FIXES_PER_STAMP
         or not (np.abs(seconds - np.round(seconds)) < _WHOLE_SECOND_ERROR_S).all()
     ):
@@ -338,7 +344,7 @@ def level_sigmas(horizontal: Floats | None, vertical: Floats | None) -> Floats |
 
 def known_sigmas(sigmas: Floats) -> Floats | None:
     """Sigmas (n, 3) of a log, NaN for each figure that is not positive; None where no place has any. [m]"""
-    found = np.where(sigmas > 0, np.minimum(sigmas, _MAX_SIGMA_M), np.nan)
+    found = np.where(sigmas > 0, np.minimum(sigmas, _MAX_LOG_SIGMA_M), np.nan)
     return None if np.isnan(found).all() else found
 
 
@@ -453,7 +459,7 @@ _MIN_FAULT_M = 0.1  # shortest way that repeats miss, or smallest jump: six deci
 _MAX_ACCELERATION_MPS2 = 30.0  # 3 g; no platform reverses it within three samples
 _MEDIAN_FACTOR = 20  # the largest of thousands of normal numbers is 4 medians, the largest of rough noise 10
 _NEIGHBOUR_STEPS = 3  # steps on each side with which a step is compared
-_MARGIN_SAMPLES = 10  # samples beyond each end of the aperture that count in the median
+_MEDIAN_MARGIN_SAMPLES = 10  # samples beyond each end of the aperture that count in the median
 
 
 def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str) -> None:
@@ -491,7 +497,7 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
             "A fixed platform needs no log: give its position, and speed 0",
         )
     _hold_to_new_fixes(flown_times, flown_positions, extent, name)
-    neighbourhood = slice(max(first - _MARGIN_SAMPLES, 0), last + _MARGIN_SAMPLES)
+    neighbourhood = slice(max(first - _MEDIAN_MARGIN_SAMPLES, 0), last + _MEDIAN_MARGIN_SAMPLES)
     _hold_to_small_steps(times[neighbourhood], positions[neighbourhood], half, name)
 
 

@@ -18,7 +18,7 @@ from bisar_budget.paths.instant import Instant, day_of_year, parse_instant
 MAX_MARKUP_BYTES = 32_000_000  # a day of an ephemeris at 1 Hz has 26 MB as XML
 FIRST_ORBIT_DAY, LAST_ORBIT_DAY = 36112, 124593  # modified Julian days, 1957-10-01 and 2200-01-01
 _MAX_COORDINATE_LEVEL = 1e9  # of a position or a velocity, in the unit of its file
-_NUMBER = re.compile(r"\s*[+-]?(\d+(?:\.\d*)?|\.\d+)([eEdD][+-]?\d+)?\s*", re.ASCII)
+_DECIMAL_PATTERN = re.compile(r"\s*[+-]?(\d+(?:\.\d*)?|\.\d+)([eEdD][+-]?\d+)?\s*", re.ASCII)
 
 
 def hold_to_size(size: int, name: str, part: str = "objects") -> None:
@@ -57,7 +57,7 @@ def number_in(text: object) -> float | None:
     if isinstance(text, bool) or not isinstance(text, str | int | float):
         return None
     if isinstance(text, str):
-        if not _NUMBER.fullmatch(text):
+        if not _DECIMAL_PATTERN.fullmatch(text):
             return None
         text = text.replace("D", "e").replace("d", "e")  # as Fortran writes exponents
     try:
@@ -76,7 +76,7 @@ def coordinate_in(text: str, location: str, requirement: str) -> float:
 
 
 # ---------------------------------------------------------------------- objects
-_NAMED_OBJECTS = 10  # objects that an error names
+_NAMED_OBJECT_COUNT = 10  # in an error
 _MAX_LIST_CHARACTERS = 400
 
 
@@ -122,8 +122,8 @@ def one_object(
 
 def _listed(objects: Sequence[_Named]) -> str:
     names = list(dict.fromkeys(candidate.object for candidate in objects))
-    more = f" and {len(names) - _NAMED_OBJECTS} more" if len(names) > _NAMED_OBJECTS else ""
-    return cut(", ".join(names[:_NAMED_OBJECTS])) + more
+    more = f" and {len(names) - _NAMED_OBJECT_COUNT} more" if len(names) > _NAMED_OBJECT_COUNT else ""
+    return cut(", ".join(names[:_NAMED_OBJECT_COUNT])) + more
 
 
 def cut(text: str) -> str:
@@ -134,8 +134,8 @@ def cut(text: str) -> str:
 # ---------------------------------------------------------------------- XML
 _NO_ATTRIBUTES: Mapping[str, str] = {}
 _MAX_ELEMENTS_COUNT = 2_000_000  # a day of an ephemeris at 1 Hz has 0.7 million
-_MAX_NESTING_LEVEL = 32
-_MAX_TEXT_CHARACTERS = 10_000  # in the text of an element
+_MAX_XML_LEVEL = 32
+_MAX_ELEMENT_CHARACTERS = 10_000  # in the text of an element
 
 
 @dataclass(eq=False, slots=True)
@@ -178,8 +178,8 @@ def parse_markup(data: bytes, name: str) -> MessageElement:
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal count
         count += 1
-        if count > _MAX_ELEMENTS_COUNT or len(open_elements) > _MAX_NESTING_LEVEL:
-            raise fault(f"has more than {_MAX_ELEMENTS_COUNT} elements, or {_MAX_NESTING_LEVEL} in each other")
+        if count > _MAX_ELEMENTS_COUNT or len(open_elements) > _MAX_XML_LEVEL:
+            raise fault(f"has more than {_MAX_ELEMENTS_COUNT} elements, or {_MAX_XML_LEVEL} in each other")
         element = MessageElement(
             intern(tag.rpartition(":")[2]),
             parser.CurrentLineNumber,
@@ -197,8 +197,8 @@ def parse_markup(data: bytes, name: str) -> MessageElement:
         element = open_elements[-1]
         if piece.strip():
             element.text += piece
-            if len(element.text) > _MAX_TEXT_CHARACTERS:
-                raise fault(f"has a text of more than {_MAX_TEXT_CHARACTERS} characters")
+            if len(element.text) > _MAX_ELEMENT_CHARACTERS:
+                raise fault(f"has a text of more than {_MAX_ELEMENT_CHARACTERS} characters")
 
     def doctype(*_: object) -> None:
         raise fault("declares a document type (DOCTYPE), which is not read; take it out")

@@ -30,7 +30,7 @@ from bisar_budget.extras import install_command
 from bisar_budget.faults import shown
 from bisar_budget.paths.earth import EQUATORIAL_RADIUS_M, Floats
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
-from bisar_budget.paths.instant import DAY, Instant, parse_instant
+from bisar_budget.paths.instant import DAY_S, Instant, parse_instant
 from bisar_budget.paths.log_places import (
     LogKeys,
     LogRecords,
@@ -44,18 +44,18 @@ from bisar_budget.paths.log_places import (
 from bisar_budget.paths.messages import number_in
 from bisar_budget.units import format_quantity
 
-LARGEST = 200_000_000  # bytes; ten hours at 10 Hz of eight sentences
-_LONGEST = 256  # characters of a sentence; the standard has 82
+MAX_NMEA_BYTES = 200_000_000  # ten hours at 10 Hz of eight sentences
+_MAX_SENTENCE_CHARACTERS = 256  # the standard has 82
 _SENTENCE = re.compile(r"\$[A-Z]{2}(?:GGA|GNS|RMC|ZDA|GST|DTM),", re.ASCII)
 _ANYWHERE = re.compile(rb"\$[A-Z]{2}(?:GGA|GNS|RMC|ZDA),[^\r\n$]{0,250}\*[0-9A-Fa-f]{2}")
-_CLOCK = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d{1,9})?|60(?:\.0{1,9})?)", re.ASCII)
-_ANGLE = re.compile(r"(\d{1,3})([0-5]\d(?:\.\d{1,12})?)", re.ASCII)
-_NUMBER = re.compile(r"[+-]?\d{1,9}(?:\.\d{0,12})?", re.ASCII)
+_UTC_TIME_PATTERN = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d{1,9})?|60(?:\.0{1,9})?)", re.ASCII)
+_ANGLE_PATTERN = re.compile(r"(\d{1,3})([0-5]\d(?:\.\d{1,12})?)", re.ASCII)
+_HEIGHT_PATTERN = re.compile(r"[+-]?\d{1,9}(?:\.\d{0,12})?", re.ASCII)
 _TIME_STEP_S = 1e-4  # less than between two fixes, more than a rounding of days
 _SAME_PLACE_M = 0.5  # of two sentences; four decimals of a minute are 0.2 m on each axis
-_KINDS = ("GGA", "GNS")  # of sentences with a place
+_FIX_SENTENCES = ("GGA", "GNS")  # kinds with a position
 _DATES = ("RMC", "ZDA")
-_BESIDE = ("GST", "DTM")  # of sentences beside fixes; there may be one for each
+_COMPANION_SENTENCES = ("GST", "DTM")  # kinds that come with a fix, at most one each
 _CHECKED = re.compile(r"\$([^*]+)\*([0-9A-Fa-f]{2})", re.ASCII)
 _REFERENCES = ("W84", "")  # of DTM; an offset from another datum is none from WGS-84
 _GST_REACH_S = 5.0  # from a fix to a GST that speaks for it; receivers write one a second, or fewer than fixes
@@ -143,11 +143,11 @@ class _Datum(NamedTuple):
     def words(self) -> str:
         """The datum in a sentence."""
         north, east, up = (shown(offset) for offset in self.offsets)
-        known = {"999": "a user datum (999)", "": "a datum without a code"}
+        code_words = {"999": "a user datum (999)", "": "a datum without a code"}
         if self.reference in _REFERENCES:
-            known["W84"] = "WGS-84 with offsets"
+            code_words["W84"] = "WGS-84 with offsets"
         return (
-            f"{known.get(self.code, f'the datum {shown(self.code)}')}, {north}, {east} and {up} off "
+            f"{code_words.get(self.code, f'the datum {shown(self.code)}')}, {north}, {east} and {up} off "
             f"{shown(self.reference or 'its reference')}"
         )
 
@@ -158,18 +158,18 @@ def is_nmea(data: bytes) -> bool:
 
 
 def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read a log of NMEA 0183 of at most `LARGEST` bytes, as every reader of `LOG_FORMATS` does; needs pynmea2.
+    """Read a log of NMEA 0183 of at most `MAX_NMEA_BYTES`, as every reader of `LOG_FORMATS` does; needs pynmea2.
 
     Of GGA and GNS those count of which there are more; both must have the same places, and the worse quality counts.
     """
     hold_to_scale("utc", keys, name)
-    hold_to_bytes(data, LARGEST, name)
-    found = _sentences(data, name)
-    talker = found.talker_of_fixes(keys, name)
-    found.hold_to_datum(talker, name)
-    kind = max(_KINDS, key=lambda kind: len(found.fixes[talker, kind]))
-    found.hold_to_one_solution(talker, kind, name)
-    return _log(talker, kind, found, name, keys)
+    hold_to_bytes(data, MAX_NMEA_BYTES, name)
+    sentences = _sentences(data, name)
+    talker = sentences.talker_of_fixes(keys, name)
+    sentences.hold_to_datum(talker, name)
+    kind = max(_FIX_SENTENCES, key=lambda kind: len(sentences.fixes[talker, kind]))
+    sentences.hold_to_one_solution(talker, kind, name)
+    return _log(talker, kind, sentences, name, keys)
 
 
 @dataclass(eq=False)
@@ -199,8 +199,8 @@ class _Sentences:
         listed = " and ".join(f"{talker} ({self._words(talker)})" for talker in sorted(+counts))
         if keys.talker is not None:
             if not counts[keys.talker]:
-                others = f"; it has fixes of {listed}" if listed else ""
-                raise PathFileError(f"{name}: has no fix of the talker {keys.talker}{others}", key="talker")
+                alternatives = f"; it has fixes of {listed}" if listed else ""
+                raise PathFileError(f"{name}: has no fix of the talker {keys.talker}{alternatives}", key="talker")
             return keys.talker
         if len(+counts) > 1:
             raise PathFileError(
@@ -217,7 +217,7 @@ class _Sentences:
 
     def _words(self, talker: str) -> str:
         """How many fixes of which quality a talker has, the most frequent first."""
-        of_talker = (fix.quality.words for kind in _KINDS for fix in self.fixes.get((talker, kind), ()))
+        of_talker = (fix.quality.words for kind in _FIX_SENTENCES for fix in self.fixes.get((talker, kind), ()))
         return ", ".join(f"{count} of {words}" for words, count in Counter(of_talker).most_common(2))
 
     def other_receivers(self, talker: str) -> set[str]:
@@ -241,9 +241,9 @@ class _Sentences:
 
     def hold_to_one_solution(self, talker: str, kind: str, name: str) -> None:
         """Refuse GGA and GNS of two solutions; give fixes of a kind the worse quality of both at their time."""
-        other_kind = next(one for one in _KINDS if one != kind)
-        fixes, others = self.fixes[talker, kind], self.fixes[talker, other_kind]
-        if not others:
+        other_kind = next(candidate for candidate in _FIX_SENTENCES if candidate != kind)
+        fixes, counterparts = self.fixes[talker, kind], self.fixes[talker, other_kind]
+        if not counterparts:
             return
         at: defaultdict[int, list[int]] = defaultdict(list)
         for index, fix in enumerate(fixes):
@@ -251,22 +251,24 @@ class _Sentences:
         between = (fixes[0].seconds, fixes[-1].seconds)
         alone, apart, alike = [], [], 0
         worse: dict[int, _Quality] = {}
-        for other in others:
-            same = at.get(round(other.seconds / _TIME_STEP_S))
-            if same is None:
-                alone += [other] if between[0] < other.seconds < between[1] else []
+        for counterpart in counterparts:
+            candidates = at.get(round(counterpart.seconds / _TIME_STEP_S))
+            if candidates is None:
+                alone += [counterpart] if between[0] < counterpart.seconds < between[1] else []
                 continue
-            index = min(same, key=lambda one: abs(fixes[one].line - other.line))  # a log may have several days
+            index = min(
+                candidates, key=lambda candidate: abs(fixes[candidate].line - counterpart.line)
+            )  # a log may have several days
             fix = fixes[index]
             alike += 1
-            if fix.distance(other) > _SAME_PLACE_M:
-                apart.append((fix, other))
-            if other.quality.typical_sigma_m > fix.quality.typical_sigma_m:
-                worse[index] = other.quality
+            if fix.distance(counterpart) > _SAME_PLACE_M:
+                apart.append((fix, counterpart))
+            if counterpart.quality.typical_sigma_m > fix.quality.typical_sigma_m:
+                worse[index] = counterpart.quality
         if len(apart) > most_left_out(alike):
-            fix, other = max(apart, key=lambda pair: pair[0].distance(pair[1]))
-            says = f"up to {format_quantity(fix.distance(other), 'm')} apart at the same time"
-            at_line = other.line
+            fix, counterpart = max(apart, key=lambda pair: pair[0].distance(pair[1]))
+            says = f"up to {format_quantity(fix.distance(counterpart), 'm')} apart at the same time"
+            at_line = counterpart.line
         elif len(alone) > alike:
             says, at_line = "at times of their own", alone[0].line
         else:
@@ -286,7 +288,7 @@ class _Sentences:
     def accuracies_for(self, talker: str) -> Sequence[_Accuracy]:
         """Errors that a talker states, or else those of talkers without fixes: names of the same receiver."""
         speakers = self.accuracies.keys() - self.other_receivers(talker)
-        return self.accuracies.get(talker) or sorted(gst for one in speakers for gst in self.accuracies[one])
+        return self.accuracies.get(talker) or sorted(gst for speaker in speakers for gst in self.accuracies[speaker])
 
     def unusable_words(self, talker: str) -> str:
         """How many figures of accuracy of a talker, or of talkers without fixes, are none, for reports."""
@@ -307,7 +309,7 @@ def _sentences(data: bytes, name: str) -> _Sentences:
         from pynmea2 import parse as parse_sentence
     except ImportError:
         raise PathFileError(f"{name}: needs the package pynmea2: {install_command('logs')}") from None
-    found = _Sentences(
+    sentences = _Sentences(
         fixes=defaultdict(list),
         broken=defaultdict(dict),
         dates=defaultdict(list),
@@ -326,44 +328,52 @@ def _sentences(data: bytes, name: str) -> _Sentences:
         sentence = text[begin.start() :].rstrip()
         talker, kind = sentence[1:3], sentence[3:6]
         try:
-            if len(sentence) > _LONGEST or not sentence.isascii():
+            if len(sentence) > _MAX_SENTENCE_CHARACTERS or not sentence.isascii():
                 raise ParseError("no sentence of the standard", sentence)
-            data_fields = _checked_fields(sentence) if kind in _BESIDE else parse_sentence(sentence, check=True).data
+            data_fields = (
+                _checked_fields(sentence)
+                if kind in _COMPANION_SENTENCES
+                else parse_sentence(sentence, check=True).data
+            )
             fields = [field.strip() for field in data_fields] + [""] * 14
         except (ParseError, ValueError):
-            found.lost[talker, kind] += 1
+            sentences.lost[talker, kind] += 1
             if kind == "DTM":
                 datum = _dtm(_unchecked_fields(sentence), name, number)
-                found.doubtful_datums[talker] += [] if datum is None else [(number, datum)]
+                sentences.doubtful_datums[talker] += [] if datum is None else [(number, datum)]
             continue
         try:
             read_one = _READERS[kind](fields, f"{name}:{number}: {kind}", number)
         except PathFileError as fault:
-            if kind in _KINDS:
-                found.broken[talker, kind][number] = str(fault)
+            if kind in _FIX_SENTENCES:
+                sentences.broken[talker, kind][number] = str(fault)
             elif kind in _DATES:
-                found.undated.append(str(fault))
+                sentences.undated.append(str(fault))
             elif kind == "GST":
-                found.unusable[talker] += 1
+                sentences.unusable[talker] += 1
             continue
         if isinstance(read_one, _Fix):
-            found.fixes[talker, kind].append(read_one)
+            sentences.fixes[talker, kind].append(read_one)
         elif isinstance(read_one, Instant):
-            found.dates[talker].append((number, read_one))
+            sentences.dates[talker].append((number, read_one))
         elif isinstance(read_one, _Accuracy):
-            found.unusable[talker] += read_one.unusable
+            sentences.unusable[talker] += read_one.unusable
             if not all(map(math.isnan, read_one.sigmas)):
-                found.accuracies[talker].append(read_one)
+                sentences.accuracies[talker].append(read_one)
         elif isinstance(read_one, _Datum):
-            found.datums[talker].append((number, read_one))
-    return found
+            sentences.datums[talker].append((number, read_one))
+    return sentences
 
 
-def _log(talker: str, kind: str, found: _Sentences, name: str, keys: LogKeys) -> Log:
+def _log(talker: str, kind: str, sentences: _Sentences, name: str, keys: LogKeys) -> Log:
     """The log of a talker's sentences of one kind."""
-    fixes, dates = found.fixes[talker, kind], found.dates_for(talker)
+    fixes, dates = sentences.fixes[talker, kind], sentences.dates_for(talker)
     records = LogRecords(
-        name, len(fixes), [fix.line for fix in fixes], found.broken.get((talker, kind), {}), found.lost[talker, kind]
+        name,
+        len(fixes),
+        [fix.line for fix in fixes],
+        sentences.broken.get((talker, kind), {}),
+        sentences.lost[talker, kind],
     )
     latitude, longitude, height, separation = np.array([fix[2:6] for fix in fixes], dtype=float).T
     has_none = np.isnan(separation)
@@ -372,20 +382,20 @@ def _log(talker: str, kind: str, found: _Sentences, name: str, keys: LogKeys) ->
     separations = None if has_none.all() else separation
     heights = from_sea_level(height, separations, keys, name)
     days, seconds = _dated(fixes, dates, fixes[len(fixes) // 2].seconds)
-    times, start = days * DAY + seconds, None
+    times, start = days * DAY_S + seconds, None
     if dates:
         start = Instant(int(days[0]), float(seconds[0]))
-        times = (days - days[0]) * DAY + (seconds - seconds[0])
-    words = f"NMEA 0183 {kind}" + (f" of the talker {talker}" if keys.talker else "") + found.lost_words()
-    words += found.unusable_words(talker)
+        times = (days - days[0]) * DAY_S + (seconds - seconds[0])
+    words = f"NMEA 0183 {kind}" + (f" of the talker {talker}" if keys.talker else "") + sentences.lost_words()
+    words += sentences.unusable_words(talker)
     log = geodetic_log(records, words, times, start, "utc", (latitude, longitude, heights))
     qualities = [fix.quality for fix, is_usable in zip(fixes, records.is_usable.tolist(), strict=True) if is_usable]
     # Without dates, times of day are those of day 0 or of its neighbours.
-    at = (days * DAY + seconds)[records.is_usable]
+    at = (days * DAY_S + seconds)[records.is_usable]
     return replace(
         log,
         clock="" if dates else "day",
-        sigmas=_sigmas(at, found.accuracies_for(talker), dates, fixes[len(fixes) // 2].seconds),
+        sigmas=_sigmas(at, sentences.accuracies_for(talker), dates, fixes[len(fixes) // 2].seconds),
         typical_sigmas=np.array([quality.typical_sigma_m for quality in qualities]),
         quality_words=lambda i: qualities[i].words,
     )
@@ -401,7 +411,7 @@ def _sigmas(
     if not stated:
         return None
     days, seconds = _dated(stated, dates, middle)
-    at = days * DAY + seconds
+    at = days * DAY_S + seconds
     order = np.argsort(at, kind="stable")
     at, figures = at[order], np.array([gst.sigmas for gst in stated])[order]
     sigmas = np.full((len(times), 3), np.nan)
@@ -422,10 +432,10 @@ def _dated(
     """
     seconds = np.array([fix.seconds for fix in fixes])
     if not dates:
-        return np.round((middle - seconds) / DAY), seconds
+        return np.round((middle - seconds) / DAY_S), seconds
     before = np.searchsorted([line for line, _ in dates], [fix.line for fix in fixes], "right") - 1
     dated = np.array([[date.day, date.seconds] for _, date in dates])[np.maximum(before, 0)]
-    return dated[:, 0] + np.round((dated[:, 1] - seconds) / DAY), seconds
+    return dated[:, 0] + np.round((dated[:, 1] - seconds) / DAY_S), seconds
 
 
 # ---------------------------------------------------------------------- sentences
@@ -442,19 +452,19 @@ def _unchecked_fields(sentence: str) -> list[str]:
     return [field.strip() for field in sentence.partition("*")[0].split(",")[1:]] + [""] * 14
 
 
-def _refused(where: str, says: str, given: str) -> NoReturn:
-    raise PathFileError(f"{where} {says} (got {shown(given)!r})")
+def _refused(where: str, says: str, value: str) -> NoReturn:
+    raise PathFileError(f"{where} {says} (got {shown(value)!r})")
 
 
 def _clock(text: str, where: str) -> float:
-    match = _CLOCK.fullmatch(text)
+    match = _UTC_TIME_PATTERN.fullmatch(text)
     if match is None:
         _refused(where, "must have a time like 052001.25", text)
     return int(match[1]) * 3600.0 + int(match[2]) * 60.0 + float(match[3])  # 60.00 is what 59.996 is rounded to
 
 
 def _angle(text: str, side: str, sides: str, where: str) -> float:
-    match = _ANGLE.fullmatch(text)
+    match = _ANGLE_PATTERN.fullmatch(text)
     if match is None or side not in (sides[0], sides[1]):
         _refused(
             where, f"must have degrees and minutes like 4805.196, and {sides[0]} or {sides[1]}", f"{text},{side}"
@@ -463,7 +473,7 @@ def _angle(text: str, side: str, sides: str, where: str) -> float:
 
 
 def _metres(text: str, unit: str, where: str) -> float:
-    if not _NUMBER.fullmatch(text) or unit != "M":
+    if not _HEIGHT_PATTERN.fullmatch(text) or unit != "M":
         _refused(where, "must have a height and a geoid separation in M", f"{text},{unit}")
     return float(text)
 
@@ -497,10 +507,10 @@ def _gns(fields: Sequence[str], where: str, line: int) -> _Fix | None:
 
 
 def _gst(fields: Sequence[str], where: str, line: int) -> _Accuracy | None:
-    given = (fields[2], *fields[5:8])
-    numbers = [number_in(field) for field in given]
+    cells = (fields[2], *fields[5:8])
+    numbers = [number_in(field) for field in cells]
     unusable = sum(
-        field != "" and (number is None or number < 0) for field, number in zip(given, numbers, strict=True)
+        field != "" and (number is None or number < 0) for field, number in zip(cells, numbers, strict=True)
     )
     # A receiver without a fix writes zeros, or nothing.
     semi_major, north, east, up = (number if number is not None and number > 0 else math.nan for number in numbers)
@@ -541,10 +551,10 @@ def _zda(fields: Sequence[str], where: str, line: int) -> Instant | None:
     return _dated_at(f"{year:>04}-{month:>02}-{day:>02}", fields[0], f"{day},{month},{year}", where)
 
 
-def _dated_at(date: str, clock: str, given: str, where: str) -> Instant:
+def _dated_at(date: str, clock: str, text: str, where: str) -> Instant:
     day = _day(date)
     if day is None:
-        _refused(where, "must have a date that there is", given)
+        _refused(where, "must have a date that there is", text)
     return Instant(day, _clock(clock, where))
 
 

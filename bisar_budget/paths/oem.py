@@ -9,7 +9,13 @@ from functools import lru_cache
 import numpy as np
 
 from bisar_budget.faults import shown
-from bisar_budget.paths.accuracy import CovarianceError, EpochCovariance, held_to_covariance, local_axes
+from bisar_budget.paths.accuracy import (
+    CovarianceError,
+    EpochCovariance,
+    held_to_covariance,
+    local_axes,
+    turns_with_orbit,
+)
 from bisar_budget.paths.ephemeris import (
     DEFAULT_DEGREE,
     MAX_VELOCITY_ERROR_RATIO,
@@ -20,7 +26,7 @@ from bisar_budget.paths.ephemeris import (
     velocity_error,
 )
 from bisar_budget.paths.flight import Orbit, PathFileError, Sample
-from bisar_budget.paths.instant import DAY, FIRST_UTC_DAY, TAI_LESS, Instant, has_leap_second, tai_less_utc, utc
+from bisar_budget.paths.instant import DAY_S, FIRST_UTC_DAY, TAI_LESS, Instant, has_leap_second, tai_less_utc, utc
 from bisar_budget.paths.messages import (
     LAST_ORBIT_DAY,
     MessageElement,
@@ -218,7 +224,7 @@ def read_covariance(
         axes = "earth"
     elif axes is None and covariance_frame in _CELESTIAL_AXES:
         axes, turn = "stars", _turn(covariance_frame, orientation, location)
-    return EpochCovariance(time, values, axes, turn)
+    return EpochCovariance(time, values, axes, turn, turns_with_orbit(covariance_frame))
 
 
 def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
@@ -278,7 +284,7 @@ def _time(line: int, text: str, system: str, name: str) -> Instant:
     head, _, seconds = text.rpartition(":")
     minute = _minute(head)
     # A leap second is part of the last minute of its day.
-    is_last = minute is not None and minute.seconds == DAY - 60
+    is_last = minute is not None and minute.seconds == DAY_S - 60
     longest = 60 + (minute is not None and is_last and system == "UTC" and has_leap_second(minute.day))
     if minute is None or not _SECONDS.fullmatch(seconds) or (past := float(seconds.rstrip("Z"))) >= longest:
         raise PathFileError(f"{name}:{line}: must be a time such as 2026-05-31T10:12:13.123 (got {shown(text)})")

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from bisar_budget.extras import install_command
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
-from bisar_budget.paths.earth import ROTATION_RATE
+from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S
 from bisar_budget.paths.flight import PathFileError
-from bisar_budget.paths.instant import DAY, TAI_LESS, Instant, tai, tai_less_utc
+from bisar_budget.paths.instant import DAY_S, TAI_LESS, Instant, tai, tai_less_utc
 
 Turn = Callable[[Vector, Instant], Vector]
 _MJD_EPOCH_JULIAN_DAYS = 2400000.5
@@ -69,7 +69,7 @@ class Orientation(NamedTuple):
 
     def misplaced(self, position: Vector) -> tuple[float, float]:
         """Largest errors of a position by the doubts of UT1 and of the pole. [m]"""
-        turned = ROTATION_RATE * self.ut1_doubt * math.hypot(position[0], position[1])
+        turned = ROTATION_RATE_RAD_PER_S * self.ut1_doubt * math.hypot(position[0], position[1])
         return turned, self.pole_doubt * math.hypot(*position)
 
 
@@ -99,14 +99,14 @@ def sidereal_time(ut1: Instant) -> float:
     1982). Its 876600 hours a century are a turn a day, which the seconds of the day give here: the equation as
     written would round to 1e-7 s.
     """
-    centuries = (ut1.day - _J2000_DAY - 0.5 + ut1.seconds / DAY) / _CENTURY_DAYS
+    centuries = (ut1.day - _J2000_DAY - 0.5 + ut1.seconds / DAY_S) / _CENTURY_DAYS
     at_midnight = (ut1.day - _J2000_DAY - 0.5) / _CENTURY_DAYS
     seconds = (
-        (67310.54841 + 8640184.812866 * at_midnight - DAY / 2) % DAY
-        + ut1.seconds * (1 + 8640184.812866 / (_CENTURY_DAYS * DAY))
+        (67310.54841 + 8640184.812866 * at_midnight - DAY_S / 2) % DAY_S
+        + ut1.seconds * (1 + 8640184.812866 / (_CENTURY_DAYS * DAY_S))
         + (0.093104 - 6.2e-6 * centuries) * centuries**2
     )
-    return seconds * (2 * math.pi / DAY)
+    return seconds * (2 * math.pi / DAY_S)
 
 
 def celestial_turn(is_j2000: bool, orientation: Orientation = UNKNOWN) -> Turn:
@@ -131,7 +131,7 @@ def celestial_turn(is_j2000: bool, orientation: Orientation = UNKNOWN) -> Turn:
     def turn(position: Vector, instant: Instant) -> Vector:
         tt = tai(instant).after(-TAI_LESS["TT"])
         ut1 = orientation.ut1(instant)
-        days = (tt.day, tt.seconds / DAY), (ut1.day, ut1.seconds / DAY)
+        days = (tt.day, tt.seconds / DAY_S), (ut1.day, ut1.seconds / DAY_S)
         dates = (number for day, fraction in days for number in (_MJD_EPOCH_JULIAN_DAYS + day, fraction))
         x, y, z = (erfa.c2t06a(*dates, *orientation.pole) @ (bias @ position)).tolist()
         return (x, y, z)
@@ -210,7 +210,7 @@ def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation
         if day == instant.day:
             first, is_first_predicted = numbers, row.is_predicted
         elif first is not None and day == instant.day + 1:
-            orientation = _between(first, numbers, instant.seconds / DAY)
+            orientation = _between(first, numbers, instant.seconds / DAY_S)
             return orientation._replace(is_predicted=row.is_predicted or is_first_predicted)
     if last_day is None or first_day is None:
         raise PathFileError(f"{name}: has no row of values")

@@ -16,14 +16,14 @@ import math
 import re
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bisar_budget.faults import shown
-from bisar_budget.paths.earth import Floats, Geodetic, axes_at, geodetic_places
+from bisar_budget.paths.earth import Floats, axes_at_places, geodetic_places
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
-from bisar_budget.paths.instant import DAY, GPS_EPOCH_DAY, WEEK_S, Instant, parse_instant
+from bisar_budget.paths.instant import DAY_S, GPS_EPOCH_DAY, WEEK_S, Instant, parse_instant
 from bisar_budget.paths.log_places import (
     LogKeys,
     LogRecords,
@@ -46,11 +46,11 @@ _HEADER_LINE = re.compile(r"% ?(GPST|UTC|JST) ?([,;]?) ?((?:latitude|x-ecef|e-ba
 _DATUM_WORDS = re.compile(r"(?:height|ecef)=([^/,)]+)")
 _MIN_ROW_BYTES = 8
 _COLUMN_NAME = re.compile(r"[a-z-]+\([^)]{0,9}\)|[A-Za-z]+")
-_DATE = re.compile(r"(\d{4})/(\d\d)/(\d\d)", re.ASCII)
-_CLOCK = re.compile(r"([01]\d|2[0-3]):([0-5]\d):([0-5]\d(?:\.\d{1,12})?|60(?:\.0{1,12})?)", re.ASCII)
+_DATE_PATTERN = re.compile(r"(\d{4})/(\d\d)/(\d\d)", re.ASCII)
+_CLOCK_PATTERN = re.compile(r"([01]\d|2[0-3]):([0-5]\d):([0-5]\d(?:\.\d{1,12})?|60(?:\.0{1,12})?)", re.ASCII)
 _JST_LESS_UTC_S = 9 * 3600.0
 _QUALITY_WORDS = {1: "fix", 2: "float", 3: "sbas", 4: "dgps", 5: "single", 6: "ppp", 7: "dead reckoning"}
-_MAX_SIGMA_M = 1e5
+_MAX_RTKLIB_SIGMA_M = 1e5
 
 
 class _Columns(NamedTuple):
@@ -124,7 +124,7 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
     table = np.array(numbers)
     seconds = table[:, -1] - (_JST_LESS_UTC_S if header.system == "JST" else 0.0)
     start = Instant(days[0], 0.0).after(float(seconds[0]))
-    times = (np.array(days) - days[0]) * DAY + (seconds - seconds[0])
+    times = (np.array(days) - days[0]) * DAY_S + (seconds - seconds[0])
     words = "RTKLIB solution" + _qualities(table, header)
     if "x-ecef(m)" in header.indices:
         hold_to_ellipsoid(keys, name, "has x, y, z")
@@ -170,7 +170,7 @@ def _row(text: str, header: _Columns, location: str) -> tuple[int, list[float]]:
     if len(cells) != header.width:
         raise PathFileError(f"{location}: has {counted(len(cells), 'cell')}, the columns need {header.width}")
     if "/" in cells[0]:
-        day, clock = _day(cells[0]), _CLOCK.fullmatch(cells[1])
+        day, clock = _day(cells[0]), _CLOCK_PATTERN.fullmatch(cells[1])
         if day is None or clock is None:
             time_text = shown(f"{cells[0]} {cells[1]}")
             raise PathFileError(
@@ -184,7 +184,7 @@ def _row(text: str, header: _Columns, location: str) -> tuple[int, list[float]]:
             raise PathFileError(
                 f"{location}: must begin with a GPS week and its second, like 2421 105619.250 (got {time_text!r})"
             )
-        days, seconds = divmod(second, DAY)
+        days, seconds = divmod(second, DAY_S)
         day = GPS_EPOCH_DAY + 7 * int(week) + int(days)
     row = [0.0, 0.0]  # instead of the two cells of the time
     for cell in cells[2:]:
@@ -201,7 +201,7 @@ def _row(text: str, header: _Columns, location: str) -> tuple[int, list[float]]:
 @lru_cache(maxsize=64)
 def _day(text: str) -> int | None:
     """Modified Julian day of a date like 2026/06/01; None if the text is no date."""
-    match = _DATE.fullmatch(text)
+    match = _DATE_PATTERN.fullmatch(text)
     instant = parse_instant("{}-{}-{}T00:00:00Z".format(*match.groups())) if match else None
     return None if instant is None else instant.day
 
@@ -269,9 +269,9 @@ def _sigmas(
         return None
     sigmas = table[:, [header.indices[column] for column in names]]
     records.leave_out(
-        ~((sigmas >= 0) & (sigmas <= _MAX_SIGMA_M)).all(axis=1),
+        ~((sigmas >= 0) & (sigmas <= _MAX_RTKLIB_SIGMA_M)).all(axis=1),
         lambda i: (
-            f"standard deviations must be from 0 to {_MAX_SIGMA_M:g} m "
+            f"standard deviations must be from 0 to {_MAX_RTKLIB_SIGMA_M:g} m "
             f"(got {', '.join(f'{sigma:g}' for sigma in sigmas[i])})"
         ),
     )
@@ -283,10 +283,11 @@ def _sigmas(
     covariance[:, range(3), range(3)] = sigmas**2
     for column, i, j in (("sdxy(m)", 0, 1), ("sdyz(m)", 1, 2), ("sdzx(m)", 2, 0)):
         if column in header.indices:
-            roots = np.nan_to_num(np.clip(table[:, header.indices[column]], -_MAX_SIGMA_M, _MAX_SIGMA_M))
+            roots = np.nan_to_num(
+                np.clip(table[:, header.indices[column]], -_MAX_RTKLIB_SIGMA_M, _MAX_RTKLIB_SIGMA_M)
+            )
             covariance[:, i, j] = covariance[:, j, i] = roots * np.abs(roots)
-    points: Any = (latitude, longitude, np.zeros_like(latitude))
-    axes: Floats = np.moveaxis(np.array(axes_at(Geodetic(*points)).axes), -1, 0)
+    axes: Floats = np.moveaxis(axes_at_places(latitude, longitude), -1, 0)
     squares = np.einsum("nij,njk,nik->ni", axes, covariance, axes)
     local_sigmas: Floats = np.sqrt(np.maximum(squares, 0.0))
     return local_sigmas

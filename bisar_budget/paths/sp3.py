@@ -37,7 +37,7 @@ _TAI_LESS_SYSTEM_S = {"GPS": TAI_LESS["GPS"], "GAL": 19.0, "QZS": 19.0, "IRN": 1
 _UTC_SYSTEMS = ("UTC", "GLO")
 _MIN_COORDINATE_KM = 1e-6  # all three coordinates are 0 for a bad or absent position
 _NAMED_LINES = 3  # lines that the words of an orbit name
-_MAX_GAP_RATIO = 1.5  # of a gap to the usual step; no polynomial crosses a longer gap
+_MAX_SAMPLE_GAP_RATIO = 1.5  # of a gap to the usual step; no polynomial crosses a longer gap
 
 
 @dataclass
@@ -340,7 +340,7 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
     edges = [
         n
         for n in range(1, len(samples))
-        if n in satellite.breaks or samples[n].time.since(samples[n - 1].time) > _MAX_GAP_RATIO * usual_step
+        if n in satellite.breaks or samples[n].time.since(samples[n - 1].time) > _MAX_SAMPLE_GAP_RATIO * usual_step
     ]
     lines = f"{header.nameless} position{'s' * (header.nameless > 1)}"
     nameless = f", {lines} without a satellite's name left out" if header.nameless else ""

@@ -9,9 +9,9 @@ number of coefficients. For motion by finite forces it does: even acceleration t
 of variance h³ in pieces of length h. Noise of a receiver that wanders (Gauss-Markov) leaves h.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,31 +20,31 @@ from bisar_budget.geometry import Pieces, PlatformState, Vector
 
 Floats = NDArray[np.float64]
 
-ORDER = 5
+SPLINE_ORDER = 5
 MIN_PIECE_S = 1.0  # faster motion is vibration, which has rows of its own
 _MIN_HALF_FIXES = 3  # in each half of a piece that is halved
 _HALVED_MOTION_FRACTION = 0.5  # pieces with more than this fraction of the largest motion are halved together
 
 
 def basis(times: Floats, edges: Floats) -> Floats:
-    """B-splines of pieces between rising edges (m + 1,) at times (n,), (n, m + `ORDER`).
+    """B-splines of pieces between rising edges (m + 1,) at times (n,), (n, m + `SPLINE_ORDER`).
 
     The first and the last piece go on beyond the edges. Source: the recursion of de Boor (1972) and Cox (1972).
     """
     pieces = len(edges) - 1
-    knots = np.concatenate([np.full(ORDER, edges[0]), edges, np.full(ORDER, edges[-1])])
+    knots = np.concatenate([np.full(SPLINE_ORDER, edges[0]), edges, np.full(SPLINE_ORDER, edges[-1])])
     piece = np.clip(np.searchsorted(edges, times, "right") - 1, 0, pieces - 1)
-    # Only ORDER + 1 of the B-splines differ from zero in a piece: `nonzero` has their values, and no 0/0 occurs.
+    # In a piece only SPLINE_ORDER + 1 B-splines differ from zero: `nonzero` has their values, and no 0/0 occurs.
     nonzero = np.ones((len(times), 1))
-    for order in range(1, ORDER + 1):
-        after = knots[piece[:, None] + ORDER + 1 + np.arange(order)]
-        before = knots[piece[:, None] + ORDER + 1 - order + np.arange(order)]
+    for order in range(1, SPLINE_ORDER + 1):
+        after = knots[piece[:, None] + SPLINE_ORDER + 1 + np.arange(order)]
+        before = knots[piece[:, None] + SPLINE_ORDER + 1 - order + np.arange(order)]
         share = nonzero / (after - before)
         nonzero = np.zeros((len(times), order + 1))
         nonzero[:, :-1] = (after - times[:, None]) * share
         nonzero[:, 1:] += (times[:, None] - before) * share
-    matrix = np.zeros((len(times), pieces + ORDER))
-    np.put_along_axis(matrix, piece[:, None] + np.arange(ORDER + 1), nonzero, axis=1)
+    matrix = np.zeros((len(times), pieces + SPLINE_ORDER))
+    np.put_along_axis(matrix, piece[:, None] + np.arange(SPLINE_ORDER + 1), nonzero, axis=1)
     return matrix
 
 
@@ -103,14 +103,14 @@ class SplineFit:
 
     def state(self) -> PlatformState:
         """The path of the spline."""
-        # Powers of the time from the middle of a piece, from values at ORDER + 1 nodes: exact but for rounding.
+        # Powers of the time from the middle of a piece, from SPLINE_ORDER + 1 nodes: exact but for rounding.
         middles, halves = (self.edges[1:] + self.edges[:-1]) / 2, np.diff(self.edges) / 2
-        nodes = np.cos(np.pi * (np.arange(ORDER + 1) + 0.5) / (ORDER + 1))
+        nodes = np.cos(np.pi * (np.arange(SPLINE_ORDER + 1) + 0.5) / (SPLINE_ORDER + 1))
         values = (basis((middles[:, None] + halves[:, None] * nodes).ravel(), self.edges) @ self.series).reshape(
-            len(middles), ORDER + 1, 3
+            len(middles), SPLINE_ORDER + 1, 3
         )
-        powers = np.linalg.solve(np.vander(nodes, ORDER + 1, increasing=True), values)
-        powers /= halves[:, None, None] ** np.arange(ORDER + 1)[:, None]
+        powers = np.linalg.solve(np.vander(nodes, SPLINE_ORDER + 1, increasing=True), values)
+        powers /= halves[:, None, None] ** np.arange(SPLINE_ORDER + 1)[:, None]
         powers[:, 0] += self.center
         middle_piece = min(max(int(np.searchsorted(self.edges, 0.0, "right")) - 1, 0), len(middles) - 1)
         position, velocity, (x, y, z), *bends = _shifted(powers[middle_piece], -middles[middle_piece])
@@ -124,7 +124,7 @@ class SplineFit:
         )
 
 
-def _vector(values: Any) -> Vector:
+def _vector(values: Iterable[float]) -> Vector:
     x, y, z = (float(value) for value in values)
     return (x, y, z)
 

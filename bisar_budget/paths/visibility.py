@@ -31,8 +31,8 @@ _MAX_TOUCHING_GAP_S = 5 * _CHANGE_ERROR_S
 _SEARCH_STEPS = 16  # of a span, in the search for orbits in a file that does not state its times
 _MIN_SEARCH_STEP_S = 3600.0
 # From powers of the position between two nodes to weights of the samples: the inverse of Vandermonde's matrix.
-_WEIGHTS = np.linalg.inv(np.vander(np.arange(_INTERPOLATION_NODES, dtype=float), increasing=True))
-_POWERS = np.arange(_INTERPOLATION_NODES)
+_INTERPOLATION_WEIGHTS = np.linalg.inv(np.vander(np.arange(_INTERPOLATION_NODES, dtype=float), increasing=True))
+_INTERPOLATION_POWERS = np.arange(_INTERPOLATION_NODES)
 
 
 class OrbitGap(NamedTuple):
@@ -78,10 +78,10 @@ class _Sampled:
         last = len(self.positions) - _INTERPOLATION_NODES
         first = np.clip(sample_number.astype(int) - (_INTERPOLATION_NODES // 2 - 1), 0, last)
         offset = (sample_number - first)[:, None]
-        powers = offset**_POWERS
-        rates = np.hstack([np.zeros_like(offset), powers[:, :-1] * _POWERS[1:]])
-        samples = self.positions[first[:, None] + _POWERS]
-        weights, slopes = powers @ _WEIGHTS, rates @ _WEIGHTS / self.step
+        powers = offset**_INTERPOLATION_POWERS
+        rates = np.hstack([np.zeros_like(offset), powers[:, :-1] * _INTERPOLATION_POWERS[1:]])
+        samples = self.positions[first[:, None] + _INTERPOLATION_POWERS]
+        weights, slopes = powers @ _INTERPOLATION_WEIGHTS, rates @ _INTERPOLATION_WEIGHTS / self.step
         return np.einsum("nk,nkx->nx", weights, samples), np.einsum("nk,nkx->nx", slopes, samples)
 
 

@@ -37,6 +37,7 @@ from bisar_budget.phrases.input_sentences import (
     input_usually_has_more,
     log_is_coarse,
     log_is_flown_as_it_is,
+    orbit_errors_are_independent,
 )
 from bisar_budget.phrases.limit_sentences import (
     aggregate_over,
@@ -98,6 +99,7 @@ __all__ = (
     "not_declared_as_required",
     "note",
     "nothing_judges",
+    "orbit_errors_are_independent",
     "oscillator_does_not_vibrate",
     "other_model_fails",
     "phase_does_not_grow",

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from bisar_budget.phrases.notes import composed
 from bisar_budget.phrases.templates import size_words
+from bisar_budget.units import format_quantity
 
 TEMPLATES: dict[str, str] = {
     "log-leaves-too-much": (
@@ -93,4 +94,16 @@ def input_usually_has_more(error: StatedError) -> str:
     return (
         f"{error.words} usually have an error of {size_words(max(error.stated), error.unit)} on each axis,"
         f" but {error.declared_words}: declare at least a third of the usual error in {error.key}"
+    )
+
+
+@composed
+def orbit_errors_are_independent(platform: str, position_m: float, rate: float, velocity: float) -> str:
+    """Said of the position and velocity errors of a platform in free fall. [m, rad/s, m/s]"""
+    sigma, rest = format_quantity(position_m, "m"), format_quantity(velocity, "m/s")
+    return (
+        f"the {platform} is in free fall: a position error of {sigma} goes with a velocity error of about "
+        f"{format_quantity(rate * position_m, 'm/s')} (rate of the orbit times position error); the file declares "
+        f"{rest}, independent of the position, which is pessimistic; the covariance of both says more "
+        "(motion_error.covariance)"
     )

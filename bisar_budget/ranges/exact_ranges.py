@@ -28,24 +28,23 @@ single case serves any number of lanes.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
-from bisar_budget.geometry import GroundVector, PlatformState, Vectors, dot, norm
-from bisar_budget.image_plane import FEWEST_NODES, LEADING, GroundMatrix, Sampling, band_variance, nodes
+from bisar_budget import image_plane
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
+from bisar_budget.geometry import GroundVector, PlatformState, VectorArrays, Vectors, dot, norm
+from bisar_budget.image_plane import FEWEST_PATH_NODES, LEGENDRE_LEADING, GroundMatrix, Sampling, band_variance, nodes
 
 if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Truths = NDArray[np.bool_]
+Shifts = Sequence[Sequence[Floats] | Floats]  # east, north and up of each platform, (nodes, lanes) or alike. [m]
 
 FINE_NODE_COUNT = 24  # nodes of courses less smooth than the courses of (22)
 RANGE_ROUNDING_FRACTION = 2e-15  # rounding error of a few operations, as a fraction of a range sum
@@ -54,7 +53,7 @@ MAX_TURN_RAD = 1.0  # turn of a line of sight within the aperture up to which Le
 # A quadratic phase φ at the aperture edge leaves the phase with a variance of 4φ²/45.
 QUADRATIC_OF_VARIANCE = math.sqrt(45 / 4)
 
-STILL = [np.zeros((1, 1))] * 3  # shifts of a platform that no error moves
+NO_SHIFTS = [np.zeros((1, 1))] * 3  # shifts of a platform that no error moves
 
 
 @dataclass(frozen=True)
@@ -110,10 +109,10 @@ class PointSettings:
     samples_at_once: int = 1 << 16
 
 
-SETTINGS = PointSettings()
+POINT_SETTINGS = PointSettings()
 
-# Number of arrays of all samples that hold measured paths, and the number together with the arrays of a step.
-_MEASURED_ARRAY_COUNT, _ARRAY_COUNT = 8, 16
+# Number of arrays of both platforms that hold measured paths, and the number together with the arrays of a step.
+_MEASURED_ARRAY_COUNT, _ARRAY_COUNT = 5, 9
 
 
 def aperture_nodes(aperture_time_s: float) -> Floats:
@@ -128,10 +127,10 @@ class Effect(NamedTuple):
     phase at the aperture edge. [rad/unit]
     """
 
-    constant: Any
-    linear: Any
-    qpe: Any
-    cubic: Any
+    constant: PerCase
+    linear: PerCase
+    qpe: PerCase
+    cubic: PerCase
 
 
 class FullEffect(NamedTuple):
@@ -141,10 +140,10 @@ class FullEffect(NamedTuple):
     that is left at the displaced point. [rad/unit]
     """
 
-    east: Any
-    north: Any
-    qpe: Any
-    cubic: Any
+    east: PerCase
+    north: PerCase
+    qpe: PerCase
+    cubic: PerCase
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +163,7 @@ class TimeTags:
         case = self.case.take(lanes)
         return replace(self, case=case) if (case >= 0).any() else None
 
-    def put(self, platform: int, tag_s: Floats, along: Sequence[Floats], *, is_rate: bool = False) -> list[Any]:
+    def put(self, platform: int, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> list[Any]:
         """Insert a platform's shift by time tags (nodes, lanes) [m], or its rate per second, into other motions."""
         tagged = np.flatnonzero(self.case >= 0)
         (times,), tag_s = _take_cases([self.times], self.case[tagged]), tag_s[:, tagged]
@@ -186,85 +185,65 @@ class Lanes:
         The case of each error.
     at_nodes : (nodes, lanes)
         Position error, or for a clock the range error [m/unit], or for a time tag its sign.
-    moves : two of float or (lanes,)
+    moves : (2, lanes)
         1 where the transmitter, or the receiver, moves, else 0.
-    direction : Vectors
-        Direction of the motion: floats, (lanes,), or (nodes, lanes) for a direction that turns. For a small time tag
-        the velocity. [m/s]
-    order : int or (lanes,)
+    directions : (2, 3, nodes, lanes)
+        Directions in which a unit of each error moves transmitter and receiver; zero for a platform that does not
+        move. For a small time tag the velocity. [m/s] One node if no direction turns, one lane if all lanes share it.
+    order : (lanes,)
         Power of slow time with which a position error grows; -1 for a clock. An error of velocity turns Doppler.
-    of_receiver : Vectors, optional
-        Direction of the receiver's motion if it differs.
     tags : TimeTags, optional
         Paths of the lanes that are time tags, if any lane is.
     """
 
     case: Indices
     at_nodes: Floats
-    moves: tuple[Any, Any] = (0.0, 0.0)
-    direction: Vectors = (0.0, 0.0, 0.0)
-    order: Any = -1
-    of_receiver: Vectors | None = None
+    moves: Floats
+    directions: Floats
+    order: Any
     tags: TimeTags | None = None
-
-    @property
-    def directions(self) -> tuple[Vectors, Vectors]:
-        """Directions in which errors move transmitter and receiver."""
-        return self.direction, self.direction if self.of_receiver is None else self.of_receiver
 
     @property
     def turns(self) -> bool:
         """Whether any direction turns within the aperture."""
-        return any(np.ndim(component) > 1 for direction in self.directions for component in direction)
+        return bool(self.directions.shape[2] > 1)
 
     @property
     def platforms(self) -> list[int]:
         """Platforms that any of the lanes moves."""
-        return [platform for platform in (0, 1) if np.any(self.moves[platform])]
+        return [platform for platform in (0, 1) if self.moves[platform].any()]
 
     def of(self, lanes: Indices) -> "Lanes":
         """Some of the lanes."""
-        u, v, x, y, z, order, *of_receiver_axes = (
-            component.take(lanes, axis=-1) if isinstance(component, np.ndarray) else component
-            for component in (*self.moves, *self.direction, self.order, *(self.of_receiver or ()))
-        )
-        of_receiver = (of_receiver_axes[0], of_receiver_axes[1], of_receiver_axes[2]) if of_receiver_axes else None
-        tags = self.tags and self.tags.of(lanes)
-        at_nodes = self.at_nodes.take(lanes, axis=1)
-        return Lanes(self.case.take(lanes), at_nodes, (u, v), (x, y, z), order, of_receiver, tags)
+        moves, directions, order = _take([self.moves, self.directions, self.order], lanes)
+        tags, at_nodes = self.tags and self.tags.of(lanes), self.at_nodes.take(lanes, axis=1)
+        return Lanes(self.case.take(lanes), at_nodes, moves, directions, order, tags)
 
     def there(self, case: Indices) -> "Lanes":
         """The lanes, one per case, for a new choice of cases: errors of `ExactRanges.at`."""
         return replace(self.of(case), case=np.arange(case.size))
 
-    def shifts(self, size: Any) -> list[Any]:
-        """Shift of each platform at the nodes by errors of given sizes. [m]"""
-        along = [self.at_nodes * (size * component) for component in self.direction]
-        both = [along, along]
-        if self.of_receiver is not None:
-            both[1] = [self.at_nodes * (size * component) for component in self.of_receiver]
-        if self.tags is not None:
-            both = [
-                self.tags.put(platform, self.at_nodes * size, along_platform)
-                for platform, along_platform in enumerate(both)
-            ]
-        return [_weighted(shift, weight) for shift, weight in zip(both, self.moves, strict=True)]
+    def shifts(self, size: Any) -> Floats:
+        """Shift of each platform at the nodes by errors of given sizes, (2, 3, nodes, lanes). [m]"""
+        course = self.at_nodes * size
+        shifts: Floats = self.directions * course
+        return shifts if self.tags is None else self._tagged(self.tags, course, shifts)
 
-    def ways(self, size: Any) -> tuple[Sequence[Any], Sequence[Any]]:
+    def ways(self, size: Any) -> Floats:
         """Directions in which larger errors move transmitter and receiver; for time tags they turn with the paths."""
         if self.tags is None:
             return self.directions
-        of_transmitter, of_receiver = (
-            self.tags.put(platform, self.at_nodes * size, direction, is_rate=True)
-            for platform, direction in enumerate(self.directions)
-        )
-        return of_transmitter, of_receiver
+        return self._tagged(self.tags, self.at_nodes * size, self.directions, is_rate=True)
 
-    def clock(self, size: Any) -> Any:
+    def _tagged(self, tags: TimeTags, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> Floats:
+        """Shifts or directions of both platforms, with those of the time tags in their place."""
+        both = np.array([tags.put(platform, tag_s, along[platform], is_rate=is_rate) for platform in (0, 1)])
+        return np.asarray(both * self.moves[:, None, None])
+
+    def clock(self, size: Any) -> Floats:
         """Range error at the nodes by clock errors of given sizes. [m]"""
-        transmitter, receiver = self.moves
-        is_clock = 1.0 - np.maximum(transmitter, receiver)
-        return self.at_nodes * (size * is_clock) if np.any(is_clock) else np.zeros_like(self.at_nodes)
+        is_clock = 1.0 - self.moves.max(axis=0)
+        return np.asarray(self.at_nodes * (size * is_clock))
 
 
 class SmallErrors(NamedTuple):
@@ -284,29 +263,18 @@ class SmallErrors(NamedTuple):
     @classmethod
     def of(cls, errors: Sequence[Lanes]) -> "SmallErrors":
         """Small errors from lanes, one `Lanes` per error, whose lanes are the cases."""
-        courses: dict[Any, Floats] = {}
-        components = [
-            component
-            for lanes_of_error in errors
-            for direction in lanes_of_error.directions
-            for component in direction
-        ]
-        cases = max((np.shape(component)[-1] for component in components if np.ndim(component)), default=1)
+        keys = [int(lanes.order[0]) if lanes.platforms else -index for index, lanes in enumerate(errors, 1)]
+        courses = dict(zip(keys, (lanes.at_nodes for lanes in errors), strict=True))
+        cases = max((lanes.directions.shape[-1] for lanes in errors), default=1)
         ways, turning = np.zeros((len(errors), 7, cases)), dict[int, Floats]()
-        for index, (lanes, way) in enumerate(zip(errors, ways, strict=True), 1):
-            courses[lanes.order if lanes.platforms else -index] = lanes.at_nodes
+        for index, (lanes, way) in enumerate(zip(errors, ways, strict=True)):
             if lanes.turns:
-                way = turning[index - 1] = np.zeros((7, len(lanes.at_nodes), cases))
-            for platform in lanes.platforms:
-                for axis, component in enumerate(lanes.directions[platform]):
-                    way[3 * platform + axis] = component * lanes.at_nodes if lanes.turns else component
+                way = turning[index] = np.zeros((7, len(lanes.at_nodes), cases))
+            by_axis = lanes.directions.reshape(6, -1, lanes.directions.shape[-1])
+            way[:6] = by_axis * lanes.at_nodes if lanes.turns else by_axis[:, 0]
             way[6] = not lanes.platforms
-        names = list(courses)
-        course = [
-            names.index(lanes_of_error.order if lanes_of_error.platforms else -index)
-            for index, lanes_of_error in enumerate(errors, 1)
-        ]
-        return cls(np.array(list(courses.values())), np.array(course), ways, turning)
+        course = np.array([list(courses).index(key) for key in keys])
+        return cls(np.array(list(courses.values())), course, ways, turning)
 
     def there(self, case: Indices) -> "SmallErrors":
         """The same errors for a new choice of cases, like `Lanes.there`."""
@@ -322,7 +290,7 @@ class ImagePoints(NamedTuple):
     at the centre.
     """
 
-    is_settled: Truths
+    is_settled: Booleans
     east: Floats
     north: Floats
     quadratic: Floats
@@ -387,8 +355,8 @@ class ExactRanges:
         k: Floats,
         band: Floats,
         sampling: Sampling,
-        tracks: Sequence[Vectors],
-        positions: Sequence[Vectors],
+        tracks: Sequence[VectorArrays],
+        positions: Sequence[VectorArrays],
         *,
         has_direct_path: bool = False,
     ) -> None:
@@ -406,7 +374,7 @@ class ExactRanges:
         cls,
         paths: Sequence[PlatformState],
         radar: "Radar",
-        aperture_time: Any,
+        aperture_time: PerCase,
         count: int,
         cases: int = 1,
         *,
@@ -414,7 +382,7 @@ class ExactRanges:
     ) -> "ExactRanges":
         """Exact ranges of collections, with paths of transmitter and receiver, at their scene centres."""
 
-        def of_each(value: Any) -> Floats:
+        def of_each(value: PerCase) -> Floats:
             return np.array(np.broadcast_to(np.asarray(value, dtype=float), (cases,)))
 
         half, k, band = (
@@ -451,15 +419,31 @@ class ExactRanges:
         return np.array([p[axis] / R + q[axis] / S for axis in (0, 1)])
 
     @cached_property
+    def _both(self) -> tuple[Floats, Floats]:
+        """Positions of both platforms at the nodes, (2, 3, nodes, n), and their ranges, (2, nodes, n). [m]"""
+        tracks = np.array([np.broadcast_arrays(*track) for track in self.tracks])
+        return tracks, np.array(np.broadcast_arrays(*self.ranges))
+
+    @cached_property
     def sine(self) -> Floats:
         """Sine of the angle between the directions that band and turn resolve at the centre."""
         return self.matrix.sine
 
     @cached_property
-    def is_turned(self) -> Truths:
+    def product_weights(self) -> Floats:
+        """Weights of the parts that `Sampling.centred` gives, in a product of V, (nodes + 1, n)."""
+        return np.concatenate(((1 + self.band) * self.mean, self.band[None]))
+
+    @cached_property
+    def near_fold(self) -> Floats:
+        """Determinant of H below which a point is near a fold, (n,)."""
+        return np.asarray(POINT_SETTINGS.near_fold_fraction**2 * self.matrix.determinant)
+
+    @cached_property
+    def is_turned(self) -> Booleans:
         """Whether a line of sight turns by more than `MAX_TURN_RAD` between two times of the aperture, (n,)."""
         least = np.full(self.half.shape, math.inf)
-        if self.fit.shape[1] > FEWEST_NODES:  # with fewer nodes no line of sight turns that far
+        if self.fit.shape[1] > FEWEST_PATH_NODES:  # with fewer nodes no line of sight turns that far
             for track, ranges in zip(self.tracks, self.ranges, strict=True):
                 looks = np.stack(np.broadcast_arrays(*(component / ranges for component in track)))
                 looks = np.concatenate((looks, self.sampling.to_ends @ looks), axis=1)
@@ -486,7 +470,7 @@ class ExactRanges:
         return np.asarray(RANGE_ROUNDING_FRACTION * self.k * recorded)
 
     @cached_property
-    def _between(self) -> Vectors:
+    def _between(self) -> VectorArrays:
         """Position of the transmitter relative to the receiver at the nodes. [m]"""
         (x, y, z), (u, v, w) = self.tracks
         return (x - u, y - v, z - w)
@@ -497,7 +481,7 @@ class ExactRanges:
         return np.asarray(norm(self._between))
 
     @cached_property
-    def heard_along(self) -> tuple[Vectors, Vectors]:
+    def heard_along(self) -> tuple[VectorArrays, VectorArrays]:
         """Unit vectors along the direct path at the nodes: receiver to transmitter, transmitter to receiver."""
         x, y, z = (component / self.baselines for component in self._between)
         return ((x, y, z), (-x, -y, -z))
@@ -508,10 +492,12 @@ class ExactRanges:
         """Position error at the nodes by a unit of an error: 1, τ or τ²/2 of (22)."""
         return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
 
-    def clock_course(self, terms: Sequence[Any]) -> Floats:
+    def clock_course(self, terms: Sequence[PerCase]) -> Floats:
         """Range error at the nodes of a clock error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³, by its terms. [m]"""
-        seconds = sum(term * self.times**power for power, term in enumerate(terms) if np.any(term))
-        return np.asarray(SPEED_OF_LIGHT * seconds + np.zeros_like(self.times))
+        seconds = np.zeros_like(self.times)
+        for term in reversed(terms):
+            seconds = seconds * self.times + term
+        return SPEED_OF_LIGHT_MPS * seconds
 
     def along(self, platform: int, direction: Vectors) -> Floats:
         """Change of a platform's range at the nodes per metre along a direction: −u·d, or −(u − b)·d if heard."""
@@ -522,7 +508,8 @@ class ExactRanges:
         """Range error at the nodes by a small unit of errors, one per case, or all of a single case. [m/unit]"""
         moved = lanes.clock(1.0)
         for platform in lanes.platforms:
-            moved = moved + lanes.moves[platform] * self.along(platform, lanes.directions[platform]) * lanes.at_nodes
+            x, y, z = lanes.directions[platform]
+            moved = moved + self.along(platform, (x, y, z)) * lanes.at_nodes
         return np.asarray(moved)
 
     def quadratics_of(self, errors: SmallErrors) -> Floats:
@@ -542,7 +529,7 @@ class ExactRanges:
         for error_index, ways in errors.turning.items():
             phase[error_index] = np.einsum("np,wnp,wnp->p", weights, ways, along)
             seen[error_index] = np.einsum("np,wnp->p", np.abs(weights), np.abs(ways))
-        return np.where(np.abs(phase) > ROUNDING * seen, phase, 0.0)
+        return np.where(np.abs(phase) > VECTOR_ROUNDING_FRACTION * seen, phase, 0.0)
 
     @cached_property
     def place_weights(self) -> tuple[Floats, Floats]:
@@ -601,7 +588,7 @@ class ExactRanges:
         # Where terms cancel exactly, the rest is rounding and would give a limit where none exists.
         return FullEffect(_unless_rounding(east, seen_east), _unless_rounding(north, seen_north), *phases)
 
-    def left_of_small(self, range_error: Floats, moved: tuple[Any, Any]) -> Floats:
+    def left_of_small(self, range_error: Floats, moved: tuple[PerCase, PerCase]) -> Floats:
         """Range error that small errors (..., nodes, cases) leave at the point they move to, (..., cases). [m]"""
         (by_east, by_north), (east, north) = self.slopes, (np.asarray(component)[..., None, :] for component in moved)
         return np.asarray(range_error + by_east * east + by_north * north)
@@ -620,10 +607,12 @@ class ExactRanges:
     @cached_property
     def _legendre(self) -> Floats:
         """Orders 0 to 3 at the nodes, each with its leading term equal to 1 at the edge, (nodes, 4)."""
-        return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEADING)
+        return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEGENDRE_LEADING)
 
     # ------------------------------------------------------------------ errors of any size
-    def phases(self, lanes: Lanes, size: Floats, near: tuple[Any, Any], *, is_at_fold: bool = False) -> ImagePoints:
+    def phases(
+        self, lanes: Lanes, size: Floats, near: tuple[Floats, Floats], *, is_at_fold: bool = False
+    ) -> ImagePoints:
         """Find the point to which errors of given sizes move a point at the centre, and the defocus there.
 
         The search starts `near` [m]. It finds a point where it settles at once, or, `is_at_fold`, where V leads down
@@ -632,13 +621,16 @@ class ExactRanges:
         """
         return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
-    def left_over(self, lanes: Lanes, size: Floats, point: tuple[Any, Any]) -> Floats:
+    def left_over(self, lanes: Lanes, size: Floats, point: tuple[PerCase, PerCase]) -> Floats:
         """Range error at the nodes that errors leave at ground points, (nodes, lanes). [m]"""
-        room = self._room(lanes.case.size)
-        measured = self._measured(lanes.clock(size), lanes.shifts(size), lanes.case, room)
-        return _remaining(measured, *point, room[_MEASURED_ARRAY_COUNT:])
+        lane_count = lanes.case.size
+        room = self._room(lane_count)
+        clock, measured = self._measured(lanes.clock(size), lanes.shifts(size), lanes.case, room)
+        east, north = (np.broadcast_to(component, lane_count) for component in point)
+        growth, _, _ = _grown(measured, np.array((east, north)), room[_MEASURED_ARRAY_COUNT:])
+        return np.asarray(clock - growth[0] - growth[1])
 
-    def _heard(self, shifts: Sequence[Any], case: Indices) -> Floats:
+    def _heard(self, shifts: Iterable[Any], case: Indices) -> Floats:
         """The c·t̃ at the nodes by shifts of the platforms if the direct path is the clock. [m]"""
         a, b, c = (of_transmitter - of_receiver for of_transmitter, of_receiver in zip(*shifts, strict=True))
         x, y, z, baseline = _take_cases([*self._between, self.baselines], case)
@@ -651,43 +643,31 @@ class ExactRanges:
         It is the motion of the least of V: by the second derivative of V, and by the change of its slope with the
         error.
         """
-        course, ways = lanes.at_nodes, lanes.ways(size)
-        east, north = point
-        shifts, remaining, change = lanes.shifts(size), lanes.clock(size), lanes.clock(1.0)
-        looks, distances = np.empty((2, 2, *course.shape)), np.empty((2, *course.shape))
-        turns = np.zeros((2, *course.shape))
-        for platform, (track, weight, shift, (x, y, z)) in enumerate(
-            zip(self.tracks, lanes.moves, shifts, ways, strict=True)
-        ):
-            *true, true_range = _take_cases([*track, self.ranges[platform]], lanes.case)
-            a, b, c = (first + moved for first, moved in zip(true, shift, strict=True))
-            a, b = a - east, b - north
-            R = np.sqrt(a * a + b * b + c * c)
-            a, b, c = a / R, b / R, c / R
-            looks[platform, 0], looks[platform, 1], distances[platform] = a, b, R
-            remaining = remaining + (true_range - R)
-            if np.any(weight):
-                step = weight * course
-                along = a * x + b * y + c * z
-                change = change - step * along
-                turns[0] += step * (x - a * along) / R
-                turns[1] += step * (y - b * along) / R
+        course, ways, shifts = lanes.at_nodes, lanes.ways(size), lanes.shifts(size)
+        tracks, true_ranges = _take_cases(self._both, lanes.case)
+        vectors = tracks + shifts
+        vectors[:, :2] -= np.array(point)[:, None]
+        distances = np.sqrt(np.einsum("panc,panc->pnc", vectors, vectors))
+        vectors /= distances[:, None]
+        looks = vectors[:, :2]
+        along = np.einsum("panc,panc->pnc", vectors, ways)
+        turns = (course / distances[:, None] * (ways[:, :2] - along[:, None] * looks)).sum(axis=0)
+        remaining = lanes.clock(size) + (true_ranges - distances).sum(axis=0)
+        change = lanes.clock(1.0) - course * along.sum(axis=0)
         if self.has_direct_path:
-            ahead, back = lanes.moves
-            x, y, z = (ahead * first - back * second for first, second in zip(*ways, strict=True))
-            a, b, c, true_range = _take_cases([*self._between, self.baselines], lanes.case)
-            a, b, c = (between + first - second for between, first, second in zip((a, b, c), *shifts, strict=True))
-            apart = np.sqrt(a * a + b * b + c * c)
-            remaining = remaining + (apart - true_range)
-            change = change + np.where(apart > 0, course * (a * x + b * y + c * z) / apart, 0.0)
-        (band,) = _take_cases([self.band], lanes.case)
-        matrix = GroundMatrix.of(looks[0] + looks[1], self.fit, band)
-        weights = matrix.projected(remaining)
-        slope = (matrix.projection * change + weights * turns).sum(axis=1)
-        return _against(matrix, weights, looks, distances, slope)
+            *between, baseline = _take_cases([*self._between, self.baselines], lanes.case)
+            vector, way = between + shifts[0] - shifts[1], ways[0] - ways[1]
+            apart = norm(tuple(vector))
+            remaining += apart - baseline
+            change += np.where(apart > 0, course * dot(tuple(vector), tuple(way)) / apart, 0.0)
+        (weights,) = _take_cases([self.product_weights], lanes.case)
+        seen = np.array((remaining, *looks.sum(axis=0)))
+        view = _GroundView(seen, looks.swapaxes(0, 1), distances, self.sampling.centred, weights)
+        east, north = view.step(view.products(change) + (view.node_weights * turns).sum(axis=1))
+        return east, north
 
     def settled(
-        self, clock: Floats, shifts: Sequence[Any], near: Any, case: Indices, *, is_at_fold: bool = False
+        self, clock: Floats, shifts: Iterable[Any], near: Any, case: Indices, *, is_at_fold: bool = False
     ) -> ImagePoints:
         """Newton's method for the least of V, or `is_at_fold` a descent.
 
@@ -695,53 +675,39 @@ class ExactRanges:
         [m], `near` the start of the search [m], and `case` the cases of the lanes.
         """
         lanes = clock.shape[1]
-        size = max(1, min(lanes, SETTINGS.samples_at_once // self.fit.shape[1]))
-        points = ImagePoints(np.zeros(lanes, dtype=bool), *(np.full(lanes, math.nan) for _ in range(7)))
-        start = [np.broadcast_to(np.asarray(values, dtype=float), (lanes,)) for values in near]
+        size = max(1, min(lanes, POINT_SETTINGS.samples_at_once // self.fit.shape[1]))
+        points = ImagePoints(np.zeros(lanes, dtype=bool), *np.full((7, lanes), math.nan))
+        start = np.empty((2, lanes))
+        start[0], start[1] = near
         with np.errstate(all="ignore"):
             room = self._room(size)
             for first in range(0, lanes, size):
                 block = slice(first, first + size)
-                here = ImagePoints._make(values[block] for values in points)
                 moved = [
                     [along if along.shape[-1] == 1 else along[:, block] for along in values] for values in shifts
                 ]
                 measured = self._measured(clock[:, block], moved, case[block], room)
-                lane_indices = np.arange(here.east.size)
-                near_by = start[0][block], start[1][block]
-                search = _PointSearch(
-                    self,
-                    here,
-                    lane_indices,
-                    case[block],
-                    *near_by,
-                    measured,
-                    room[_MEASURED_ARRAY_COUNT:, :, : lane_indices.size],
-                )
+                search = _PointSearch(self, case[block], start[:, block], *measured, room)
                 search.descend() if is_at_fold else search.run()
+                search.store(ImagePoints._make(values[block] for values in points))
         return points
 
     def _room(self, lanes: int) -> Floats:
         """Work arrays for a number of lanes, allocated once because allocation takes longer than filling them."""
-        return np.empty((_ARRAY_COUNT, self.fit.shape[1], lanes))
+        return np.empty((_ARRAY_COUNT, 2, self.fit.shape[1], lanes))
 
-    def _measured(self, clock: Floats, shifts: Sequence[Any], case: Indices, room: Floats) -> list[Floats]:
-        """Parts of errors that `_seen` takes, (nodes, lanes): the clock error, and five of each platform, in `room`.
+    def _measured(self, clock: Floats, shifts: Iterable[Any], case: Indices, room: Floats) -> tuple[Floats, Floats]:
+        """Parts of errors that `_grown` takes: the clock error, and five arrays (2, nodes, lanes), in `room`.
 
         If d is added to a platform's vector r, its range R grows by p/(R + √(R² + p)), with p = d·(2r + d). This form
-        has no rounding of the range itself. From a point at g = (east, north) the growth has p - 2r̂·g + |g|²
-        instead.
+        has no rounding of the range itself. From a point at g = (east, north) the growth has p - g·(2r̂ - g) instead.
         """
         if self.has_direct_path:  # no other clock error counts
             clock = clock + self._heard(shifts, case)
-        measured = [clock]
-        for track, ranges, (a, b, c), room_of_platform in zip(
-            self.tracks, self.ranges, shifts, (room[:4], room[4:8]), strict=True
-        ):
-            x, y, z, R = _take_cases([*track, ranges], case)
-            u, v, p, squared_range = room_of_platform[
-                ..., : max(x.shape[-1], a.shape[-1])
-            ]  # arrays that all lanes share are computed once
+        measured = room[:_MEASURED_ARRAY_COUNT, ..., : case.size]
+        for platform, (track, (a, b, c)) in enumerate(zip(self.tracks, shifts, strict=True)):
+            x, y, z, R = _take_cases([*track, self.ranges[platform]], case)
+            u, v, p, true_range, squared_range = measured[:, platform]
             np.add(x, a, out=u)
             np.add(y, b, out=v)
             np.add(x, u, out=p)
@@ -753,171 +719,218 @@ class ExactRanges:
             squared_range += c
             squared_range *= c
             p += squared_range
+            true_range[:] = R
             np.multiply(R, R, out=squared_range)
             squared_range += p
-            measured += [u, v, R, p, squared_range]
-        return measured
+        return clock, measured
 
 
 class _PointSearch:
-    """Newton's method for the points of the lanes that have not settled. `alive` are their indices in `points`.
+    """Newton's method for the points of lanes, by the range errors that measured paths leave.
 
-    The search also keeps the cases of these lanes, their points so far [m], the measured arrays, and work arrays.
+    `lane` are the indices of the lanes that have not settled, `of` their cases, and `point` their points so far,
+    east and north. [m] A lane that has settled keeps its view before the last step, and this step.
     """
 
     def __init__(
-        self,
-        exact: ExactRanges,
-        points: ImagePoints,
-        alive: Indices,
-        of: Indices,
-        east: Floats,
-        north: Floats,
-        measured: list[Floats],
-        room: Floats,
+        self, exact: ExactRanges, of: Indices, point: Floats, clock: Floats, measured: Floats, room: Floats
     ) -> None:
-        self.exact, self.points, self.alive, self.of = exact, points, alive, of
-        self.east, self.north, self.measured, self.room = east, north, measured, room
+        self.exact, self.of, self.point, self.clock, self.measured = exact, of, point, clock, measured
+        self.case, self.lane = of, np.arange(of.size)
+        self.room = room[_MEASURED_ARRAY_COUNT:, ..., : of.size]
+        self.is_settled = np.zeros(of.size, dtype=bool)
+        self.last_view = np.empty((3, exact.fit.shape[1], of.size))
+        self.last_point, self.last_step = np.empty((2, 2, of.size))
+        self.last_determinant = np.empty(of.size)
+        self._set_cases()
 
     def run(self) -> None:
         """Search with the slopes of each point."""
-        exact, before = self.exact, np.full(self.alive.size, math.inf)
-        for _ in range(SETTINGS.max_newton_iterations):
-            k, meets, band = _take_cases([exact.k, exact.nearest, exact.band], self.of)
-            remaining, looks, distances = _seen(self.measured, self.east, self.north, self.room)
-            nearest = distances.min(axis=(0, 1))
-            matrix = GroundMatrix.of(looks[0] + looks[1], exact.fit, band)
-            step_east, step_north = _newton_step(matrix, remaining, looks, distances)
-            self.east, self.north = self.east + step_east, self.north + step_north
-            step = step_east * step_east + step_north * step_north
-            is_apart = nearest >= SETTINGS.nearest_fraction * meets
-            turn = matrix.turned_from(exact.matrix, self.of)
-            unseen = np.where(
-                np.abs(turn) < SETTINGS.near_fold_fraction,
-                SETTINGS.last_step_near_fold_fraction * SETTINGS.last_step_rad,
-                SETTINGS.last_step_rad,
-            )
-            is_done = is_apart & (k * step < unseen * nearest)
-            self._keep(
-                is_done & (turn > -SETTINGS.folded_fraction),
-                remaining,
-                matrix.slopes,
-                (step_east, step_north),
-                turn,
-            )
-            going = np.flatnonzero(~is_done & (step < SETTINGS.shrinking_ratio * before) & is_apart)
+        before = np.full(self.lane.size, math.inf)
+        for _ in range(POINT_SETTINGS.max_newton_iterations):
+            view = self._view()
+            step = view.step(view.slope)
+            self.point = self.point + step
+            square = step[0] ** 2 + step[1] ** 2
+            is_apart = view.nearest >= self.least_range
+            is_done = is_apart & (square < self._last_step(view) * view.nearest)
+            self._keep(np.flatnonzero(is_done), view, step)
+            going = np.flatnonzero(~is_done & (square < POINT_SETTINGS.shrinking_ratio * before) & is_apart)
             if not going.size:
                 return
-            before = step
-            if going.size < self.alive.size:
-                before = step[going]
+            before = square
+            if going.size < self.lane.size:
+                before = square[going]
                 self._go_on(going)
 
     def descend(self) -> None:
         """Search by damped steps that only go down V. It is slower, and safe where V hardly bends, as near a fold."""
-        exact = self.exact
-        k, meets, band = _take_cases([exact.k, exact.nearest, exact.band], self.of)
-        damping = SETTINGS.damping_fraction * sum(_take_cases([exact.matrix.xx + exact.matrix.yy], self.of))
-        least, is_going = np.full(self.alive.size, math.inf), np.ones(self.alive.size, dtype=bool)
-        best_point, slope, bends = (np.zeros((count, least.size)) for count in (2, 2, 3))
-        for _ in range(SETTINGS.max_descent_steps):
-            remaining, looks, distances = _seen(self.measured, self.east, self.north, self.room)
-            matrix = GroundMatrix.of(looks[0] + looks[1], exact.fit, band)
-            weights, nearest = matrix.projected(remaining), distances.min(axis=(0, 1))
-            variance = (weights * remaining).sum(axis=0)
-            falls = variance <= least
-            least, damping = (
-                np.minimum(least, variance),
-                np.where(falls, damping / SETTINGS.damping_ratio, damping * SETTINGS.damping_ratio),
-            )
-            best_point = np.where(falls, (self.east, self.north), best_point)
-            bends = np.where(falls, _bends(matrix, weights, looks, distances), bends)
-            slope = np.where(falls, np.einsum("anc,nc->ac", matrix.projection, remaining), slope)
-            xx, xy, yy = bends
+        exact, count = self.exact, self.lane.size
+        (trace,) = _take_cases([exact.matrix.xx + exact.matrix.yy], self.of)
+        damping, is_going = POINT_SETTINGS.damping_fraction * trace, np.ones(count, dtype=bool)
+        least, best_point, slope, bends = np.full(count, math.inf), self.point, *np.zeros((2, 3, count))
+        slope = slope[:2]
+        for _ in range(POINT_SETTINGS.max_descent_steps):
+            view = self._view()
+            falls = view.variance <= least
+            least = np.minimum(least, view.variance)
+            damping = damping * np.where(falls, 1 / POINT_SETTINGS.damping_ratio, POINT_SETTINGS.damping_ratio)
+            best_point = np.where(falls, self.point, best_point)
+            xx, xy, yy = bends = np.where(falls, view.bends, bends)
+            slope = np.where(falls, view.slope, slope)
             flattest = (xx + yy) / 2 - np.hypot((xx - yy) / 2, xy)
             more = np.maximum(damping, -2 * flattest)
             step = _solved((xx + more, xy, yy + more), slope)
-            turn = matrix.turned_from(exact.matrix, self.of)
-            is_done = falls & (
-                k * (step[0] ** 2 + step[1] ** 2)
-                < SETTINGS.last_step_near_fold_fraction * SETTINGS.last_step_rad * nearest
-            )
-            is_done &= nearest >= SETTINGS.nearest_fraction * meets
-            self._keep(is_going & is_done & (turn > -SETTINGS.folded_fraction), remaining, matrix.slopes, step, turn)
+            last_step = POINT_SETTINGS.last_step_near_fold_fraction * POINT_SETTINGS.last_step_rad / self.k
+            is_done = falls & (step[0] ** 2 + step[1] ** 2 < last_step * view.nearest)
+            is_done &= view.nearest >= self.least_range
+            self._keep(np.flatnonzero(is_going & is_done), view, step)
             is_going &= ~is_done
             if not is_going.any():
                 return
-            self.east, self.north = best_point + np.array(step)
+            self.point = best_point + step
+
+    def store(self, points: ImagePoints) -> None:
+        """Store the points of the lanes that have settled, and the defocus there, unless they are beyond a fold.
+
+        The range error is what was left before the last step, plus the change by the step. A phase below the rounding
+        counts as 0.
+        """
+        exact, lanes = self.exact, np.flatnonzero(self.is_settled)
+        if not lanes.size:
+            return
+        view, step = self.last_view.take(lanes, axis=-1), self.last_step[:, lanes]
+        k, band, rounding = _take_cases([exact.k, exact.band, exact.rounding], self.case[lanes])
+        determinant = self.last_determinant[lanes]
+        turn = image_plane.turn(
+            determinant,
+            image_plane.orientation(view[1:], exact.fit, band, determinant),
+            exact.matrix,
+            self.case[lanes],
+        )
+        remaining = view[0] + view[1] * step[0] + view[2] * step[1]
+        orders = exact.fit @ remaining
+        is_turned = exact.is_turned if exact.is_turned.size == 1 else exact.is_turned[self.case[lanes]]
+        hidden, beyond_cubic = _unresolved(orders, exact.mean_squares(remaining, orders), k, band, is_turned)
+        phases = np.array((k * orders[2], k * orders[3], hidden, beyond_cubic))
+        phases = np.where(np.abs(phases) > rounding, phases, 0.0)
+        is_ahead = turn > -POINT_SETTINGS.folded_fraction
+        lanes = lanes[is_ahead]
+        points.is_settled[lanes] = True
+        for kept, values in zip(points[1:], (*self.last_point[:, self.is_settled], *phases, turn), strict=True):
+            kept[lanes] = values[is_ahead]
+
+    def _view(self) -> "_GroundView":
+        """View of the ground at the points so far."""
+        growth, looks, distances = _grown(self.measured, self.point, self.room)
+        seen = np.empty((3, *growth.shape[1:]))
+        np.subtract(self.clock, growth[0], out=seen[0])
+        seen[0] -= growth[1]
+        looks /= distances
+        np.add(looks[:, 0], looks[:, 1], out=seen[1:])
+        return _GroundView(seen, looks, distances, self.exact.sampling.centred, self.weights)
+
+    def _last_step(self, view: "_GroundView") -> Floats:
+        """Square of a step after which a lane has settled, over the distance to the nearer platform. [m]"""
+        is_near_fold = view.determinant < self.near_fold
+        smaller, usual = (
+            POINT_SETTINGS.last_step_near_fold_fraction * POINT_SETTINGS.last_step_rad,
+            POINT_SETTINGS.last_step_rad,
+        )
+        return np.asarray(np.where(is_near_fold, smaller, usual) / self.k)
+
+    def _set_cases(self) -> None:
+        """Numbers of the cases of the lanes."""
+        exact = self.exact
+        of_cases = [exact.k, POINT_SETTINGS.nearest_fraction * exact.nearest, exact.near_fold, exact.product_weights]
+        self.k, self.least_range, self.near_fold, self.weights = _take_cases(of_cases, self.of)
 
     def _go_on(self, going: Indices) -> None:
         """Go on with some of the lanes."""
-        self.alive, self.of = self.alive[going], self.of[going]
-        self.east, self.north = self.east[going], self.north[going]
-        self.measured, self.room = _take(self.measured, going), self.room[..., : going.size]
+        self.lane, self.of, self.point = self.lane[going], self.of[going], self.point[:, going]
+        (self.clock,), self.measured = _take([self.clock], going), self.measured.take(going, axis=-1)
+        self.room = self.room[..., : going.size]
+        if self.exact.k.size > 1:
+            self._set_cases()
 
-    def _keep(
-        self, is_done: Truths, remaining: Floats, slopes: Floats, step: tuple[Floats, Floats], turn: Floats
-    ) -> None:
-        """Store the lanes that have settled; a phase below the rounding counts as 0.
-
-        The range error is `remaining` before the last step, plus the change by the step.
-        """
-        done = np.flatnonzero(is_done)
-        if not done.size:
-            return
-        exact, points, lanes = self.exact, self.points, self.alive[done]
-        by_east, by_north, remaining = _take([*slopes, remaining], done)
-        remaining = remaining + by_east * step[0][done] + by_north * step[1][done]
-        orders = exact.fit @ remaining
-        k, band, rounding = _take_cases([exact.k, exact.band, exact.rounding], self.of[done])
-        is_turned = exact.is_turned if exact.is_turned.size == 1 else exact.is_turned[self.of[done]]
-        hidden, beyond_cubic = _unresolved(orders, exact.mean_squares(remaining, orders), k, band, is_turned)
-        points.is_settled[lanes] = True
-        for kept, value in ((points.east, self.east), (points.north, self.north), (points.turn, turn)):
-            kept[lanes] = value[done]
-        phases = (k * orders[2], k * orders[3], hidden, beyond_cubic)
-        for kept, phase in zip((points.quadratic, points.cubic, points.hidden, points.rest), phases, strict=True):
-            kept[lanes] = np.where(np.abs(phase) > rounding, phase, 0.0)
+    def _keep(self, done: Indices, view: "_GroundView", step: Floats) -> None:
+        """Keep the lanes that have settled."""
+        if done.size:
+            lanes = self.lane[done]
+            self.is_settled[lanes] = True
+            self.last_view[..., lanes] = view.seen.take(done, axis=-1)
+            self.last_point[:, lanes], self.last_step[:, lanes] = self.point[:, done], step[:, done]
+            self.last_determinant[lanes] = view.determinant[done]
 
 
-def _newton_step(matrix: GroundMatrix, remaining: Floats, looks: Floats, distances: Floats) -> tuple[Floats, Floats]:
-    """Step east and north to the least of V, by its slope and the change of the slope. [m]
+class _GroundView:
+    """View of the ground from points.
 
-    `remaining` are range errors left at the nodes (nodes, lanes) [m], `looks` the components of the lines of sight of
-    both platforms over the ground (2, 2, nodes, lanes), and `distances` their ranges. [m]
+    Attributes
+    ----------
+    seen : (3, nodes, lanes)
+        Range errors left at the nodes [m], and what a metre east, and north, adds to them. [m/m]
+    looks : (2, 2, nodes, lanes)
+        Lines of sight over the ground, by axis and platform.
+    distances : (2, nodes, lanes)
+        Ranges of both platforms. [m]
+    nearest : (lanes,)
+        The smallest range. [m]
+    variance : (lanes,)
+        V. [m²]
+    slope : (2, lanes)
+        Half the slope of V, east and north. [m]
+    matrix : (2, 2, lanes)
+        The matrix H.
+    determinant : (lanes,)
+        Determinant of H.
     """
-    slope = np.einsum("anc,nc->ac", matrix.projection, remaining)
-    return _against(matrix, matrix.projected(remaining), looks, distances, slope)
+
+    def __init__(self, seen: Floats, looks: Floats, distances: Floats, centred: Floats, weights: Floats) -> None:
+        self.seen, self.looks, self.distances, self._centred = seen, looks, distances, centred
+        self.nearest = distances.min(axis=(0, 1))
+        parts = centred @ seen
+        self._weighted = weights * parts
+        products = np.einsum("anc,bnc->abc", self._weighted, parts)
+        self.variance, self.slope, self.matrix = products[0, 0], products[0, 1:], products[1:, 1:]
+        (xx, xy), (_, yy) = self.matrix
+        self.determinant = xx * yy - xy * xy
+
+    @cached_property
+    def node_weights(self) -> Floats:
+        """Weights at the nodes whose sum with a history is its product of V with the range error, (nodes, lanes)."""
+        return np.asarray(self._centred.T @ self._weighted[0])
+
+    @cached_property
+    def bends(self) -> tuple[Floats, Floats, Floats]:
+        """Half the second derivative of V: east and east, east and north, north and north."""
+        bends = self.node_weights / self.distances
+        turned, total = np.einsum("apnc,bpnc->abc", self.looks * bends, self.looks), bends.sum(axis=(0, 1))
+        (xx, xy), (_, yy) = self.matrix + turned
+        return xx - total, xy, yy - total
+
+    def products(self, values: Floats) -> Floats:
+        """Products of V of a history at the nodes with the range that a metre east, and north, adds, (2, lanes)."""
+        return np.asarray(np.einsum("anc,nc->ac", self._weighted[1:], self._centred @ values))
+
+    def step(self, slope: Floats) -> Floats:
+        """Step that removes half a slope of V, by its second derivative; where V is no bowl, by H alone. [m]"""
+        xx, xy, yy = self.bends
+        is_bowl = (xx * yy - xy * xy > POINT_SETTINGS.bowl_fraction * self.determinant) & (xx > 0)
+        if not is_bowl.all():
+            (h_xx, h_xy), (_, h_yy) = self.matrix
+            xx, xy, yy = np.where(is_bowl, self.bends, (h_xx, h_xy, h_yy))
+        return _solved((xx, xy, yy), slope)
 
 
-def _against(
-    matrix: GroundMatrix, weights: Floats, looks: Floats, distances: Floats, slope: Floats
-) -> tuple[Floats, Floats]:
-    """Step that removes half a slope of V, by the change of the slope; where V is no bowl, by H alone. [m]"""
-    xx, xy, yy = _bends(matrix, weights, looks, distances)
-    is_bowl = (xx * yy - xy * xy > SETTINGS.bowl_fraction * matrix.determinant) & (xx > 0)
-    if not is_bowl.all():
-        of_matrix = matrix.xx, matrix.xy, matrix.yy
-        xx, xy, yy = (np.where(is_bowl, *both) for both in zip((xx, xy, yy), of_matrix, strict=True))
-    return _solved((xx, xy, yy), slope)
-
-
-def _bends(matrix: GroundMatrix, weights: Floats, looks: Floats, distances: Floats) -> tuple[Floats, Floats, Floats]:
-    """Half the second derivative of V: east and east, east and north, north and north."""
-    bends = weights / distances
-    turned, total = np.einsum("panc,pbnc->abc", looks * bends[:, None], looks), bends.sum(axis=(0, 1))
-    return matrix.xx - total + turned[0, 0], matrix.xy + turned[0, 1], matrix.yy - total + turned[1, 1]
-
-
-def _solved(bends: tuple[Floats, Floats, Floats], slope: Floats) -> tuple[Floats, Floats]:
-    """Step that removes half a slope of V, by half the second derivative of V. [m]"""
+def _solved(bends: Sequence[Floats], slope: Floats) -> Floats:
+    """Step that removes half a slope of V, by half the second derivative of V, (2, lanes). [m]"""
     (xx, xy, yy), (x, y) = bends, slope
-    determinant = xx * yy - xy * xy
-    return (xy * y - yy * x) / determinant, (xy * x - xx * y) / determinant
+    return np.asarray((xy * y - yy * x, xy * x - xx * y) / (xx * yy - xy * xy))
 
 
 def _unresolved(
-    orders: Floats, squares: tuple[Floats, Floats], k: Floats, band: Floats, is_turned: Truths
+    orders: Floats, squares: tuple[Floats, Floats], k: Floats, band: Floats, is_turned: Booleans
 ) -> tuple[Floats, Floats]:
     """Hidden phase, and rms beyond the cubic, by orders 0 to 3 at the edge [m] and mean squares. [m²], [rad]"""
     _, slope, _, cubic = orders
@@ -928,59 +941,29 @@ def _unresolved(
 
 
 def _unless_rounding(value: Floats, seen: Floats) -> Floats:
-    return np.where(np.abs(value) <= ROUNDING * seen, 0.0, value)
+    return np.where(np.abs(value) <= VECTOR_ROUNDING_FRACTION * seen, 0.0, value)
 
 
-def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:
-    """Shift of a platform, multiplied by the weight with which lanes move the platform."""
-    if np.ndim(weight):
-        return [weight * component for component in along]
-    return along if weight else STILL
+def _grown(measured: Floats, point: Floats, room: Floats) -> tuple[Floats, Floats, Floats]:
+    """Growth of the ranges of both platforms to points (2, lanes), in `room`, (2, nodes, lanes). [m]
 
-
-def _grow(platform: Sequence[Floats], east: Any, north: Any, room: Floats, distance: Floats) -> None:
-    """Fill `room` with the growth of a platform's range to points, and `distance` with the range itself. [m]"""
-    u, v, R, p, squared_range = platform
-    grown, scratch = room[:2]
-    np.multiply(u, 2 * east, out=grown)
-    np.multiply(v, 2 * north, out=scratch)
-    grown += scratch
-    np.subtract(east * east + north * north, grown, out=grown)
-    np.add(squared_range, grown, out=distance)
-    np.sqrt(distance, out=distance)
-    grown += p
-    np.add(distance, R, out=scratch)
-    grown /= scratch
-
-
-def _remaining(measured: Sequence[Floats], east: Any, north: Any, room: Floats) -> Floats:
-    """Range error left at the nodes at points (lanes,), (nodes, lanes). [m]"""
-    clock, first, second = measured[0], room[:3], room[3:6]
-    _grow(measured[1:6], east, north, first, room[6])
-    _grow(measured[6:], east, north, second, room[6])
-    remaining: Floats = np.subtract(clock, first[0], out=first[0])
-    remaining -= second[0]
-    return remaining
-
-
-def _seen(measured: Sequence[Floats], east: Floats, north: Floats, room: Floats) -> tuple[Floats, Floats, Floats]:
-    """Range error left at the nodes at points, (nodes, lanes) [m], and the view of both platforms, in `room`.
-
-    The view has the components east and north of the lines of sight, (2, 2, nodes, lanes), and the ranges, (2, nodes,
-    lanes). [m]
+    Further the vectors over the ground from the points to the platforms, (2, 2, nodes, lanes), by axis and platform,
+    and the ranges, (2, nodes, lanes). [m]
     """
-    both = room[:8].reshape(2, 4, *room.shape[1:])
-    for platform, out in zip((measured[1:6], measured[6:]), both, strict=True):
-        _grow(platform, east, north, out, out[3])
-        np.subtract(platform[0], east, out=out[1])
-        np.subtract(platform[1], north, out=out[2])
-        out[1:3] /= out[3]
-    remaining = measured[0] - both[0, 0]
-    remaining -= both[1, 0]
-    return remaining, both[:, 1:3], both[:, 3]
+    (p, true_range, squared_range), over_ground, point = measured[2:], measured[:2], point[:, None, None]
+    looks, grown, distances = room[:2], room[2], room[3]
+    np.subtract(over_ground, point, out=looks)
+    both = over_ground + looks
+    both *= point
+    np.add(both[0], both[1], out=grown)
+    np.subtract(squared_range, grown, out=distances)
+    np.sqrt(distances, out=distances)
+    np.subtract(p, grown, out=grown)
+    grown /= np.add(distances, true_range, out=both[0])
+    return grown, looks, distances
 
 
-def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Indices) -> ImagePoints:
+def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -> ImagePoints:
     """Find where errors of any course move a point at the centre, if necessary in steps from no error on.
 
     Parameters
@@ -1001,7 +984,7 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Ind
         of `point_paths`, no point has it if half a cycle is hidden and the gradients of V span little.
     """
     points = _within_ends(exact.settled(clock, shifts, (0.0, 0.0), case))
-    for steps in SETTINGS.course_steps:
+    for steps in POINT_SETTINGS.course_steps:
         missed = np.flatnonzero(~points.is_settled)
         if not missed.size:
             break
@@ -1014,7 +997,7 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Ind
             near = np.array((there.east, there.north)) * ((step + 2) / (step + 1))  # NaN from the first lost point on
         for column, later in zip(points, there, strict=True):
             column[missed] = later
-    has_ended = (np.abs(points.turn) < SETTINGS.folded_fraction) & (points.hidden > SETTINGS.end_rad)
+    has_ended = (np.abs(points.turn) < POINT_SETTINGS.folded_fraction) & (points.hidden > POINT_SETTINGS.end_rad)
     points.is_settled[has_ended] = False
     for values in points[1:]:
         values[has_ended] = math.nan
@@ -1023,11 +1006,11 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Ind
 
 def _within_ends(points: ImagePoints) -> ImagePoints:
     """The points, without points beyond the end of the image."""
-    is_gone = (np.abs(points.turn) < SETTINGS.folded_fraction) & (points.hidden > SETTINGS.end_rad)
+    is_gone = (np.abs(points.turn) < POINT_SETTINGS.folded_fraction) & (points.hidden > POINT_SETTINGS.end_rad)
     return ImagePoints(points.is_settled & ~is_gone, *(np.where(is_gone, math.nan, column) for column in points[1:]))
 
 
-def _take(arrays: Sequence[Floats], indices: Indices) -> list[Floats]:
+def _take(arrays: Sequence[Floats] | Floats, indices: Indices) -> list[Floats]:
     """Some lanes of arrays (nodes, lanes). An array that all lanes share stays as it is."""
     return [array if array.shape[-1] == 1 else array.take(indices, axis=-1) for array in arrays]
 

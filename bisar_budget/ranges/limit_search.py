@@ -7,11 +7,10 @@ no crest between smaller sizes may be above it. All searches take each step toge
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 
-from bisar_budget.ranges.exact_ranges import Floats, Indices, Truths
+from bisar_budget.arrays import Booleans, Floats, Indices
 from bisar_budget.ranges.point_paths import (
     AREA,
     CUBIC,
@@ -70,13 +69,13 @@ class SearchSettings:
     max_rounds: int = 100
 
 
-SETTINGS = SearchSettings()
+SEARCH_SETTINGS = SearchSettings()
 
 # Sizes that a few searches try in addition: fractions of the first size, factors around the size where a limit is
 # expected, and factors of a size while the search looks for the limit.
 FIRST_SIZE_FRACTIONS = np.array((0.25, 0.5, 0.75, 1.3, 2.0))
 NEIGHBOUR_FACTORS = np.array((0.98, 0.996, 1.004, 1.02))
-GROWTH_FACTORS = SETTINGS.growth_factor ** np.arange(1, 5)
+GROWTH_FACTORS = SEARCH_SETTINGS.growth_factor ** np.arange(1, 5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,14 +110,14 @@ class LimitSearches:
     first: Floats
     largest: Floats
     group: Indices
-    is_alone: Truths
+    is_alone: Booleans
 
     @classmethod
     def joined(cls, searches: "list[LimitSearches]") -> "LimitSearches":
         """All searches of a list."""
         return cls(*(np.concatenate([getattr(each, field.name) for each in searches]) for field in fields(cls)))
 
-    def of(self, index: Any) -> "LimitSearches":
+    def of(self, index: Indices) -> "LimitSearches":
         """Some of the searches."""
         return LimitSearches(*(getattr(self, field.name)[index] for field in fields(self)))
 
@@ -146,7 +145,7 @@ def find_first_sizes(paths: PointPaths, searches: LimitSearches, smallest: Float
         The smallest sizes known so far; the sizes that are found replace larger ones. [unit]
     """
     tries = np.zeros(searches.lane.shape, dtype=int)
-    for _ in range(SETTINGS.max_rounds):
+    for _ in range(SEARCH_SETTINGS.max_rounds):
         of_group = smallest[:, searches.group]
         bound = np.where(searches.is_alone, np.choose(searches.requirement, of_group), of_group.min(axis=0))
         state = _SearchState(paths, searches, np.minimum(searches.largest, bound), tries)
@@ -187,7 +186,7 @@ class _SearchState:
         self.size = np.where(is_known, points[SIZE], math.nan)
         self.square = np.where(is_known, searches.square(points), math.nan)
         reaches = self.square >= 1 - 2 * LIMIT_FRACTION
-        self.is_between: Truths = np.asarray(reaches.any(axis=1))
+        self.is_between: Booleans = np.asarray(reaches.any(axis=1))
         first_above = np.where(self.is_between, reaches.argmax(axis=1), self.count)
         self._set_slopes(every)
         self.doubtful = self._doubtful_sizes(first_above)
@@ -219,9 +218,9 @@ class _SearchState:
         rise, slope_low, slope_high = stop - start, self.slope[:, :-1] * width, self.slope[:, 1:] * width
         expected_rise = slope_low.copy()
         expected_rise[:, 0] = (width[:, 0] / self.searches.first) ** 2  # the rise of a small error
-        is_wide = width > SETTINGS.trusted_interval_fraction * self.size[:, 1:]
-        threshold = np.where(is_wide, (1 - SETTINGS.crest_fraction) ** 2, 1.0)
-        departs = np.abs(rise - expected_rise) > SETTINGS.departure_fraction
+        is_wide = width > SEARCH_SETTINGS.trusted_interval_fraction * self.size[:, 1:]
+        threshold = np.where(is_wide, (1 - SEARCH_SETTINGS.crest_fraction) ** 2, 1.0)
+        departs = np.abs(rise - expected_rise) > SEARCH_SETTINGS.departure_fraction
         size = np.where(is_wide & departs, low + width / 2, math.nan)
         for position in reversed(_crests(slope_low, rise, slope_high)):
             height = _on_cubic(position, start, rise, slope_low, slope_high)
@@ -230,7 +229,7 @@ class _SearchState:
         is_below = np.arange(1, self.size.shape[1]) < first_above[:, None]
         return np.where(is_below & (low < self.bound[:, None]), size, math.nan)
 
-    def _between(self, every: Indices, first_above: Indices) -> tuple[Floats, Truths]:
+    def _between(self, every: Indices, first_above: Indices) -> tuple[Floats, Booleans]:
         """Size at which a cubic between known points reaches the limit, and whether it is close enough."""
         high = np.minimum(first_above, self.size.shape[1] - 1)
         low = high - 1
@@ -240,7 +239,7 @@ class _SearchState:
         position = chord = (1 - start) / (stop - start)
         square_term = 2 * (3 * (stop - start) - 2 * slope_low - slope_high)
         cube_term = 3 * (slope_low + slope_high - 2 * (stop - start))
-        for _ in range(SETTINGS.newton_steps):
+        for _ in range(SEARCH_SETTINGS.newton_steps):
             steepness = slope_low + position * (square_term + cube_term * position)
             height = _on_cubic(position, start, stop - start, slope_low, slope_high)
             position = position - (height - 1) / steepness
@@ -250,15 +249,15 @@ class _SearchState:
         rise = np.sqrt(stop) - np.sqrt(start)  # of the value itself, whose slope a straight line keeps
         value_slope_low = np.where(start > 0, slope_low / (2 * np.sqrt(start)), rise)
         bend = np.abs(value_slope_low - slope_high / (2 * np.sqrt(stop)))
-        is_bent = bend > SETTINGS.bent_fraction * np.abs(rise)
-        trusted = np.where(is_bent, SETTINGS.trusted_bent_fraction, SETTINGS.trusted_fraction)
+        is_bent = bend > SEARCH_SETTINGS.bent_fraction * np.abs(rise)
+        trusted = np.where(is_bent, SEARCH_SETTINGS.trusted_bent_fraction, SEARCH_SETTINGS.trusted_fraction)
         is_close = (stop - 1 < 2 * trusted) & (self.high - size < 2 * trusted * self.high)
         is_close |= (1 - start < 2 * trusted) & (size - (self.high - width) < 2 * trusted * self.high)
         # Every fourth try halves the interval, so that no search is slow.
         position = np.where(self.tries % 4 == 3, 0.5, np.minimum(np.maximum(position, 0.01), 0.99))
         self.inside = self.high - (1 - position) * width
         by_power = self._by_power(every, low, high)
-        is_steep = (stop > SETTINGS.steep_ratio) & (by_power > self.size[every, low]) & (by_power < self.high)
+        is_steep = (stop > SEARCH_SETTINGS.steep_ratio) & (by_power > self.size[every, low]) & (by_power < self.high)
         self.inside = np.where(is_steep, by_power, self.inside)
         return np.where(is_narrow, self.high - width, size), is_close | is_narrow
 
@@ -274,7 +273,7 @@ class _SearchState:
         power = np.where(below < above, rise / growth, 2.0)
         return np.asarray(self.size[every, high] * self.square[every, high] ** (-1 / power))
 
-    def _ahead(self, every: Indices, last: Indices) -> tuple[Floats, Truths]:
+    def _ahead(self, every: Indices, last: Indices) -> tuple[Floats, Booleans]:
         """Size at which a parabola through the last points reaches the limit, and whether it is close enough."""
         before = np.maximum(last - 1, 0)
         slope = self.slope[every, last]
@@ -286,14 +285,14 @@ class _SearchState:
         ahead = np.where(is_rising, self.low + 2 * missing / steepness, math.inf)
         value, value_before = np.sqrt(self.square[every, last]), np.sqrt(self.square[every, before])
         rise, expected_rise = value - value_before, slope / (2 * value) * self.width[every, before]
-        is_bent = np.abs(expected_rise - rise) > SETTINGS.bent_fraction / 2 * np.abs(rise)
-        trusted = np.where(is_bent, SETTINGS.trusted_bent_fraction, SETTINGS.trusted_fraction)
+        is_bent = np.abs(expected_rise - rise) > SEARCH_SETTINGS.bent_fraction / 2 * np.abs(rise)
+        trusted = np.where(is_bent, SEARCH_SETTINGS.trusted_bent_fraction, SEARCH_SETTINGS.trusted_fraction)
         is_close = (missing < 2 * trusted) & (ahead < (1 + 1.5 * trusted) * self.low) & (self.area > 0.5)
         return ahead, is_close
 
     def next_sizes(self, going: Indices, *, is_several: bool) -> tuple[Indices, Floats]:
         """Searches that go on and the sizes that they try next: one per lane, or several."""
-        growth = SETTINGS.growth_factor
+        growth = SEARCH_SETTINGS.growth_factor
         low, bound, is_between = self.low[going], self.bound[going], self.is_between[going]
         grown = np.minimum(np.maximum(self.ahead[going], 1.01 * low), growth * low)
         is_first = low < self.searches.first[going]

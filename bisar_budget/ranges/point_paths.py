@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bisar_budget.constants import ROUNDING
-from bisar_budget.ranges.exact_ranges import SETTINGS as POINT_SETTINGS
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Indices, Lanes, Truths
+from bisar_budget.arrays import Booleans, Floats, Indices
+from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
+from bisar_budget.ranges.exact_ranges import POINT_SETTINGS, ExactRanges, Lanes
 
 # Rows of a known point: the size of the error [unit], then the fields of `ImagePoints`.
 SIZE, EAST, NORTH, QUADRATIC, CUBIC, HIDDEN, REST, AREA = ROWS = range(8)
@@ -72,17 +72,17 @@ class PathSettings:
     few_lanes_count: int = 256
 
 
-SETTINGS = PathSettings()
+PATH_SETTINGS = PathSettings()
 
 
 def tries_several_sizes(lane_count: int, is_alike: bool) -> bool:
     """Whether a step tries several sizes per lane."""
-    return is_alike or lane_count < SETTINGS.few_lanes_count
+    return is_alike or lane_count < PATH_SETTINGS.few_lanes_count
 
 
 def up_to(sizes: Floats, largest: Floats) -> Floats:
     """Limit sizes to a largest size, and round sizes just below the largest one up to it."""
-    return np.where(sizes > (1 - SETTINGS.same_size_fraction) * largest, largest, sizes)
+    return np.where(sizes > (1 - PATH_SETTINGS.same_size_fraction) * largest, largest, sizes)
 
 
 class PointPaths:
@@ -168,7 +168,7 @@ class PointPaths:
             point[1:, lost] = wider[1:]
             distance = np.hypot(wider.east - start[EAST], wider.north - start[NORTH])
             displacement = np.hypot(start[EAST], start[NORTH])
-            is_on_path[lost] = wider.is_settled & (distance <= SETTINGS.fade_fraction * displacement)
+            is_on_path[lost] = wider.is_settled & (distance <= PATH_SETTINGS.fade_fraction * displacement)
 
         is_end = (
             is_on_path
@@ -196,8 +196,8 @@ class PointPaths:
         last = self._point(lane, index)
         to_fold = self._distance_to_fold(index, lane, last)
         longest = np.where(last[SIZE] >= self._limited_from[lane], self._longest_step[lane], math.inf)
-        is_far_fold = to_fold > SETTINGS.finest_step_fraction * last[SIZE]
-        step = np.minimum(longest, np.where(is_far_fold, SETTINGS.fold_fraction * to_fold, math.inf))
+        is_far_fold = to_fold > PATH_SETTINGS.finest_step_fraction * last[SIZE]
+        step = np.minimum(longest, np.where(is_far_fold, PATH_SETTINGS.fold_fraction * to_fold, math.inf))
         # A size a little beyond the step is reached in one step too, except after a miss: it would miss again.
         is_after_miss = self._missed_last[lane] & np.isfinite(longest)
         is_beyond = size - last[SIZE] >= np.where(is_after_miss, 1.0, 1.2) * step
@@ -212,30 +212,31 @@ class PointPaths:
         order = np.lexsort((size, lane))
         is_new = np.ones(order.size, dtype=bool)
         next_lane, next_size = lane[order], size[order]
-        is_new[1:] = (np.diff(next_lane) > 0) | (np.diff(next_size) > ROUNDING * next_size[1:])
+        is_new[1:] = (np.diff(next_lane) > 0) | (np.diff(next_size) > VECTOR_ROUNDING_FRACTION * next_size[1:])
         order = order[is_new]
         return lane[order], index[order], size[order], to_fold[order]
 
     def _shorten_step(
-        self, lane: Indices, point: Floats, before: Floats, reached: Floats, to_fold: Floats, is_end: Truths
+        self, lane: Indices, point: Floats, before: Floats, reached: Floats, to_fold: Floats, is_end: Booleans
     ) -> None:
         """Note the ends of paths where a step missed, or make the next step shorter."""
         end = _end_between(before, point)
         halved = np.maximum((point[SIZE] - before[SIZE]) / 2, reached)
         step = np.where(is_end, 0.9 * (end - before[SIZE]), halved)
         curvature = (end - before[SIZE]) * (point[SIZE] - end)  # the error of a straight line grows with it
-        is_narrow = is_end & (curvature < (SETTINGS.end_fraction * point[SIZE]) ** 2)
-        is_stuck = ~is_end & (step < SETTINGS.finest_step_fraction * point[SIZE])
+        is_narrow = is_end & (curvature < (PATH_SETTINGS.end_fraction * point[SIZE]) ** 2)
+        is_stuck = ~is_end & (step < PATH_SETTINGS.finest_step_fraction * point[SIZE])
         self.end[lane[is_narrow]] = end[is_narrow]
         self.end[lane[is_stuck]] = (before[SIZE] + np.minimum(step, to_fold))[is_stuck]
         self._longest_step[lane], self._limited_from[lane] = step, before[SIZE]
         self._missed_last[lane] = self._missed_ever[lane] = True
 
     def _insert(self, lane: Indices, point: Floats) -> None:
-        """Insert known points, in the order of their sizes."""
+        """Insert known points, ordered by lane and size."""
         if not lane.size:
             return
-        changed, first, count = np.unique(lane, return_index=True, return_counts=True)
+        first = np.flatnonzero(np.diff(lane, prepend=-1))
+        changed, count = lane[first], np.diff(first, append=lane.size)
         filled = np.isfinite(self.known_points[SIZE, changed]).sum(axis=1)
         width, needed = self.known_points.shape[2], int((filled + count).max())
         if needed > width:  # the first step adds few points, most other steps one
@@ -261,7 +262,7 @@ class PointPaths:
         curvature = np.where(index > 1, curvature, 0.0)
         decrease = decrease - curvature * step
         distance = 2 * square / (decrease + np.sqrt(np.maximum(decrease**2 - 4 * curvature * square, 0.0)))
-        is_ahead = (index > 0) & (decrease > 0) & (distance > SETTINGS.least_fold_fraction * step)
+        is_ahead = (index > 0) & (decrease > 0) & (distance > PATH_SETTINGS.least_fold_fraction * step)
         return np.where(is_ahead, distance, math.inf)
 
     def _predicted(self, index: Indices, lane: Indices, last: Floats, size: Floats) -> tuple[Floats, Floats]:
@@ -272,13 +273,13 @@ class PointPaths:
         u, v = self._slope_at_start[:, lane]
         bend = (last[EAST] - u * last[SIZE], last[NORTH] - v * last[SIZE])
         growth = np.where(index > 0, (size / last[SIZE]) ** 2, 0.0)
-        is_straight = np.hypot(*bend) <= SETTINGS.straight_fraction * np.hypot(last[EAST], last[NORTH])
+        is_straight = np.hypot(*bend) <= PATH_SETTINGS.straight_fraction * np.hypot(last[EAST], last[NORTH])
         east, north = u * size + bend[0] * growth, v * size + bend[1] * growth
         fresh = np.flatnonzero(index == 0)
         if fresh.size:  # the slope at an early size tells how the path bends at its start
-            early = SETTINGS.early_fraction * size[fresh]
+            early = PATH_SETTINGS.early_fraction * size[fresh]
             slope = self._slopes_at(lane[fresh], np.array((early, u[fresh] * early, v[fresh] * early)))
-            half = size[fresh] / (2 * SETTINGS.early_fraction)
+            half = size[fresh] / (2 * PATH_SETTINGS.early_fraction)
             east[fresh] += half * (slope[0] - u[fresh])
             north[fresh] += half * (slope[1] - v[fresh])
         bent = np.flatnonzero(~is_straight | (self._missed_ever[lane] & (index > 0)))
@@ -313,12 +314,12 @@ class PointPaths:
         return np.where(is_start, u, east), np.where(is_start, v, north)
 
 
-def _is_near(last: Floats, point: Floats, expected: tuple[Floats, Floats]) -> Truths:
+def _is_near(last: Floats, point: Floats, expected: tuple[Floats, Floats]) -> Booleans:
     """Whether points are near enough to their prediction to be on the path."""
     stray = np.hypot(point[EAST] - expected[0], point[NORTH] - expected[1])
     predicted_step = np.hypot(expected[0] - last[EAST], expected[1] - last[NORTH])
     step = np.maximum(np.hypot(point[EAST] - last[EAST], point[NORTH] - last[NORTH]), predicted_step)
-    return np.asarray(stray <= SETTINGS.stray_fraction * step + SETTINGS.stray_m)
+    return np.asarray(stray <= PATH_SETTINGS.stray_fraction * step + PATH_SETTINGS.stray_m)
 
 
 def _extrapolated(far: Floats, middle: Floats, near: Floats, size: Floats) -> tuple[Floats, Floats]:

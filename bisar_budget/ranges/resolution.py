@@ -11,14 +11,15 @@ is 0.886 as wide.
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.image_plane import Band, nodes
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 BENT_EDGE_FRACTION = 0.05  # of half the support; edges that bend less leave the closed widths right to 1 %
 _HALF_POWER = 0.5
@@ -28,7 +29,7 @@ _BAND_NODE_COUNT, _APERTURE_NODE_COUNT = 16, 64  # for phases of ±20 rad, reach
 # minimum beyond 6.
 _STEP_RATIO, _MAX_STEP_COUNT = 0.25, 64
 _NEWTON_ROUNDS = 5  # rounds: the last changes a width by less than 1e-6
-_MAX_CASE_COUNT = 128  # cases in one block of samples
+_MAX_CASE_COUNT = 64  # cases in one block of samples
 
 
 class Resolution(NamedTuple):
@@ -37,13 +38,13 @@ class Resolution(NamedTuple):
     A support that is no parallelogram may have no null. Then the first minimum counts.
     """
 
-    range: Any
-    cross_range: Any
-    range_half_power: Any
-    cross_range_half_power: Any
+    range: PerCase
+    cross_range: PerCase
+    range_half_power: PerCase
+    cross_range_half_power: PerCase
 
 
-def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aperture_time_s: Any) -> Resolution:
+def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aperture_time_s: PerCase) -> Resolution:
     """Resolution at the scene centre, (cases,)."""
     cases, matrix = exact.half.size, exact.matrix
     with np.errstate(all="ignore"):
@@ -51,9 +52,9 @@ def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aper
         ahead, across = np.array((np.cos(azimuth), np.sin(azimuth))), np.array((-np.sin(azimuth), np.cos(azimuth)))
         x, y = matrix.xy * across[0] + matrix.yy * across[1], -matrix.xx * across[0] - matrix.xy * across[1]
         conjugate = np.array((x, y)) / (x * ahead[0] + y * ahead[1])
-        wavelength = SPEED_OF_LIGHT / radar.center_frequency
+        wavelength = SPEED_OF_LIGHT_MPS / radar.center_frequency
         nulls = (
-            geometry.range_resolution(radar.bandwidth, SPEED_OF_LIGHT) * np.ones(cases),
+            geometry.range_resolution(radar.bandwidth, SPEED_OF_LIGHT_MPS) * np.ones(cases),
             geometry.cross_range_resolution(wavelength, aperture_time_s) * np.ones(cases),
         )
     widths = np.array((*nulls, *(_HALF_POWER_OF_NULL_RATIO * null for null in nulls)))
@@ -62,10 +63,9 @@ def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aper
     for first in range(0, long.size, _MAX_CASE_COUNT):
         some = long[first : first + _MAX_CASE_COUNT]
         slopes = _slopes(geometry, exact.half, some, max(_APERTURE_NODE_COUNT, exact.sampling.places.size))
-        for axis, direction in enumerate((conjugate, across)):
-            widths[axis::2, some] = _widths(
-                exact.k[some], relative_band[some], np.einsum("anc,ac->nc", slopes, direction[:, some])
-            )
+        along = np.einsum("anc,dac->ndc", slopes, np.array((conjugate, across))[:, :, some])
+        of_both = _widths(np.tile(exact.k[some], 2), np.tile(relative_band[some], 2), along.reshape(len(along), -1))
+        widths[:, some] = np.reshape(of_both, (4, -1))
     return Resolution(*widths)
 
 
@@ -76,41 +76,41 @@ def cells_of_support(sight: Floats, axes: Floats, radar: Band) -> Floats:
     """
     band = radar.center_frequency + np.array((-0.5, 0.5)) * radar.bandwidth
     extent: Floats = np.ptp(np.multiply.outer(band, sight @ axes), axis=(0, 1))
-    return SPEED_OF_LIGHT / extent
+    return SPEED_OF_LIGHT_MPS / extent
 
 
-def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, across: Floats) -> Any:
+def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, across: Floats) -> Booleans:
     """Whether the support is close enough to a parallelogram for the closed widths."""
     band = np.hypot(*exact.gradient[:, 0]) * relative_band / 2
     _, _, *bends = np.abs(np.einsum("aon,an->on", exact.gradient, conjugate))
     _, turn, *bends_across = np.abs(np.einsum("aon,an->on", exact.gradient, across))
-    return (sum(bends) <= BENT_EDGE_FRACTION * band) & (sum(bends_across) <= BENT_EDGE_FRACTION * turn)
+    return np.asarray((sum(bends) <= BENT_EDGE_FRACTION * band) & (sum(bends_across) <= BENT_EDGE_FRACTION * turn))
 
 
-def _slopes(geometry: BistaticGeometry, half: Floats, some: Any, count: int) -> Floats:
-    """Sum of both lines of sight over the ground in some cases, at `count` nodes, (2, nodes, some)."""
-    slopes = np.zeros((2, count, some.size))
+def _slopes(geometry: BistaticGeometry, half: Floats, indices: Indices, count: int) -> Floats:
+    """Sum of both lines of sight over the ground in some cases, at `count` nodes, (2, nodes, cases)."""
+    slopes = np.zeros((2, count, indices.size))
     for path in geometry.both:
-        x, y, z = path.of(some).place(nodes(count).places[:, None] * half[some])
+        x, y, z = path.of(indices).place(nodes(count).places[:, None] * half[indices])
         slopes += np.array(np.broadcast_arrays(x, y)) / np.sqrt(x * x + y * y + z * z)
     return slopes
 
 
 def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, Floats]:
     """Peak to first null, and full width at half power, by slopes (nodes, cases) of the range per metre. [m]"""
-    frequencies, of_band = np.polynomial.legendre.leggauss(_BAND_NODE_COUNT)
-    wavenumbers = k * (1 + np.multiply.outer(frequencies, relative_band / 2))
-    mean = np.multiply.outer(of_band / 2, nodes(len(slopes)).fit[0])[..., None]
-    rates = wavenumbers[:, None] * slopes  # change of phase by a metre [rad/m]
-    rates -= (mean * rates).sum(axis=(0, 1))
-    unit = math.sqrt(_HALF_POWER) / np.sqrt((mean * rates**2).sum(axis=(0, 1)))
+    band = nodes(_BAND_NODE_COUNT)
+    wavenumbers = k * (1 + np.multiply.outer(band.places, relative_band / 2))
+    mean = np.multiply.outer(band.fit[0], nodes(len(slopes)).fit[0]).ravel()
+    rates = (wavenumbers[:, None] * slopes).reshape(mean.size, -1)  # change of phase by a metre [rad/m]
+    rates -= mean @ rates
+    unit = math.sqrt(_HALF_POWER) / np.sqrt(mean @ rates**2)
     rates *= unit
+    moments = mean[:, None] * rates ** np.arange(3)[:, None, None]
 
     def power(step: Floats) -> tuple[Floats, Floats, Floats]:
         """Power of the response at a step, and its first two derivatives."""
-        turned = mean * np.exp(1j * rates * step)
-        value = turned.sum(axis=(0, 1))
-        slope, bend = 1j * (rates * turned).sum(axis=(0, 1)), -(rates * rates * turned).sum(axis=(0, 1))
+        value, slope, bend = np.einsum("knc,nc->kc", moments, np.exp(1j * rates * step))
+        slope, bend = 1j * slope, -bend
         first = 2 * (value.conj() * slope).real
         return np.abs(value) ** 2, first, 2 * (np.abs(slope) ** 2 + (value.conj() * bend).real)
 
@@ -118,12 +118,12 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
         level, slope, _ = power(step)
         return level - _HALF_POWER, slope
 
-    turn, turned = np.exp(1j * rates * _STEP_RATIO), mean.astype(complex)
+    turn, turned = np.exp(1j * rates * _STEP_RATIO), np.ones(rates.shape, dtype=complex)
     last = float(_MAX_STEP_COUNT)
     level, half, null = np.ones(unit.size), np.full(unit.size, last), np.full(unit.size, last)
     for step in range(1, _MAX_STEP_COUNT):
         turned = turned * turn
-        before, level = level, np.abs(turned.sum(axis=(0, 1))) ** 2
+        before, level = level, np.abs(mean @ turned) ** 2
         half = np.where((half == last) & (level < _HALF_POWER), step - 0.5, half)
         null = np.where((null == last) & (half < last) & (level > before), step - 1.0, null)
         if (null < last).all():

@@ -8,9 +8,11 @@ checks a mission writes its piece and need not keep its findings. A format with 
 
 from collections.abc import Mapping, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 
 
@@ -30,7 +32,7 @@ class Format(NamedTuple):
     has_pictures: bool = False
 
 
-_FORMATS = (
+_FORMAT_ENTRIES = (
     Format("text", "formats.text_table", (".txt",), is_piecewise=True),
     Format("json", "formats.json_document", (".json",), is_piecewise=True),
     Format("csv", "formats.csv_table", (".csv",), is_piecewise=True),
@@ -46,7 +48,7 @@ _FORMATS = (
         is_illustrated=True, has_pictures=True,
     ),
 )  # fmt: skip
-FORMATS = {entry.name: entry for entry in _FORMATS}
+FORMATS = {entry.name: entry for entry in _FORMAT_ENTRIES}
 
 
 def format_of(name: str) -> str | None:
@@ -56,7 +58,7 @@ def format_of(name: str) -> str | None:
     if ending.count(".") == 1:
         return None
     matches = [
-        (len(suffix), entry.name) for entry in _FORMATS for suffix in entry.suffixes if ending.endswith(suffix)
+        (len(suffix), entry.name) for entry in _FORMAT_ENTRIES for suffix in entry.suffixes if ending.endswith(suffix)
     ]
     return max(matches)[1] if matches else None
 
@@ -82,7 +84,7 @@ class Style(NamedTuple):
         return f"\x1b[{sgr}m{text}\x1b[0m" if self.color else text
 
 
-def _module(format_name: str) -> Any:
+def _module(format_name: str) -> "ModuleType":
     """Module of a format, imported at its first use, so that other formats need not wait for it."""
     return import_module(f"bisar_budget.report.{FORMATS[format_name].module}")
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from math import prod
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,16 +18,19 @@ from bisar_budget.extras import install_command
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
-from bisar_budget.memory import OF_TABLES, hold_room
+from bisar_budget.memory import TABLES_MEMORY_BYTES, hold_room
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import Number
 from bisar_budget.report.words.sentences import spreadsheet_text
 
 if TYPE_CHECKING:
+    from dask.array import Array as DaskArray
+    from netCDF4 import Dataset as NetcdfFile
+    from pyarrow import Array
     from xarray import Dataset
 
 
-FORMAT = "bisar-budget/sweep/1"
+SWEEP_FORMAT = "bisar-budget/sweep/1"
 
 
 class Described:
@@ -39,7 +43,7 @@ class Described:
         self.numbers = {key.key: key for key in cases.varied if isinstance(key, Number)}
         changed = changes_words(mission.changes)
         self.facts = {
-            "format": FORMAT,
+            "format": SWEEP_FORMAT,
             "mission": printable(swept.mission_name),
             "mission_sha256": swept.mission_sha256,
             **({"set": changed} if changed else {}),
@@ -56,9 +60,9 @@ class Described:
             for column in self.swept.columns
         )
 
-    def values(self, part: Part) -> Mapping[str, Values]:
-        """Values of a part by the name of their column."""
-        return {name: self.converted(name, values) for name, values in part.values.items()}
+    def values(self, block: Part) -> Mapping[str, Values]:
+        """Values of a block by the name of their column."""
+        return {name: self.converted(name, values) for name, values in block.values.items()}
 
     def converted(self, name: str, values: Values) -> Values:
         """Values of a column in the unit of the column."""
@@ -72,21 +76,21 @@ def _overrides_text(overrides: Sequence[Override]) -> str:
     return "; ".join(printable(f"{override.name} {override.value} ({override.origin})") for override in overrides)
 
 
-def write_csv(described: Described, parts: Iterable[Part], path: str) -> None:
+def write_csv(described: Described, blocks: Iterable[Part], path: str) -> None:
     """Write metadata as lines `# name: value`, a header `KEY [unit]`, and one line for each case.
 
     Numbers have all digits that reproduce them. A missing value is an empty cell.
     """
     with open(path, "w", encoding="utf-8", errors="backslashreplace", newline="") as file:
-        file.writelines(texts(described, parts))
+        file.writelines(texts(described, blocks))
 
 
-def texts(described: Described, parts: Iterable[Part]) -> Iterator[str]:
-    """Texts of a CSV file: metadata and header, then the lines of each part."""
+def texts(described: Described, blocks: Iterable[Part]) -> Iterator[str]:
+    """Texts of a CSV file: metadata and header, then the lines of each block."""
     yield "".join(f"# {name}: {value}\n" for name, value in described.facts.items())
     yield ",".join(_quoted(spreadsheet_text(column.heading)) for column in described.columns) + "\n"
-    for part in parts:
-        values = described.values(part)
+    for block in blocks:
+        values = described.values(block)
         cells = (_cells(column, values[column.name]) for column in described.columns)
         yield "".join(f"{line}\n" for line in map(",".join, zip(*cells, strict=True)))
 
@@ -119,7 +123,7 @@ def _number(number: float) -> str:
 _MIN_GROUP_ROWS = 1 << 17  # of a row group, which readers load at once
 
 
-def write_parquet(described: Described, parts: Iterable[Part], path: str) -> None:
+def write_parquet(described: Described, blocks: Iterable[Part], path: str) -> None:
     """Write one row for each case, with units and descriptions as metadata of the fields.
 
     Texts are dictionaries, missing values are null. The metadata of the file is the same as in a CSV.
@@ -137,29 +141,29 @@ def write_parquet(described: Described, parts: Iterable[Part], path: str) -> Non
     ]
     schema = pa.schema(fields, metadata=described.facts)
     with pq.ParquetWriter(path, schema) as writer:
-        for group in _groups(parts):
+        for group in _groups(blocks):
             tables = []
-            for part in group:
-                values = described.values(part)
+            for block in group:
+                values = described.values(block)
                 arrays = [_array(pa, column, values[column.name]) for column in described.columns]
                 tables.append(pa.Table.from_arrays(arrays, schema=schema))
             table = pa.concat_tables(tables).unify_dictionaries()
             writer.write_table(table, row_group_size=table.num_rows)
 
 
-def _array(pa: Any, column: Column, values: Values) -> Any:
+def _array(pa: ModuleType, column: Column, values: Values) -> "Array":
     if column.is_text:
         return pa.array(values, pa.string(), mask=values == "").dictionary_encode()
     return pa.array(values, pa.float64(), from_pandas=True)  # NaN is null
 
 
-def _groups(parts: Iterable[Part]) -> Iterator[list[Part]]:
-    """Lists of parts with at least the rows of a row group each."""
+def _groups(blocks: Iterable[Part]) -> Iterator[list[Part]]:
+    """Lists of blocks with at least the rows of a row group each."""
     group: list[Part] = []
     rows = 0
-    for part in parts:
-        group.append(part)
-        rows += part.stop - part.start
+    for block in blocks:
+        group.append(block)
+        rows += block.stop - block.start
         if rows >= _MIN_GROUP_ROWS:
             yield group
             group, rows = [], 0
@@ -167,13 +171,13 @@ def _groups(parts: Iterable[Part]) -> Iterator[list[Part]]:
         yield group
 
 
-_UNITS = {"": "1", "deg": "degree", "°": "degree"}  # names of UDUNITS
-_TITLES = {"mission": "title"}
+_UDUNITS_NAMES = {"": "1", "deg": "degree", "°": "degree"}
+_FACT_TITLES = {"mission": "title"}
 _PROBE_BYTES = 1 << 20  # a write of this size fails on a disk that was too full for the library
 _EMPTY_MEANING = "none"  # meaning of the flag of an empty text
 
 
-def write_netcdf(described: Described, parts: Iterable[Part], path: str) -> None:
+def write_netcdf(described: Described, blocks: Iterable[Part], path: str) -> None:
     """Write by the CF conventions: a grid has one dimension for each key, a table has the dimension `case`.
 
     Texts are flags, numbers with a list of their meanings. Reasons, which may differ in every case, are strings.
@@ -184,15 +188,15 @@ def write_netcdf(described: Described, parts: Iterable[Part], path: str) -> None
     try:
         with Dataset(path, "w", format="NETCDF4") as file:
             file.Conventions = "CF-1.11"
-            file.setncatts({_TITLES.get(name, name): value for name, value in described.facts.items()})
+            file.setncatts({_FACT_TITLES.get(name, name): value for name, value in described.facts.items()})
             shape = described.cases.shape
             columns = _dimensions(file, described)
             names = tuple(file.dimensions)
             variables = [_Variable(file, column, names) for column in columns]
-            for part in parts:
-                values = described.values(part)
+            for block in blocks:
+                values = described.values(block)
                 for variable in variables:
-                    variable.put(values[variable.column.name], part.start, part.stop, shape)
+                    variable.put(values[variable.column.name], block.start, block.stop, shape)
             for variable in variables:
                 variable.close()
     except RuntimeError as error:  # by the library, if the disk is full or the file exceeds a limit
@@ -210,7 +214,7 @@ def _hold_to_room(path: str) -> None:
         os.fsync(file.fileno())
 
 
-def _dimensions(file: Any, described: Described) -> list[Column]:
+def _dimensions(file: "NetcdfFile", described: Described) -> list[Column]:
     """Create the dimensions. Returns the columns with a value for each case."""
     cases = described.cases
     if not cases.is_grid:
@@ -227,20 +231,20 @@ def _dimensions(file: Any, described: Described) -> list[Column]:
 
 
 def _attributes(column: Column) -> Mapping[str, str]:
-    units = {} if column.is_text else {"units": _UNITS.get(column.unit, column.unit)}
+    units = {} if column.is_text else {"units": _UDUNITS_NAMES.get(column.unit, column.unit)}
     return {"long_name": column.words, **units}
 
 
 class _Variable:
     """One column of a file. Texts are stored as the numbers of their meanings."""
 
-    def __init__(self, file: Any, column: Column, names: tuple[str, ...]) -> None:
+    def __init__(self, file: "NetcdfFile", column: Column, names: tuple[str, ...]) -> None:
         self.column = column
         self.is_free = column.is_text and column.name.rpartition(".")[2] == "reason"
         meanings = list(STATUS) if column.name == "status" else [""]
         self.codes = {meaning: code for code, meaning in enumerate(meanings)}
         kind = str if self.is_free else "i4" if column.is_text else "f8"
-        fill = {"fill_value": np.nan} if kind == "f8" else {}
+        fill: Mapping[str, Any] = {"fill_value": np.nan} if kind == "f8" else {}
         self.variable = file.createVariable(column.name, kind, names, **fill)
         self.variable.setncatts(_attributes(column))
 
@@ -316,7 +320,7 @@ def writer_of(suffix: str) -> TableFormat:
     """
     table_format = TABLES[suffix]
     if table_format.library:
-        hold_room(OF_TABLES, table_format.name)
+        hold_room(TABLES_MEMORY_BYTES, table_format.name)
         try:
             import_module(table_format.library)
         except ImportError:
@@ -328,7 +332,7 @@ def _missing(name: str, library: str) -> str:
     return f"{name} needs {library}, which is not installed; {install_command('tables')} brings it"
 
 
-def dataset(described: Described, values_by_column: Mapping[str, Any]) -> "Dataset":
+def dataset(described: Described, values_by_column: "Mapping[str, Values | DaskArray]") -> "Dataset":
     """Columns of a sweep as a dataset.
 
     Parameters

@@ -13,17 +13,18 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
+from bisar_budget.arrays import Floats
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.faults import printable
 from bisar_budget.geometry import PlatformState
 from bisar_budget.memory import is_spacious
-from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Floats, ImagePoints, followed
+from bisar_budget.ranges.exact_ranges import NO_SHIFTS, ExactRanges, ImagePoints, followed
 
 if TYPE_CHECKING:
     from bisar_budget.workers import MapBlocks
@@ -33,9 +34,8 @@ if TYPE_CHECKING:
 BLOCK_DRAWS = 1 << 15
 CHUNK_DRAWS = 1 << 22  # draws of one stream; a second or so
 EXACT_PIECE_DRAWS = 1 << 18  # of a chunk, which it divides, where each draw goes through exact ranges: as long
-_ORDER = {"m": 0, "m/s": 1, "m/s^2": 2}
-_SAMPLE = 512  # draws that decide whether exact ranges are needed
-_DIFFERENT = 0.01  # of a limit
+_LINEARITY_DRAWS = 512  # that decide whether exact ranges are needed
+_LINEARITY_TOLERANCE_FRACTION = 0.01  # of a limit
 _AFTER_BYTES = 256
 _MIN_COMPILED_DRAWS = 1 << 30  # normal numbers; then Numba saves more seconds than it takes
 
@@ -193,9 +193,9 @@ class Sums:
 
     def clear(self) -> None:
         """Begin another block."""
-        every: list[Mapping[Any, Floats]] = [self.phases, self.totals, self.motion, self.tags, self.clock, self.alone]
-        for kept in every:
-            for sums in kept.values():
+        by_name = (self.motion, self.tags, self.clock, self.alone)
+        for kept in (self.phases.values(), self.totals.values(), *(each.values() for each in by_name)):
+            for sums in kept:
                 sums.fill(0.0)
         self._exact.clear()
 
@@ -220,9 +220,10 @@ class Sums:
         elif source.is_position:
             motion = self._kept(self.motion, owner, (2, 3, 3))
             for platform in source.platforms:
-                for axis, component in enumerate(source.direction_of(platform)):
-                    if component:
-                        motion[platform, _ORDER[source.unit], axis] += size * component * drawn
+                for order, vector in enumerate(source.state_of(platform)):
+                    for axis, component in enumerate(vector):
+                        if component:
+                            motion[platform, order, axis] += size * component * drawn
         elif source.clock is not None:
             self._kept(self.clock, owner, (4,))[:] += np.multiply.outer(size * np.array(source.clock), drawn)
         else:
@@ -266,11 +267,17 @@ class Sums:
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> ImagePoints:
         times = self.exact.times[:, 0]
         powers = times[:, None] ** np.arange(3) / (1, 1, 2)  # of (22)
-        clock_powers = SPEED_OF_LIGHT * times[:, None] ** np.arange(4)
+        clock_powers = SPEED_OF_LIGHT_MPS * times[:, None] ** np.arange(4)
         motion = _sum(self.motion, owners, np.broadcast_to(0.0, (2, 3, 3, self.size)))
         tags = _sum(self.tags, owners, np.broadcast_to(0.0, (2, self.size)))
         clock = _sum(self.clock, owners, np.broadcast_to(0.0, (4, self.size)))
-        shifts: list[Any] = [powers @ shift.swapaxes(0, 1) if shift.any() else STILL for shift in motion]
+        shifts: list[Floats | Sequence[Floats]] = [
+            powers @ shift.swapaxes(0, 1) if shift.any() else NO_SHIFTS for shift in motion
+        ]
+        for platform, path in enumerate(self.paths):
+            if path.fall is not None and motion[platform].any():
+                of_units = path.fall.motions(path, self.exact.half, self.exact.sampling.places)[..., 0]
+                shifts[platform] = list(np.einsum("kacq,kad->cqd", of_units, motion[platform]))
         for platform, tag in enumerate(tags):
             if tag.any():
                 late = self.paths[platform].later(times[:, None], tag)
@@ -314,7 +321,7 @@ class Drawer:
             for index, requirement in enumerate(drawing.judged):
                 square = sums.exact_square(requirement) if drawing.is_exact else sums.square(requirement)
                 # What has no image holds nothing: it is not a number.
-                holds_in_draw = square <= (requirement.limit * (1 + UTILIZATION_TOLERANCE)) ** 2
+                holds_in_draw = square <= (requirement.limit * (1 + UTILIZATION_TOLERANCE_FRACTION)) ** 2
                 holds[index] += int(np.count_nonzero(holds_in_draw))
                 if drawing.is_exact:
                     square = square[np.isfinite(square)]
@@ -351,14 +358,14 @@ def _needs_exact_ranges(drawing: Drawing) -> bool:
 
     The linear model has no hidden phase: where band and turn hide more than that part, draws need exact ranges.
     """
-    sums = Sums(drawing, _SAMPLE, adds=True, keeps_motion=True)
-    drawn = np.empty(_SAMPLE)
+    sums = Sums(drawing, _LINEARITY_DRAWS, adds=True, keeps_motion=True)
+    drawn = np.empty(_LINEARITY_DRAWS)
     for variable in drawing.variables:
         _Stream(variable, drawing.seed).fill(drawn)
         sums.add(variable, drawn)
     for requirement in drawing.judged:
         linear, exact = np.sqrt(sums.square(requirement)), np.sqrt(sums.exact_square(requirement))
-        if not np.all(np.abs(exact - linear) <= _DIFFERENT * requirement.limit):
+        if not np.all(np.abs(exact - linear) <= _LINEARITY_TOLERANCE_FRACTION * requirement.limit):
             return True
     return False
 
@@ -428,7 +435,7 @@ class _Stream:
 
 
 # ---------------------------------------------------------------------- eigenvectors
-_SWEEPS = 30  # of a Jacobi method: convergence is quadratic, a 6 x 6 takes about five
+_JACOBI_ROUNDS = 30  # of a Jacobi method: convergence is quadratic, a 6 x 6 takes about five
 
 
 def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[list[float]]]:
@@ -441,7 +448,7 @@ def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[li
     v = [[float(i == j) for j in range(n)] for i in range(n)]
     # Below this an element moves no eigenvalue by more than rounding does.
     negligible = 1e-17 * max((abs(x) for row in a for x in row), default=0.0)
-    for _ in range(_SWEEPS):
+    for _ in range(_JACOBI_ROUNDS):
         is_done = True
         for p in range(n - 1):
             for q in range(p + 1, n):

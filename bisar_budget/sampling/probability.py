@@ -28,17 +28,17 @@ from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.phrases import Note
 from bisar_budget.sampling.draws import HeldSum, Share, Variable, drawing_of, eigensystem, in_turn, joined
 
-CONFIDENCE = 0.95
-DOMINANT = 0.5  # of the variance: beyond, a sum has the shape of that one error, whatever the others are
+CONFIDENCE_LEVEL = 0.95
+DOMINANT_FRACTION = 0.5  # of the variance: beyond, a sum has the shape of that one error, whatever the others are
 _QUANTILE_SIGMA = 1.959963984540054  # of the standard normal at 97.5 %
 _SURE_QUANTILE_SIGMA = 3.2905267314919255  # at 99.95 %: a warning is not to be chance
-_MATERIAL = 0.1  # of the probability to fail: a difference that is sure but smaller changes nobody's mind
+_MATERIAL_FRACTION = 0.1  # of the probability to fail: a difference that is sure but smaller changes nobody's mind
 
-_DIGITS = 9  # of sampled sigmas: further ones differ between processors, and mean nothing
-_PARTS = ("", ".cubic", ".east", ".north")  # variables of a random error, beside its quadratic phase
+_SIGMA_DIGITS = 9  # of sampled sigmas: further ones differ between processors, and mean nothing
+_VARIABLE_SUFFIXES = ("", ".cubic", ".east", ".north")  # variables of a random error, beside its quadratic phase
 _HIDDEN_FRACTION = 0.1  # of the quadratic phase: a hidden phase of a tenth adds half a percent
-_NOTHING_LEFT = 1e-12  # of a variance: what rounding leaves of one that others account for
-_ANGLES = 4096  # of a mean over a circle of a smooth function
+_VARIANCE_ROUNDING_FRACTION = 1e-12  # of a variance: what rounding leaves of one that others account for
+_CIRCLE_NODES = 4096  # of a mean over a circle of a smooth function
 
 
 def monte_carlo(
@@ -83,7 +83,7 @@ def monte_carlo(
         draws=draws,
         seed=seed,
         model="full",
-        confidence=CONFIDENCE,
+        confidence=CONFIDENCE_LEVEL,
         requirements=requirements,
         probability=all_hold / draws if judged else None,
         probability_low=low,
@@ -99,7 +99,7 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
     singles = {source.id: source for source in analysis.stated}
     for group in analysis.groups:
         members = [singles.pop(row_id) for row_id in group.ids]
-        values, vectors = eigensystem(group.correlation)
+        values, vectors = eigensystem([[float(rho) for rho in row] for row in group.correlation])
         for index, value in enumerate(values):
             # To six decimals a correlation matrix may have an eigenvalue just below zero.
             scale = math.sqrt(max(0.0, value)) / factor
@@ -127,8 +127,8 @@ def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
     distribution = "normal" if error.is_covered else "bound"
     covariance = np.array(error.full.covariance) * size**2
     scale = np.diagonal(covariance).copy()
-    for index, suffix in enumerate(_PARTS):
-        if covariance[index, index] <= _NOTHING_LEFT * scale[index]:
+    for index, suffix in enumerate(_VARIABLE_SUFFIXES):
+        if covariance[index, index] <= _VARIANCE_ROUNDING_FRACTION * scale[index]:
             continue
         column = covariance[:, index] / math.sqrt(covariance[index, index])
         covariance = covariance - np.multiply.outer(column, column)
@@ -231,11 +231,11 @@ def _within(radius: float, xx: float, yy: float, xy: float) -> float:
     if not large:
         return 1.0
     total = 0.0
-    for step in range(_ANGLES):
-        angle = math.pi * (step + 0.5) / _ANGLES
+    for step in range(_CIRCLE_NODES):
+        angle = math.pi * (step + 0.5) / _CIRCLE_NODES
         square = large * math.cos(angle) ** 2 + small * math.sin(angle) ** 2
         total += math.exp(-(radius**2) / (2 * square)) if square else 0.0
-    return 1 - total / _ANGLES
+    return 1 - total / _CIRCLE_NODES
 
 
 def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
@@ -261,7 +261,7 @@ def _requirement(
         sum=predictions.combined(judged, "sum"),
         rss=predictions.combined(judged, "rss"),
         sigma_rss=math.sqrt(variance),
-        sigma=float(f"{math.sqrt(mean_square):.{_DIGITS}g}") if math.isfinite(mean_square) else None,
+        sigma=float(f"{math.sqrt(mean_square):.{_SIGMA_DIGITS}g}") if math.isfinite(mean_square) else None,
         probability=holds / draws,
         probability_low=low,
         probability_high=high,
@@ -276,7 +276,7 @@ def _requirement(
 def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
     """Say where root-sum-square and the normal distribution do not describe the sum."""
     # A covariance, which is no single variable, is always normal.
-    if requirement.dominant_share > DOMINANT and not predictions.is_normal(requirement.dominant):
+    if requirement.dominant_share > DOMINANT_FRACTION and not predictions.is_normal(requirement.dominant):
         yield (
             f"{requirement.dominant}, which is not normal, has {100 * requirement.dominant_share:.3g} % of the "
             "variance: the sum has its shape, and no multiple of sigma is the bound it would be of a normal "
@@ -285,7 +285,7 @@ def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Pred
     low, high = _wilson(holds, draws, _SURE_QUANTILE_SIGMA)
     normal, drawn = requirement.probability_normal, requirement.probability
     fails = max(1 - normal, 1 - drawn)
-    if not low <= normal <= high and abs(normal - drawn) > _MATERIAL * fails:
+    if not low <= normal <= high and abs(normal - drawn) > _MATERIAL_FRACTION * fails:
         kind = "optimistic" if normal > drawn else "pessimistic"
         yield (
             f"root-sum-square is {kind}: a normal distribution would fail in {100 * (1 - normal):.3g} %, the draws "

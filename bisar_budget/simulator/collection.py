@@ -3,12 +3,12 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.air_delays import CONTENT, seen_course
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.image_plane import Band
@@ -28,6 +28,7 @@ from bisar_budget.simulator.phase_history import (
     Flight,
     Floats,
     PhaseHistory,
+    ReceiverNoise,
     cell_centres,
     direct_path_error,
     direct_path_ways,
@@ -35,16 +36,16 @@ from bisar_budget.simulator.phase_history import (
     path,
 )
 
-OVERSAMPLING = 2.5  # samples of an image per resolution cell
-CELLS = 48  # resolution cells of a cross-range cut; fewer blur the aperture by over 1 % of a phase under a taper
+OVERSAMPLING_FACTOR = 2.5  # samples of an image per resolution cell
+CUT_CELLS = 48  # resolution cells of a cross-range cut; fewer blur the aperture by over 1 % of a phase under a taper
 RANGE_CELLS = 8  # of a chip
 MAX_CELLS = 1024
-CONTRIBUTIONS = 1 << 21  # of pulses to pixels, which the reading of an image holds at once
+MAX_CONTRIBUTION_COUNT = 1 << 21  # of pulses to pixels, which the reading of an image holds at once
 
 _MAX_SPECTRUM_CELLS = (
     1.5  # width of a spectrum over the bandwidth: half of the width that three samples per cell hold
 )
-_MIN_CHIP_FREQUENCIES = 64  # half of them for the response itself
+_MIN_CHIP_FREQUENCY_COUNT = 64  # half of them for the response itself
 _BYTES_PER_PIXEL = 16 * 16  # two images, their grid, and the arrays that form or refocus one of them
 _BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
 _BYTES_PER_CONTRIBUTION = 8 + 2 * 16  # in single and in double precision
@@ -154,8 +155,8 @@ class RangeLines:
         steepness, area = float(np.hypot(*by_range)), abs(float(by_doppler @ _left(by_range)))
         if not area:
             raise ValueError("range or Doppler does not change over the ground there: no image plane")
-        wavelength = SPEED_OF_LIGHT / radar.center_frequency
-        return SPEED_OF_LIGHT / (radar.bandwidth * steepness), wavelength / (area / steepness)
+        wavelength = SPEED_OF_LIGHT_MPS / radar.center_frequency
+        return float(SPEED_OF_LIGHT_MPS / (radar.bandwidth * steepness)), float(wavelength / (area / steepness))
 
     def sampled(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
         """Cells for pixels to sample: `cells`, or finer cells across the lines. [m]
@@ -168,7 +169,9 @@ class RangeLines:
             return across, along
         first, middle, last = self._sums(np.asarray(centre, dtype=float))
         column = self._column(middle, last - first) * float(np.hypot(*middle))  # by a metre across the lines
-        wider = abs(float(((first + last) / 2 - middle) @ column)) * radar.center_frequency / SPEED_OF_LIGHT
+        wider = (
+            abs(float(((first + last) / 2 - middle) @ column)) * float(radar.center_frequency) / SPEED_OF_LIGHT_MPS
+        )
         return min(across, _MAX_SPECTRUM_CELLS / (1 / across + wider)), along
 
     def offsets(self, ground_points: Floats, centre: GroundVector, radar: Band) -> Floats:
@@ -184,7 +187,7 @@ class RangeLines:
         nearer, last, first = (self._range_sum(points, [time]) for time in (len(self.transmitter) // 2, -1, 0))
         turned = (1 if self.turns_left(centre) else -1) * (last - first)
         cells = (nearer[0] - nearer) * radar.bandwidth, (turned - turned[0]) * radar.center_frequency
-        return np.stack(cells, axis=1)[1:] / SPEED_OF_LIGHT
+        return np.stack(cells, axis=1)[1:] / SPEED_OF_LIGHT_MPS
 
     def baseband(self, points: Floats, wavelength_m: float) -> Complexes:
         """Phase that takes the `carrier` out of an image of points (..., 3).
@@ -269,7 +272,7 @@ class Chip(NamedTuple):
 
     def within(self, cells: int) -> "Chip":
         """The middle of the chip, at most `cells` resolution cells along y′."""
-        columns = 2 * round(cells * OVERSAMPLING / 2)
+        columns = 2 * round(cells * OVERSAMPLING_FACTOR / 2)
         start = self.image.shape[1] // 2 - columns // 2
         if start <= 0:
             return self
@@ -295,7 +298,7 @@ class PointCollection:
     @property
     def range_cell(self) -> float:
         """Resolution of the range sum, c/B. [m]"""
-        return SPEED_OF_LIGHT / self.radar.bandwidth
+        return SPEED_OF_LIGHT_MPS / self.radar.bandwidth
 
     def window(self, count: int) -> Floats:
         """Weights over the aperture, or over the band, at the centres of `count` equal cells."""
@@ -318,7 +321,7 @@ class PointCollection:
             return Flight(transmitter, receiver, clock, clock)
         square = self.radar.center_frequency**2
         group = errors.electrons.at(slow_time)
-        seen = clock + seen_course(group, errors.electrons.mean, CONTENT) / square
+        seen = clock + seen_course(group, np.asarray(errors.electrons.mean), CONTENT) / square
         return Flight(transmitter, receiver, clock, seen, group)
 
     def record(
@@ -328,7 +331,7 @@ class PointCollection:
         amplitudes: Complexes,
         slow_time: Floats,
         frequencies: int,
-        **noise: Any,
+        **noise: Unpack[ReceiverNoise],
     ) -> PhaseHistory:
         """Phase history of scatterers (n, 3) at `frequencies` frequencies over the band, under the window."""
         frequency = self.radar.center_frequency + cell_centres(self.radar.bandwidth, frequencies)
@@ -360,7 +363,7 @@ class PointCollection:
         errors: Errors,
         *,
         scatterer: GroundVector = (0.0, 0.0),
-        cells: int = CELLS,
+        cells: int = CUT_CELLS,
         range_cells: int = 0,
         is_reference: bool = False,
     ) -> Chip:
@@ -401,7 +404,7 @@ class PointCollection:
         return Chip(image, grid, spacing)
 
     def pair(
-        self, errors: Errors, ground_point: GroundVector, cells: int = CELLS, range_cells: int = RANGE_CELLS
+        self, errors: Errors, ground_point: GroundVector, cells: int = CUT_CELLS, range_cells: int = RANGE_CELLS
     ) -> tuple[Chip, Chip]:
         """Image with errors around the ground point to which they move the point, and the reference image there."""
         return (
@@ -421,8 +424,11 @@ class PointCollection:
             cell = lines.sampled(centre, self.radar)
             finer = lines.cells(centre, self.radar)[0] / cell[0]
             self._require_room(cells, finer * range_cells)
-            spacing = (cell[0] / OVERSAMPLING, cell[1] / OVERSAMPLING)
-            shape = (max(1, 2 * round(finer * range_cells * OVERSAMPLING / 2)), 2 * round(cells * OVERSAMPLING / 2))
+            spacing = (cell[0] / OVERSAMPLING_FACTOR, cell[1] / OVERSAMPLING_FACTOR)
+            shape = (
+                max(1, 2 * round(finer * range_cells * OVERSAMPLING_FACTOR / 2)),
+                2 * round(cells * OVERSAMPLING_FACTOR / 2),
+            )
             self._last_grid = (key, lines.grid(centre, spacing, shape), spacing)
         return self._last_grid[1:]
 
@@ -433,13 +439,13 @@ class PointCollection:
         for pulse in (0, len(flight.clock) // 2, -1):
             range_difference = np.zeros(grid.shape[:-1])
             if self.has_direct_path:  # cancels most of the error of a distant platform
-                range_difference -= SPEED_OF_LIGHT * flight.clock[pulse]
+                range_difference -= SPEED_OF_LIGHT_MPS * flight.clock[pulse]
             for flown in flight.paths:
                 range_difference += np.linalg.norm(grid - flown.measured[pulse], axis=-1)
                 range_difference -= np.linalg.norm(point - flown.actual[pulse])
             farthest = max(farthest, float(np.abs(range_difference).max()))
-        cells = 2 * farthest * self.radar.bandwidth / SPEED_OF_LIGHT
-        return max(_MIN_CHIP_FREQUENCIES, 16 * math.ceil((cells + _MIN_CHIP_FREQUENCIES / 2) / 16))
+        cells = 2 * farthest * self.radar.bandwidth / SPEED_OF_LIGHT_MPS
+        return max(_MIN_CHIP_FREQUENCY_COUNT, 16 * math.ceil((cells + _MIN_CHIP_FREQUENCY_COUNT / 2) / 16))
 
     def _require_room(self, cells: int, range_cells: float) -> None:
         """Refuse a patch that aliases or is too large. More pulses than it needs would not change its image."""
@@ -450,13 +456,13 @@ class PointCollection:
                 f"collection.pulses is {self.pulses}, but the patch with its echoes is {cells} resolution cells wide "
                 f"and aliases below {2 * cells} pulses; omit the key to get what it takes"
             )
-        pixels = max(1, round(range_cells * OVERSAMPLING)) * round(cells * OVERSAMPLING)
-        self._require_memory(pixels, pulses_for(cells), _MIN_CHIP_FREQUENCIES)
+        pixels = max(1, round(range_cells * OVERSAMPLING_FACTOR)) * round(cells * OVERSAMPLING_FACTOR)
+        self._require_memory(pixels, pulses_for(cells), _MIN_CHIP_FREQUENCY_COUNT)
 
     def _require_memory(self, pixels: int, pulses: int, frequencies: int) -> None:
         """Refuse a pair of images if forming or reading it takes more memory than the limit."""
         forming = pulses * frequencies * _BYTES_PER_SAMPLE + bytes_held(self.kernel)
-        reading = _BYTES_PER_CONTRIBUTION * min(pulses * pixels, 2 * CONTRIBUTIONS) + bytes_held("numpy")
+        reading = _BYTES_PER_CONTRIBUTION * min(pulses * pixels, 2 * MAX_CONTRIBUTION_COUNT) + bytes_held("numpy")
         needed = pixels * _BYTES_PER_PIXEL + max(forming, reading)
         if needed > self.memory_limit:
             raise ValueError(

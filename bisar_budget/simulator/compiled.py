@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.polynomial import Chebyshev, Polynomial
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.simulator.image_formation import (
     PROFILE_BYTES,
     carrier_frequency,
@@ -35,7 +35,7 @@ _FFT_OVERSAMPLING_FACTOR = 2  # of profiles from the FFT
 _KERNEL_SAMPLES = 8  # of the kernel that refines profiles: -140 dB at this oversampling
 _REFINEMENT_FACTORS = {"linear": 16, "cubic": 8}  # samples per sample from the FFT
 _SPLINE_ORDERS = {"linear": 1, "cubic": 3}
-_MARGIN_SAMPLES = 8  # samples beyond the last pixel on each side
+_RANGE_MARGIN_SAMPLES = 8  # samples beyond the last pixel on each side
 _BLOCK_BYTES = 24e6  # of profiles held at once, about the size of a processor's last cache
 _MAX_SAMPLES_PER_PIXEL = 8  # to refine more samples takes longer than to read the pixel with the kernel itself
 _MAX_NEGLECTED_RAD = 1e-6  # phase of the first neglected order of the expansion
@@ -120,7 +120,7 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
     image = np.zeros(shape, dtype=complex)
     if not image.size or not history.samples.size:
         return image
-    lattice = lattice_of(points, _LATTICE_TOLERANCE_FRACTION * SPEED_OF_LIGHT / float(history.frequency.max()))
+    lattice = lattice_of(points, _LATTICE_TOLERANCE_FRACTION * SPEED_OF_LIGHT_MPS / float(history.frequency.max()))
     if lattice is not None and lattice.shape[0] > lattice.shape[1]:
         origin, across, along, (lines, count) = lattice  # long lines fill whole segments
         lattice = Lattice(origin, along, across, (count, lines))
@@ -166,7 +166,7 @@ def _neglected_phase(history: PhaseHistory, lattice: Lattice) -> float:
         if nearest <= 2 * half:  # the orders do not fall off
             return math.inf
         total += 2 / 9 * half**5 / nearest**4
-    return 2 * math.pi * float(history.frequency.max()) / SPEED_OF_LIGHT * total
+    return 2 * math.pi * float(history.frequency.max()) / SPEED_OF_LIGHT_MPS * total
 
 
 class _Block(NamedTuple):
@@ -195,14 +195,14 @@ def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats, pixels: in
     """
     length = profile_length(history, _FFT_OVERSAMPLING_FACTOR)
     per_metre = cells_per_metre(history, length)
-    count = float((farthest - nearest).max()) * per_metre + 2 * _MARGIN_SAMPLES + 1
+    count = float((farthest - nearest).max()) * per_metre + 2 * _RANGE_MARGIN_SAMPLES + 1
     if count > max(
-        length + 4 * _MARGIN_SAMPLES,
+        length + 4 * _RANGE_MARGIN_SAMPLES,
         min(_MAX_SAMPLES_PER_PIXEL * pixels, _BLOCK_BYTES / (8 * max(_REFINEMENT_FACTORS.values()))),
     ):
         return None
     return _Needed(
-        np.floor((nearest - _reference(history)) * per_metre).astype(np.int64) - _MARGIN_SAMPLES, int(count)
+        np.floor((nearest - _reference(history)) * per_metre).astype(np.int64) - _RANGE_MARGIN_SAMPLES, int(count)
     )
 
 
@@ -268,7 +268,7 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> I
             history.receiver[pulse_block],
             reference[pulse_block],
             coarse * factor,
-            carrier_frequency(history) / SPEED_OF_LIGHT,
+            carrier_frequency(history) / SPEED_OF_LIGHT_MPS,
         )
 
 
@@ -332,11 +332,11 @@ def _expand(middle, platform, along, ranges):
 
 
 @_compiled
-def _split(ranges, per_metre, first, cycles, whole, fraction, turn, order):
+def _split(ranges, per_metre, first, cycles, whole_samples, fraction, turn, order):
     """Split off whole samples and whole cycles, in double precision."""
     for i in range(ranges.shape[1]):
         cell, step = ranges[0, i] * per_metre - first, ranges[1, i] * per_metre
-        whole[0, i], whole[1, i] = _I(np.floor(cell)), _I(np.rint(step))
+        whole_samples[0, i], whole_samples[1, i] = _I(np.floor(cell)), _I(np.rint(step))
         fraction[0, i], fraction[1, i] = _F(cell - np.floor(cell)), _F(step - np.rint(step))
     for n in range(3):
         for i in range(ranges.shape[1]):
@@ -350,13 +350,13 @@ def _split(ranges, per_metre, first, cycles, whole, fraction, turn, order):
 
 
 @_compiled
-def _places(whole, fraction, turn, order, cells_per_cycle, index, between, cycles):
+def _sample_points(whole_samples, fraction, turn, order, cells_per_cycle, index, between, cycles):
     """Sample before each pixel, distance of the pixel from that sample, and cycles of the carrier at the pixel.
 
     Cycles are in integers up to second order, in fractions of a cycle beyond.
     """
     for i in range(between.shape[0]):
-        base, step, start, slope = whole[0, i], whole[1, i], fraction[0, i], fraction[1, i]
+        base, step, start, slope = whole_samples[0, i], whole_samples[1, i], fraction[0, i], fraction[1, i]
         c0, c1, c2 = turn[0, i], turn[1, i], turn[2, i]
         p2, p3, p4 = order[0, i], order[1, i], order[2, i]
         for j in range(_SEGMENT_LENGTH):
@@ -459,7 +459,7 @@ def _add_lattice(
             _expand(middle, transmitter[pulse], along, ranges)
             _expand(middle, receiver[pulse], along, ranges)
             _split(ranges, per_metre, first[pulse], cycles, whole, fraction, turn, order)
-            _places(whole, fraction, turn, order, cells_per_cycle, index, between, carrier)
+            _sample_points(whole, fraction, turn, order, cells_per_cycle, index, between, carrier)
             _fetch(profiles[pulse], index, cubic, fetched)
             _add_taps(taps, between, carrier, cubic, real, imag)
         for i in range(rows):

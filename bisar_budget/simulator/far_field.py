@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.extras import install_command
 from bisar_budget.geometry import GroundVector
 from bisar_budget.simulator.image_formation import direct_sum
@@ -83,7 +83,7 @@ def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: 
     """
     import finufft
 
-    wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT
+    wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT_MPS
     samples: Complexes = history.samples
     middle = sight[len(sight) // 2, :2] / float(np.hypot(*sight[len(sight) // 2, :2]))
     turn = np.array([[middle[0], -middle[1], 0.0], [middle[1], middle[0], 0.0], [0.0, 0.0, 1.0]])
@@ -156,7 +156,7 @@ def polar_format(
     along, across = east * cosine + north * sine, north * cosine - east * sine  # (9), per hertz
     slope = across / along
     to_centre = 2 * (east * centre[0] + north * centre[1])
-    samples = history.samples * np.exp(-2j * math.pi / SPEED_OF_LIGHT * np.outer(to_centre, history.frequency))
+    samples = history.samples * np.exp(-2j * math.pi / SPEED_OF_LIGHT_MPS * np.outer(to_centre, history.frequency))
     turn = np.diff(slope)
     if (turn < 0).all():
         samples, along, slope = samples[::-1], along[::-1], slope[::-1]
@@ -171,13 +171,13 @@ def polar_format(
             f"polar format needs {_STENCIL_SAMPLES} frequencies or more, and x′ pointing at the platforms"
         )
     # (13), f₀ projected. At a squint the projection of a frequency changes over the aperture.
-    fx = _grid(low * along.max(), high * along.min(), SPEED_OF_LIGHT / (2 * size[0]))
+    fx = _grid(low * along.max(), high * along.min(), SPEED_OF_LIGHT_MPS / (2 * size[0]))
     if not fx.size:
         raise ValueError(
             "no rectangle of frequencies fits into the aperture: too much squint for so little bandwidth"
         )
     edges = np.outer((slope[0], slope[-1]), (fx[0], fx[-1]))
-    fy = _grid(edges[0].max(), edges[1].min(), SPEED_OF_LIGHT / (2 * size[1]))
+    fy = _grid(edges[0].max(), edges[1].min(), SPEED_OF_LIGHT_MPS / (2 * size[1]))
     if not fy.size:
         raise ValueError("no rectangle of frequencies fits into the aperture: the line of sight turns off x′")
     for name, count, pixels in (("x′", fx.size, shape[0]), ("y′", fy.size, shape[1])):
@@ -188,7 +188,10 @@ def polar_format(
     pulse = np.interp(fy / fx[:, None], slope, np.arange(slope.size))
     rectangle = _interpolated(np.ascontiguousarray(in_range.T), pulse)
     spectrum = np.zeros(shape, dtype=complex)
-    number_x, number_y = np.rint(fx * 2 * size[0] / SPEED_OF_LIGHT), np.rint(fy * 2 * size[1] / SPEED_OF_LIGHT)
+    number_x, number_y = (
+        np.rint(fx * 2 * size[0] / SPEED_OF_LIGHT_MPS),
+        np.rint(fy * 2 * size[1] / SPEED_OF_LIGHT_MPS),
+    )
     spectrum[np.ix_(number_x.astype(np.int64) % shape[0], number_y.astype(np.int64) % shape[1])] = rectangle
     image = np.fft.fft2(spectrum) / rectangle.size  # (14)
     return PolarFormat(np.roll(image, (shape[0] // 2, shape[1] // 2), axis=(0, 1)), fx, fy)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import GroundVector
 from bisar_budget.image_plane import Band, GroundMatrix, band_variance, nodes
 from bisar_budget.ranges.resolution import cells_of_support
@@ -88,7 +88,7 @@ class ExactRangeFormer:
 
     def _formed(self, history: PhaseHistory, points: Floats) -> Complexes:
         formed = matched_filter(history, points) if self.is_direct else backprojection(history, points, self.kernel)
-        formed *= self.lines.baseband(points, SPEED_OF_LIGHT / self.radar.center_frequency)
+        formed *= self.lines.baseband(points, SPEED_OF_LIGHT_MPS / float(self.radar.center_frequency))
         return formed
 
 
@@ -180,7 +180,7 @@ class PlaneWaves:
 
     def _carrier(self, points: Floats) -> Complexes:
         """Phase of the range at the midpoint for plane waves, as in `RangeLines.baseband`."""
-        wavenumber = 2 * math.pi * self.center_frequency / SPEED_OF_LIGHT
+        wavenumber = 2 * math.pi * self.center_frequency / SPEED_OF_LIGHT_MPS
         carrier: Complexes = np.exp(1j * wavenumber * (points[..., :2] @ self.middle))
         return carrier
 

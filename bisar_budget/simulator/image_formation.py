@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.extras import install_command
 from bisar_budget.memory import is_spacious
 from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory, is_even, split
@@ -56,7 +56,7 @@ def matched_filter(history: PhaseHistory, points: Floats) -> Complexes:
 def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, int], Floats]) -> Complexes:
     """Sum of (4) over pulses and frequencies, with ΔR of points (n, 3) at a pulse by `ranges(points, pulse)`."""
     image: Complexes = np.zeros(points.shape[0], dtype=complex)
-    wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT
+    wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT_MPS
     coarse, fine = split(wavenumber) if is_even(history.frequency) else (wavenumber, np.zeros(1))
     shape = (coarse.size, fine.size)
     points_per_block = max(1, _BLOCK_TERMS_COUNT // max(1, sum(shape)))
@@ -144,7 +144,7 @@ def _backprojection(history: PhaseHistory, points: Floats) -> Complexes:
     length = profile_length(history, _SAMPLES_PER_RANGE_CELL)
     transform = np.sinc(harmonics(history) / length) ** 4  # of a cubic B-spline
     per_metre = cells_per_metre(history, length)
-    carrier = 2 * math.pi * carrier_frequency(history) / SPEED_OF_LIGHT
+    carrier = 2 * math.pi * carrier_frequency(history) / SPEED_OF_LIGHT_MPS
     image: Complexes = np.zeros(axes.shape[1], dtype=complex)
     for pulse in range(history.slow_time.size):
         spline = range_profiles(history, length, transform, slice(pulse, pulse + 1))[0]
@@ -191,7 +191,7 @@ def profile_length(history: PhaseHistory, oversampling: int) -> int:
 def cells_per_metre(history: PhaseHistory, length: int) -> float:
     """Profile samples per metre of ΔR."""
     step = (history.frequency[-1] - history.frequency[0]) / max(1, history.frequency.size - 1)
-    return float(length * step / SPEED_OF_LIGHT)
+    return float(length * step / SPEED_OF_LIGHT_MPS)
 
 
 def carrier_frequency(history: PhaseHistory) -> float:

@@ -7,22 +7,23 @@ Frame: scene centre at the origin, x east, y north, z up. SI units.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector, Vectors
-from bisar_budget.image_plane import LEADING, Sampling, band_variance
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
+from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector, VectorArrays
+from bisar_budget.image_plane import LEGENDRE_LEADING, Sampling, band_variance
 from bisar_budget.mission.model import Radar
 from bisar_budget.ranges.exact_ranges import ExactEffect, ExactRanges, followed
+from bisar_budget.simulator.orbit_error import orbit_error
 
 _BLOCK_SAMPLES = 1 << 18  # complex numbers held at once
 _MIN_SIGHT_RATIO = 1e-20  # square of the change of the range by a metre of a platform; a smaller square is rounding
 SMOOTH_ORDER = 12  # of the polynomial that is the smooth part of a history
 _FIT_ORDER = 12  # of the fit to samples anywhere over the aperture
-_ROUNDING_FRACTION = 1e-14  # of a frequency: rounding of numpy.linspace
+_FREQUENCY_ROUNDING_FRACTION = 1e-14  # of a frequency: rounding of numpy.linspace
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -39,6 +40,13 @@ class PathSinusoid(NamedTuple):
     frequency: float
     phase: float = 0.0
     axis: Vector | None = None
+
+
+class ReceiverNoise(TypedDict, total=False):
+    """Noise of a receiver, as `phase_history` takes it."""
+
+    noise_power: float
+    rng: np.random.Generator | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +81,9 @@ class PathError(NamedTuple):
 
     Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], an error of any form over time, are
     east-north-up. Noise and vibrations without an axis are along the line of sight, positive away from the scene.
+    A platform in free fall flies the errors of position, velocity and acceleration at mid-aperture as another orbit;
+    for any other they are a polynomial of time. `height` [m] is the height by which a scene is too high: it moves the
+    measured path up, and is no error of an orbit.
     `time_tag` [s] is the delay of a time tag: the measured path is the true path that much later. `wideband_rms` [m]
     is the RMS noise of the pulses, white or within `wideband_band` (low, high) [Hz], and needs a generator.
     """
@@ -85,6 +96,7 @@ class PathError(NamedTuple):
     wideband_band: tuple[float, float] | None = None
     course: Course | None = None
     time_tag: float = 0.0
+    height: float = 0.0
 
     def slow(self) -> "PathError":
         """The same error with the smooth part of its course."""
@@ -99,7 +111,8 @@ class PathError(NamedTuple):
         position, velocity, acceleration = (
             (u[0] + v[0], u[1] + v[1], u[2] + v[2]) for u, v in zip(self[:3], other[:3], strict=True)
         )
-        return PathError(position, velocity, acceleration, time_tag=self.time_tag + other.time_tag)
+        time_tag, height = self.time_tag + other.time_tag, self.height + other.height
+        return PathError(position, velocity, acceleration, time_tag=time_tag, height=height)
 
 
 class Errors(NamedTuple):
@@ -195,10 +208,15 @@ class Flight:
             total += np.linalg.norm(path.actual - scatterer_position, axis=1) - np.linalg.norm(
                 path.measured - seen_position, axis=1
             )
-        return total + SPEED_OF_LIGHT * self.seen
+        return total + SPEED_OF_LIGHT_MPS * self.seen
 
     def record(
-        self, scatterers: Floats, amplitudes: Complexes, slow_time: Floats, frequency: Floats, **noise: Any
+        self,
+        scatterers: Floats,
+        amplitudes: Complexes,
+        slow_time: Floats,
+        frequency: Floats,
+        **noise: Unpack[ReceiverNoise],
     ) -> "PhaseHistory":
         """The phase history of scatterers as the receiver records it at these slow times: `phase_history`."""
         return phase_history(
@@ -245,7 +263,7 @@ def cell_centres(length: float, count: int) -> Floats:
 
 def is_even(frequency: Floats) -> bool:
     """Whether frequencies are evenly spaced, to rounding. Over kilometres of range, rounding gives no phase."""
-    return frequency.size > 2 and float(np.ptp(np.diff(frequency))) <= _ROUNDING_FRACTION * float(
+    return frequency.size > 2 and float(np.ptp(np.diff(frequency))) <= _FREQUENCY_ROUNDING_FRACTION * float(
         np.abs(frequency).max()
     )
 
@@ -291,11 +309,16 @@ def path(
     actual = _placed(state, slow_time)
     if error is None:
         return Path(actual=actual, measured=actual)
-    # (22): p̃ + ṽτ + ãτ²/2
-    tau = slow_time[:, None]
     measured = _placed(state, slow_time + error.time_tag) if error.time_tag else actual
-    measured = measured + np.asarray(error.position) + np.asarray(error.velocity) * tau
-    measured = measured + np.asarray(error.acceleration) * tau**2 / 2
+    if state.fall is None or not any(map(any, error[:3])):
+        # (22): p̃ + ṽτ + ãτ²/2
+        tau = slow_time[:, None]
+        measured = measured + np.asarray(error.position) + np.asarray(error.velocity) * tau
+        measured = measured + np.asarray(error.acceleration) * tau**2 / 2
+    else:
+        measured = measured + orbit_error(state, error.position, error.velocity, error.acceleration, slow_time)
+    if error.height:
+        measured = measured + np.array((0.0, 0.0, error.height))
     if error.course is not None:
         measured = measured + error.course.at(slow_time)
     along = np.zeros_like(slow_time)
@@ -368,7 +391,7 @@ def direct_path_error(paths: tuple[Path, Path]) -> Floats:
     excess_range: Floats = np.linalg.norm(transmitter.measured - receiver.measured, axis=-1) - np.linalg.norm(
         transmitter.actual - receiver.actual, axis=-1
     )
-    return excess_range / SPEED_OF_LIGHT
+    return excess_range / SPEED_OF_LIGHT_MPS
 
 
 def phase_history(
@@ -416,9 +439,9 @@ def phase_history(
     ValueError
         Noise without a generator, or not one amplitude for each scatterer.
     """
-    wavenumber = 2 * math.pi * frequency / SPEED_OF_LIGHT
+    wavenumber = 2 * math.pi * frequency / SPEED_OF_LIGHT_MPS
     reference = np.linalg.norm(transmitter.measured, axis=1) + np.linalg.norm(receiver.measured, axis=1)
-    clock = SPEED_OF_LIGHT * np.broadcast_to(np.asarray(clock_error, dtype=float), slow_time.shape)
+    clock = SPEED_OF_LIGHT_MPS * np.broadcast_to(np.asarray(clock_error, dtype=float), slow_time.shape)
     samples = np.zeros((slow_time.size, frequency.size), dtype=complex)
     scatterers, amplitudes = np.atleast_2d(scatterers), np.atleast_1d(amplitudes)
     if len(scatterers) != len(amplitudes):
@@ -485,7 +508,7 @@ def exact_effect(
         [_columns(path.actual) for path in paths],
         [_columns(path.actual[slow_time.size // 2]) for path in paths],
     )
-    clock = np.broadcast_to(SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float), slow_time.shape)[:, None]
+    clock = np.broadcast_to(SPEED_OF_LIGHT_MPS * np.asarray(clock_error, dtype=float), slow_time.shape)[:, None]
     shifts = [_columns(path.measured - path.actual) for path in paths]
     solution = followed(exact, clock, shifts, np.zeros(1, dtype=int))
     if not solution.is_settled[0]:
@@ -494,7 +517,7 @@ def exact_effect(
     return ExactEffect((east, north), *phases)
 
 
-def _columns(positions: Floats) -> Vectors:
+def _columns(positions: Floats) -> VectorArrays:
     """Components x, y and z of positions (..., 3), each (..., 1)."""
     x, y, z = np.moveaxis(positions, -1, 0)[..., None]
     return x, y, z
@@ -503,4 +526,4 @@ def _columns(positions: Floats) -> Vectors:
 def _sampling(nodes: Floats) -> Sampling:
     """Sampling at any nodes in −1 … 1, by a polynomial fitted through them."""
     legendre = np.polynomial.legendre.legvander(nodes, min(_FIT_ORDER, max(3, nodes.size // 4)))
-    return Sampling(nodes, LEADING[:, None] * np.linalg.pinv(legendre)[:4])
+    return Sampling(nodes, LEGENDRE_LEADING[:, None] * np.linalg.pinv(legendre)[:4])

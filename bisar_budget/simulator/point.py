@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.combined import correlated_errors, likely_error
 from bisar_budget.effects.effect import PLATFORMS, LinePiece, gradients_of, indicated_point
 from bisar_budget.effects.vibration import counted, lines_of, sight_of
-from bisar_budget.geometry import GroundVector, Vector, dot
+from bisar_budget.geometry import GroundVector, PlatformState, dot, plain_vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError as DeclaredError
 from bisar_budget.ranges.exact_ranges import ExactEffect
@@ -37,6 +37,7 @@ from bisar_budget.simulator.phase_history import (
     PathError,
     PathSinusoid,
     PhaseHistory,
+    ReceiverNoise,
     cell_centres,
     look_sum,
 )
@@ -47,7 +48,7 @@ from bisar_budget.workers import Progress, unseen
 _MARGIN_CELLS = 16  # of the patch beyond the smear, on each side
 _SAMPLES_PER_CELL = 3
 _MIN_PULSES, _MAX_PULSES = 256, 1 << 15
-_MIN_FREQUENCIES = 64
+_MIN_FREQUENCY_COUNT = 64
 _TRIAL_PULSES = 64  # pulses of the trial that foresees the time
 _MAX_ECHO_CELLS = 256  # from the peak; paired echoes farther away are named, not shown
 _SCENE_PIXELS = 1 << 18  # of the image in (x, y)
@@ -267,7 +268,7 @@ def simulate_point(
 
     def history(flight: Flight, scatterer_places: Floats) -> PhaseHistory:
         scatterers, power = np.c_[scatterer_places, np.zeros(len(scatterer_places))], settings.noise
-        noise = {"noise_power": 0.0 if power is None else 10 ** (power / 10), "rng": rng}
+        noise: ReceiverNoise = {"noise_power": 0.0 if power is None else 10 ** (power / 10), "rng": rng}
         return collection.record(flight, scatterers, amplitudes.astype(complex), slow_time, plan.frequencies, **noise)
 
     done_work = 0
@@ -386,22 +387,22 @@ def declared_errors(mission: Mission) -> Errors:
     for name in PLATFORMS:
         declared: DeclaredError = getattr(mission.platforms, name).motion_error
         state = getattr(mission.geometry, name)
-        axes = state.frame(declared.frame)
-        error = _turned((declared.position, declared.velocity, declared.acceleration), axes, factor)
+        error = _turned((declared.position, declared.velocity, declared.acceleration), state, declared.frame, factor)
         error = error._replace(time_tag=factor * (declared.time_tag or 0.0))
         if name in likely_errors:
-            likely_path_error = _turned((likely_errors[name][:3], likely_errors[name][3:]), axes, 1.0)
+            likely_vectors = (likely_errors[name][:3], likely_errors[name][3:])
+            likely_path_error = _turned(likely_vectors, state, declared.frame, 1.0)
             error = likely_path_error._replace(acceleration=error.acceleration)
         if common is not None:
             common_vectors = (common.position, common.velocity, common.acceleration)
-            common_error = _turned(common_vectors, state.frame(common.frame), factor)
+            common_error = _turned(common_vectors, state, common.frame, factor)
             error = error.plus(common_error._replace(time_tag=factor * (common.time_tag or 0.0)))
         if mission.scene.height_error:  # a higher scene: both platforms are measured too high
-            error = error.plus(PathError(position=(0.0, 0.0, mission.scene.height_error)))
+            error = error.plus(PathError(height=mission.scene.height_error))
         wideband = declared.vibration.wideband
         error = error._replace(
             sinusoids=_sinusoids(mission, name),
-            wideband_rms=counted(mission, name, wideband.rms, "islr") if wideband else 0.0,
+            wideband_rms=float(counted(mission, name, wideband.rms, "islr") if wideband else 0.0),
             course=getattr(errors, name).course,
         )
         errors = errors.of(name, error)
@@ -411,16 +412,21 @@ def declared_errors(mission: Mission) -> Errors:
     return errors._replace(clock=tuple(map(math.fsum, zip((0.0,) * 4, *clock_terms, strict=True))))
 
 
-def _turned(
-    vectors: Sequence[Sequence[float] | None], axes: tuple[Vector, Vector, Vector], factor: float
-) -> PathError:
-    """Turn position, velocity and acceleration errors from a frame's axes to the scene's axes, signs kept."""
-    turned = []
+def _turned(vectors: Sequence[Sequence[float] | None], state: PlatformState, frame: str, factor: float) -> PathError:
+    """Turn position, velocity and acceleration errors from a frame's axes to the scene's axes, signs kept.
+
+    The velocity of a platform in free fall is against the stars in `ric`, and the rate of the Earth-fixed vector in
+    all other frames.
+    """
+    axes, turned = state.frame(frame), []
     for vector in vectors:
         components = (0.0, 0.0, 0.0) if vector is None else vector
         x, y, z = (factor * sum(d * axis[i] for d, axis in zip(components, axes, strict=True)) for i in range(3))
-        turned.append((x, y, z))
+        turned.append(plain_vector((x, y, z)))
     position, velocity, acceleration = (*turned, (0.0, 0.0, 0.0))[:3]
+    if frame == "ric" and state.fall is not None:
+        u, v, w = (a + b for a, b in zip(velocity, state.fall.rate_against_stars(position), strict=True))
+        velocity = plain_vector((u, v, w))
     return PathError(position, velocity, acceleration)
 
 
@@ -464,7 +470,7 @@ def _plan(
     # Cycles over the aperture are cells of cross range. The walk of the range error is in cells of c/B.
     reach = float(np.abs(slope).max()) * T / radar.wavelength
     time = cell_centres(T, remaining_range.size)
-    walk = float(np.abs(remaining_range - slope * time).max()) * radar.bandwidth / SPEED_OF_LIGHT
+    walk = float(np.abs(remaining_range - slope * time).max()) * radar.bandwidth / SPEED_OF_LIGHT_MPS
     farthest_cells = np.abs(former.offsets(shown, centre)).max(axis=0)
     echoes = sorted({line.frequency * T for line in _flown_lines(mission)})
     mission_pulses = mission.collection.pulses
@@ -510,7 +516,7 @@ def _plan(
         cells[0] / finer + cells[1] * relative,
         diagonal / scene_former.cells(scene_centre)[0] + diagonal / scene_cell[1] * relative,
     )
-    frequencies = max(_MIN_FREQUENCIES, math.ceil(2 * longest))
+    frequencies = max(_MIN_FREQUENCY_COUNT, math.ceil(2 * longest))
     own_cells = 2 * math.ceil(reach + _MARGIN_CELLS)
     bytes_held = max(former.bytes_held, scene_former.bytes_held)
     return Plan(rotated, in_scene, pulses, frequencies, own_cells, finer, outside, bytes_held)
@@ -536,7 +542,7 @@ def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
     error: DeclaredError = getattr(mission.platforms, name).motion_error
     line = error.vibration.sinusoidal[entry]
     if not isinstance(line.displacement, tuple):
-        return [PathSinusoid(lines_of(mission, name)[entry].amplitude, line.frequency)]
+        return [PathSinusoid(float(lines_of(mission, name)[entry].amplitude), line.frequency)]
     axes, sight = getattr(mission.geometry, name).frame(error.frame), sight_of(mission, name)
     return [
         PathSinusoid(size, line.frequency, 0.0 if dot(axis, sight) >= 0 else math.pi, axis)

@@ -6,13 +6,13 @@ recursion, phase noise is a sum of tones, and synchronisation joins samples of i
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.air_delays import CONTENT, DELAY, correlation_time_of, group_delay, legs_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import (
@@ -147,7 +147,7 @@ def zenith_delays(
     """Delays at the zenith in declared sigmas, (draws, times): constant, or correlated over time."""
     correlation_time = correlation_time_of(mission, error.owner)
     if correlation_time is not None:
-        return _correlated(correlation_time, times, draws, rng)
+        return _correlated(float(correlation_time), times, draws, rng)
     return np.multiply.outer(rng.standard_normal(draws), np.ones(times.size))
 
 
@@ -163,7 +163,7 @@ def group_delays(mission: Mission, error: RandomError, times: Floats, at_zenith:
 
 def electrons_at_1_hz(mission: Mission, times: Floats, group: Floats) -> Course:
     """Convert group delays by free electrons at the centre frequency, (times,) [m], to `Errors.electrons`. [s·Hz²]"""
-    return Course(times, group / SPEED_OF_LIGHT * mission.radar.center_frequency**2)
+    return Course(times, group / SPEED_OF_LIGHT_MPS * mission.radar.center_frequency**2)
 
 
 def has_unset_clocks(mission: Mission) -> bool:
@@ -226,7 +226,7 @@ def drawn_errors(analysis: Analysis) -> Errors:
     )
     seconds = clock_seconds(phase, mission.radar.wavelength)
     if air[DELAY].any():
-        seconds = seconds + np.interp(noise_times, times, air[DELAY]) / SPEED_OF_LIGHT
+        seconds = seconds + np.interp(noise_times, times, air[DELAY]) / SPEED_OF_LIGHT_MPS
     clock = Course(noise_times, seconds) if seconds.any() else None
     electrons = electrons_at_1_hz(mission, times, air[CONTENT]) if air[CONTENT].any() else None
     return Errors(transmitter, receiver, clock_course=clock, electrons=electrons)
@@ -435,8 +435,8 @@ def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...
     metres, T = mission.radar.wavelength / (2 * math.pi), mission.collection.aperture_time
     return tuple(
         PathSinusoid(
-            metres * tone.free * tone.sensitivity * share,
-            frequency,
+            float(metres * tone.free * tone.sensitivity * share),
+            float(frequency),
             0.0 if tone.in_quadrature is None or index else math.pi / 2,
         )
         for tone in accelerated_tones(mission)
@@ -457,11 +457,11 @@ def _folded_tones(mission: Mission, error: RandomError) -> list[tuple[float, flo
     tones: list[tuple[float, LeftTone]] = []
     if error.subject.axis == "acceleration":
         of_platform = [tone for tone in accelerated_tones(mission) if tone.name == name]
-        tones = [(tone.free, tone.left) for tone in of_platform if tone.frequency * T >= SLOWEST_ECHO_CYCLES]
+        tones = [(float(tone.free), tone.left) for tone in of_platform if tone.frequency * T >= SLOWEST_ECHO_CYCLES]
     elif error.subject.kind == "oscillator":
-        tones = [(spur.free, spur.left) for spur in spurs_of(mission) if spur.name == name]
+        tones = [(float(spur.free), spur.left) for spur in spurs_of(mission) if spur.name == name]
     return [
-        (frequency, free * share)
+        (float(frequency), free * float(share))
         for free, residual in tones
         for frequency, share in zip(residual.frequencies, residual.shares, strict=True)
         if frequency * T < SLOWEST_ECHO_CYCLES and share
@@ -522,11 +522,14 @@ def _phasors(turns: float, count: int) -> Complexes:
     return phasors[1 : count + 1]
 
 
-def _folded(values: NDArray[Any], count: int) -> NDArray[Any]:
+Summed = TypeVar("Summed", np.float64, np.complex128)
+
+
+def _folded(values: NDArray[Summed], count: int) -> NDArray[Summed]:
     """Sums of the tones 1, 2 … that are equal at `count` moments of their period, (count,)."""
     padded = np.zeros(-(-(values.size + 1) // count) * count, values.dtype)
     padded[1 : values.size + 1] = values
-    folded: NDArray[Any] = padded.reshape(-1, count).sum(axis=0)
+    folded: NDArray[Summed] = padded.reshape(-1, count).sum(axis=0)
     return folded
 
 
@@ -584,7 +587,7 @@ class _Tones:
         self.count = self.slow.size
         for piece in narrow:
             width = (piece.high - piece.low) / _TONES_PER_NARROW_PIECE
-            frequencies = piece.low + width * (np.arange(_TONES_PER_NARROW_PIECE) + 0.5)
+            frequencies = piece.low + width * (np.arange(_TONES_PER_NARROW_PIECE, dtype=float) + 0.5)
             self.slow = np.append(self.slow, frequencies)
             self.slow_size = np.append(self.slow_size, np.sqrt(piece.at(frequencies) * width))
         pieces = _above(pieces, float(slow[-1]))
@@ -672,4 +675,4 @@ class _Setting:
 
 def clock_seconds(phase: Floats, wavelength_m: float) -> Floats:
     """Clock error with a given phase at the centre frequency. [s]"""
-    return phase * wavelength_m / (2 * math.pi * SPEED_OF_LIGHT)
+    return phase * wavelength_m / (2 * math.pi * SPEED_OF_LIGHT_MPS)

@@ -24,7 +24,7 @@ from sympy import (
 
 from bisar_budget.theory.symbols import (
     AXES,
-    PLATFORMS,
+    PLATFORM_SYMBOLS,
     PlatformSymbols,
     baseline,
     c,
@@ -44,7 +44,7 @@ def distance(one: Matrix, other: Matrix) -> Expr:
     return sqrt(sum((r - x) ** 2 for r, x in zip(one, other, strict=True)))
 
 
-def observed_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+def observed_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORM_SYMBOLS) -> Expr:
     """Return ΔR̂_m of (1): true distances to a scatterer minus measured distances to the centre, and the clock. [m]"""
     total = c * Function("ttilde")(tau)
     for platform in platforms:
@@ -64,14 +64,14 @@ def direct_path_clock() -> Expr:
     The receiver's clock is the direct signal, which is late by the actual distance. The processor subtracts the
     measured distance.
     """
-    transmitter, receiver = (platform.position + measured_error(platform) for platform in PLATFORMS)
-    actual = distance(*(platform.position for platform in PLATFORMS))
+    transmitter, receiver = (platform.position + measured_error(platform) for platform in PLATFORM_SYMBOLS)
+    actual = distance(*(platform.position for platform in PLATFORM_SYMBOLS))
     return distance(transmitter, receiver) - actual
 
 
 def exact_differential_range() -> Expr:
     """Differential range of a point (x, y, z) without errors: (1) with r̃ = 0 and t̃ = 0. [m]"""
-    free = dict.fromkeys((e for platform in PLATFORMS for e in measured_error(platform)), 0)
+    free = dict.fromkeys((e for platform in PLATFORM_SYMBOLS for e in measured_error(platform)), 0)
     exact = observed_differential_range().subs(Function("ttilde")(tau), 0).subs(free)
     return exact.subs(dict(zip(scatterer, point, strict=True)))
 
@@ -85,7 +85,7 @@ def far_field_differential_range() -> Expr:
 
 def in_angles(expression: Expr) -> Expr:
     """Write positions by slant range, azimuth and elevation, as (6) does."""
-    for platform in PLATFORMS:
+    for platform in PLATFORM_SYMBOLS:
         R, phi, theta = platform.slant_range, platform.azimuth, platform.elevation
         spherical = (R * cos(phi) * cos(theta), R * sin(phi) * cos(theta), R * sin(theta))
         expression = expression.subs(dict(zip(platform.position, spherical, strict=True)))
@@ -103,7 +103,7 @@ def hold_range_constant(expression: Expr) -> Expr:
 
     This is the paper's key approximation: numerators move, ranges do not. The full model drops it.
     """
-    for platform in PLATFORMS:
+    for platform in PLATFORM_SYMBOLS:
         expression = expression.subs(platform.exact_slant_range(), platform.slant_range)
         moving = platform.position + platform.velocity * tau
         expression = expression.subs(dict(zip(platform.position, moving, strict=True)))
@@ -154,7 +154,7 @@ def _first_order(platform: PlatformSymbols) -> Expr:
 
 def _grown(expression: Expr) -> Expr:
     """First order of an expression in the errors of both platforms, as functions of slow time."""
-    for platform in PLATFORMS:
+    for platform in PLATFORM_SYMBOLS:
         grown = zip(measured_error(platform), _EPSILON * error_track(platform), strict=True)
         expression = expression.subs(dict(grown))
     return diff(expression, _EPSILON).subs(_EPSILON, 0)
@@ -168,8 +168,8 @@ def direct_path_range_error() -> Expr:
     """
     observed = observed_differential_range().subs(dict.fromkeys(scatterer, 0))
     total = _grown(observed.subs(c * Function("ttilde")(tau), direct_path_clock()))
-    total = total.subs(distance(*(platform.position for platform in PLATFORMS)), baseline)
-    for platform in PLATFORMS:
+    total = total.subs(distance(*(platform.position for platform in PLATFORM_SYMBOLS)), baseline)
+    for platform in PLATFORM_SYMBOLS:
         total = total.subs(platform.exact_slant_range(), platform.slant_range)
     return expand(total)
 
@@ -182,7 +182,7 @@ def range_error_of_tracks() -> Expr:
     |r| − |r + r̃| for each platform. First order in r̃, then the motion model of (17).
     """
     total = c * Function("ttilde")(tau)
-    for platform in PLATFORMS:
+    for platform in PLATFORM_SYMBOLS:
         total += hold_range_constant(_first_order(platform))
     return total
 
@@ -191,7 +191,7 @@ def range_error_of_tracks() -> Expr:
 def range_error() -> Expr:
     """Return (23) with (22) put in, a cubic in slow time. [m]"""
     total = range_error_of_tracks().subs(Function("ttilde")(tau), clock_polynomial())
-    for platform in PLATFORMS:
+    for platform in PLATFORM_SYMBOLS:
         total = total.subs(dict(zip(error_track(platform), error_polynomial(platform), strict=True)))
     return expand(total)
 

@@ -17,7 +17,7 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import full, published, random_errors
-from bisar_budget.theory.published import Equation, Table
+from bisar_budget.theory.published import Equation, FormulaTable
 from bisar_budget.theory.render import as_latex, as_mathml_content, as_text
 from bisar_budget.theory.symbols import (
     RECEIVER,
@@ -145,7 +145,7 @@ def evaluators() -> tuple[Evaluator, ...]:
             ),
             arguments=(*platform_arguments(TRANSMITTER), *phase_arguments),
             rows=tuple(effects(beta, error) for error in motion),
-            row_names=tuple(f"{kind} {axis}" for kind in published.KINDS for axis in "xyz"),
+            row_names=tuple(f"{kind} {axis}" for kind in published.ERROR_KINDS for axis in "xyz"),
             quotients=tuple(
                 (f"{name}_{axis}", component, TRANSMITTER.slant_range)
                 for name, vector in (("constant", TRANSMITTER.position), ("linear", TRANSMITTER.velocity))
@@ -359,7 +359,7 @@ def equations() -> tuple[Equation, ...]:
 
 def named() -> Iterator[tuple[str, Expr]]:
     """Expressions that an explanation asks for by name."""
-    columns: tuple[tuple[Table, Sequence[int]], ...] = (
+    columns: tuple[tuple[FormulaTable, Sequence[int]], ...] = (
         (published.table_1(), range(4)),
         (published.table_2(), [0]),
         (published.vibration(), [0, 1]),

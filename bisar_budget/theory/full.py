@@ -35,10 +35,10 @@ from sympy import (
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import published
-from bisar_budget.theory.published import Equation, Table, TableRow
+from bisar_budget.theory.published import Equation, FormulaTable, TableRow
 from bisar_budget.theory.symbols import (
     AXES,
-    PLATFORMS,
+    PLATFORM_SYMBOLS,
     RECEIVER,
     TRANSMITTER,
     PlatformSymbols,
@@ -52,7 +52,7 @@ from bisar_budget.theory.symbols import (
     tau,
 )
 
-ORDER = 4  # of slow time: the quartic term of a long aperture is partly a quadratic phase
+SLOW_TIME_ORDER = 4  # of slow time: the quartic term of a long aperture is partly a quadratic phase
 
 DIRECT_PATH = ImmutableMatrix([real(f"b_{axis}") for axis in AXES])  # unit vector from receiver to transmitter
 DISPLACEMENT = ImmutableMatrix([real("xhat"), real("yhat")])
@@ -64,7 +64,7 @@ def growth(platform: PlatformSymbols) -> dict[Symbol, Expr]:
     square = Poly(expand(track.dot(track)), tau)
     return {
         real(f"d_{n}{platform.subscript}"): square.coeff_monomial(tau**n) / platform.slant_range**2
-        for n in range(1, ORDER + 1)
+        for n in range(1, SLOW_TIME_ORDER + 1)
     }
 
 
@@ -72,10 +72,10 @@ def growth(platform: PlatformSymbols) -> dict[Symbol, Expr]:
 def look_series(platform: PlatformSymbols) -> tuple[Matrix, ...]:
     """Derivatives of the line of sight u = r/|r| at τ = 0, orders 0 to 4, (3,) each, in `growth`. [1/sⁿ]"""
     growth_sum = 1 + sum(d * tau**n for n, d in enumerate(growth(platform), start=1))
-    inverse = [diff(1 / sqrt(growth_sum), tau, n).subs(tau, 0) / factorial(n) for n in range(ORDER + 1)]
+    inverse = [diff(1 / sqrt(growth_sum), tau, n).subs(tau, 0) / factorial(n) for n in range(SLOW_TIME_ORDER + 1)]
     track = (platform.position, platform.velocity, platform.acceleration / 2)
     series = []
-    for n in range(ORDER + 1):
+    for n in range(SLOW_TIME_ORDER + 1):
         terms = (term * inverse[n - k] for k, term in enumerate(track) if k <= n)
         series.append(sum(terms, start=Matrix([0, 0, 0])) * factorial(n) / platform.slant_range)
     return tuple(series)
@@ -91,14 +91,14 @@ def range_error_at(platform: PlatformSymbols) -> Expr:
 def range_error() -> tuple[Expr, ...]:
     """β̃₀ … β̃₄ of −Σ u(τ)·r̃(τ) + c·t̃(τ), in the derivatives of u. [m/sⁿ]"""
     total = c * dr.clock_polynomial()
-    for platform in PLATFORMS:
+    for platform in PLATFORM_SYMBOLS:
         look = sum(
             (derivative * tau**n / factorial(n) for n, derivative in enumerate(platform.look)),
             start=Matrix([0, 0, 0]),
         )
         total += range_error_at(platform).subs(dict(zip(platform.position, platform.slant_range * look, strict=True)))
     polynomial = Poly(expand(total), tau)
-    return tuple(polynomial.coeff_monomial(tau**n) for n in range(ORDER + 1))
+    return tuple(polynomial.coeff_monomial(tau**n) for n in range(SLOW_TIME_ORDER + 1))
 
 
 def direct_range_error(platform: PlatformSymbols) -> Expr:
@@ -106,7 +106,9 @@ def direct_range_error(platform: PlatformSymbols) -> Expr:
 
     The error may have any form over time; b is the unit vector from receiver to transmitter at that time.
     """
-    (other_platform,) = (platform_symbols for platform_symbols in PLATFORMS if platform_symbols is not platform)
+    (other_platform,) = (
+        platform_symbols for platform_symbols in PLATFORM_SYMBOLS if platform_symbols is not platform
+    )
     b = DIRECT_PATH if platform is TRANSMITTER else -DIRECT_PATH
     total = dr.direct_path_range_error().subs(dict.fromkeys(dr.error_track(other_platform), 0))
     return expand(total.subs(dict(zip(other_platform.position, platform.position - baseline * b, strict=True))))
@@ -120,7 +122,7 @@ def direct_sight(platform: PlatformSymbols) -> Matrix:
 
 def ground_history() -> tuple[Matrix, ...]:
     """Derivatives of s = u_t + u_r on the ground, orders 0 to 4, (2,) each: a point has the range −s(τ)·x."""
-    looks = zip(*(platform.look for platform in PLATFORMS), strict=True)
+    looks = zip(*(platform.look for platform in PLATFORM_SYMBOLS), strict=True)
     return tuple(Matrix([sum(u[axis] for u in looks_of_both) for axis in range(2)]) for looks_of_both in looks)
 
 
@@ -182,9 +184,9 @@ def effective_coefficients() -> tuple[Expr, Expr, Expr]:
 
 
 @cache
-def table() -> Table:
+def table() -> FormulaTable:
     """Coefficients of the range error with all first-order terms, without the terms of the displacement."""
-    return Table(
+    return FormulaTable(
         number="Full model",
         title="Differential range errors with the line of sight turning as it does",
         columns=("Constant β̃₀", "Linear β̃₁", "Quadratic β̃₂", "Cubic β̃₃", "Quartic β̃₄"),
@@ -200,11 +202,11 @@ def table() -> Table:
 @cache
 def equations() -> tuple[Equation, ...]:
     """Turn of the line of sight, displacement of a response, and the coefficients that defocus it."""
-    platform = PLATFORMS[0]
+    platform = PLATFORM_SYMBOLS[0]
     second, third, fourth = effective_coefficients()
     history = ground_history()
     determinant = history[0][0] * history[1][1] - history[0][1] * history[1][0]
-    remaining = [real(f"beta_{n}") for n in range(ORDER + 1)]
+    remaining = [real(f"beta_{n}") for n in range(SLOW_TIME_ORDER + 1)]
     fitted = quadratic_phase(remaining)
     constant, linear = real("beta_0tilde"), real("beta_1tilde")
     displacement = -Matrix(
@@ -243,7 +245,7 @@ def _of_the_direct_path() -> tuple[Equation, ...]:
                 Symbol(f"w_{platform.subscript}"),
                 direct_sight(platform),
             )
-            for platform in PLATFORMS
+            for platform in PLATFORM_SYMBOLS
         ),
     )
 
@@ -255,7 +257,7 @@ def _collected(coefficient: Expr) -> Expr:
 
 
 @cache
-def vibration() -> Table:
+def vibration() -> FormulaTable:
     """Vibration from first principles: the effect of a phase of peak φ or RMS σ, and the motion with that phase.
 
     A sinusoid's echoes are J₁(φ)/J₀(φ) of the response, φ/2 to first order. With Gaussian noise, exp(-σ²) of the
@@ -273,7 +275,7 @@ def vibration() -> Table:
         (amplitude, echo**2, platform_part * motion_of_phase(largest), "a part a of the amplitude of both, in phase"),
         (rms, spread, sqrt(share) * motion_of_phase(noise), "share s of the power of both, independent"),
     )
-    return Table(
+    return FormulaTable(
         number="Vibration, first principles",
         title="Amplitude A (0 to peak) and rms σ along the line of sight, φ = 2πA/λ",
         columns=("Power beside the response", "Allowable"),

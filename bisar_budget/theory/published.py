@@ -41,7 +41,7 @@ from sympy import (
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory.symbols import (
     AXES,
-    PLATFORMS,
+    PLATFORM_SYMBOLS,
     TRANSMITTER,
     PlatformSymbols,
     T,
@@ -60,8 +60,8 @@ from bisar_budget.theory.symbols import (
     wavelength,
 )
 
-KINDS = ("position", "velocity", "acceleration")
-EQUAL_SHARE_QPE = pi / 8  # per platform, half of the monostatic custom, Section V
+ERROR_KINDS = ("position", "velocity", "acceleration")
+EQUAL_SHARE_QPE_RAD = pi / 8  # per platform, half of the monostatic custom, Section V
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class TableRow:
 
 
 @dataclass(frozen=True)
-class Table:
+class FormulaTable:
     """A table with the paper's number, its column heads and its rows in print order."""
 
     number: str
@@ -106,17 +106,17 @@ def motion_errors(platform: PlatformSymbols) -> tuple[Symbol, ...]:
 
 def single_error(expression: Expr, error: Symbol) -> Expr:
     """Keep the effect of one error: all other errors are set to zero."""
-    every = [*clock_coefficients, *(e for platform in PLATFORMS for e in motion_errors(platform))]
+    every = [*clock_coefficients, *(e for platform in PLATFORM_SYMBOLS for e in motion_errors(platform))]
     return expression.xreplace({other: Integer(0) for other in every if other != error})
 
 
 def coefficient_rows(beta: Sequence[Expr], *, is_numbered: bool) -> tuple[TableRow, ...]:
     """Rows of a table of coefficients of the range error: the clock alone, then each motion error alone."""
-    motion_free = {e: 0 for platform in PLATFORMS for e in motion_errors(platform)}
+    motion_free = {e: 0 for platform in PLATFORM_SYMBOLS for e in motion_errors(platform)}
     clock = Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False)
     number = 1 if is_numbered else None
     rows = [TableRow(number, real("ttilde"), clock, tuple(cell.subs(motion_free) for cell in beta))]
-    for platform in PLATFORMS:
+    for platform in PLATFORM_SYMBOLS:
         polynomial = dr.error_polynomial(platform)
         for index, error in enumerate(motion_errors(platform)):
             axis = index // 3
@@ -128,9 +128,9 @@ def coefficient_rows(beta: Sequence[Expr], *, is_numbered: bool) -> tuple[TableR
 
 
 @cache
-def table_1() -> Table:
+def table_1() -> FormulaTable:
     """Table I: coefficients β̃₀ … β̃₃ of the range error, for the clock and each motion error alone."""
-    return Table(
+    return FormulaTable(
         number="Table I",
         title="Differential range errors induced by motion measurement errors",
         columns=("Constant β̃₀", "Linear β̃₁", "Quadratic β̃₂", "Cubic β̃₃"),
@@ -152,11 +152,11 @@ def limit(phase: Expr, error: Symbol, budget: Expr) -> Expr:
 
 
 @cache
-def table_2() -> Table:
+def table_2() -> FormulaTable:
     """Table II: quadratic phase error and largest allowable error, with the bars that the print omits."""
-    beta_2, budget = dr.coefficients(dr.range_error())[2], EQUAL_SHARE_QPE
+    beta_2, budget = dr.coefficients(dr.range_error())[2], EQUAL_SHARE_QPE_RAD
     rows = []
-    for platform in PLATFORMS:
+    for platform in PLATFORM_SYMBOLS:
         errors = [*platform.velocity_error, *platform.acceleration_error]
         powers = [tau] * 3 + [tau**2 / 2] * 3
         for index, (error, power) in enumerate(zip(errors, powers, strict=True)):
@@ -184,7 +184,7 @@ def table_2() -> Table:
             note="not in the paper: the same step for the clock's quadratic term",
         )
     )
-    return Table(
+    return FormulaTable(
         number="Table II",
         title="Quadratic phase error and allowable error at π/8 per platform",
         columns=("QPE [rad]", "Allowable, magnitude"),
@@ -199,7 +199,7 @@ def one_way_phase(motion: Expr) -> Expr:
 
 
 @cache
-def vibration() -> Table:
+def vibration() -> FormulaTable:
     """Vibration limits of Section V, amplitude and rms along the line of sight, with a share of power.
 
     A phase of peak φ makes paired echoes; the rule of Carrara et al., Table 5.12, that the paper quotes is
@@ -217,7 +217,7 @@ def vibration() -> Table:
             cells=(phase**2, allowable, allowable.subs(share, Rational(1, 2))),
         )
 
-    return Table(
+    return FormulaTable(
         number="Vibration",
         title="Allowable sinusoidal amplitude A (0 to peak) and wideband rms σ, line of sight",
         columns=("Power of the phase", "Allowable at share s", "Allowable at s = 1/2"),
@@ -272,7 +272,7 @@ def phase(differential_range: Expr) -> Expr:
 
 def in_slow_time(expression: Expr, at: Expr = tau_k) -> Expr:
     """Replace φ̄_t by φ_t(τ_k), and so on: angles of the aperture's middle by angles at any time."""
-    for platform in PLATFORMS:
+    for platform in PLATFORM_SYMBOLS:
         s = platform.subscript
         expression = expression.subs(
             {platform.azimuth: Function(f"phi_{s}")(at), platform.elevation: Function(f"theta_{s}")(at)}
@@ -376,7 +376,7 @@ def piece_inverse() -> tuple[Matrix, Expr]:
     """Adjugate (2, 2) and determinant of Q_i, for the platforms at τ_i with constant ranges: (30)."""
     moved = {
         coordinate: coordinate + speed * tau_i
-        for platform in PLATFORMS
+        for platform in PLATFORM_SYMBOLS
         for coordinate, speed in zip(platform.position, platform.velocity, strict=True)
     }
     adjugate, determinant = dr.ground_inverse()

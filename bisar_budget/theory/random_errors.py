@@ -33,12 +33,17 @@ from sympy import (
     sqrt,
 )
 
-from bisar_budget.theory.published import Equation, Table, TableRow, one_way_phase
+from bisar_budget.theory.published import Equation, FormulaTable, TableRow, one_way_phase
 from bisar_budget.theory.symbols import T, center_frequency, positive, real
 
-ORDERS = 4  # 0 to 3; the rest of a history spreads
-LEADING = (1, 1, Rational(3, 2), Rational(5, 2))  # coefficient of xⁿ in Pₙ: the order's value at the aperture edge
-TERMS = 9  # powers of a series about zero; the truncation is less than 1e-8 of it for arguments below 0.5
+ORDER_COUNT = 4  # 0 to 3; the rest of a history spreads
+LEADING_RATIONALS = (
+    1,
+    1,
+    Rational(3, 2),
+    Rational(5, 2),
+)  # coefficient of xⁿ in Pₙ: the order's value at the aperture edge
+SERIES_TERMS = 9  # powers of a series about zero; the truncation is less than 1e-8 of it for arguments below 0.5
 
 along = positive("u")  # length of the line of sight; with a size for each axis, the root of Σ(u·σ)²
 # Along the line of sight, per unit: the specific force f that a tilt turns into it, |u × f|, and the excess of f by
@@ -48,7 +53,7 @@ ratio = positive("a")  # T/(2τ_c): half the aperture over the correlation time
 decay = positive("d")  # exp(−2a)
 angle = positive("x")  # πfT
 cosine, sine = real("cosine"), real("sine")
-inverse = tuple(positive(f"inverse_{n}") for n in range(0, 2 * ORDERS + 1, 2))  # x⁻⁰, x⁻² … x⁻⁸
+inverse = tuple(positive(f"inverse_{n}") for n in range(0, 2 * ORDER_COUNT + 1, 2))  # x⁻⁰, x⁻² … x⁻⁸
 step = positive("y")  # 2πf·T_s
 
 _x, _m, _M, _w = real("xi"), positive("m"), positive("M"), positive("w")
@@ -86,8 +91,8 @@ def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
     """Moments from the mean squares of the coefficients of P₀ … P₃ and the mean square of the full history."""
     orders = [square / (2 * n + 1) for n, square in enumerate(coefficients)]
     return Moments(
-        LEADING[2] ** 2 * coefficients[2],
-        LEADING[3] ** 2 * coefficients[3],
+        LEADING_RATIONALS[2] ** 2 * coefficients[2],
+        LEADING_RATIONALS[3] ** 2 * coefficients[3],
         expand(mean_square - sum(orders)),
     )
 
@@ -110,7 +115,7 @@ def walk(order: int) -> Moments:
     """Mean squares of white noise integrated `order` times from mid-aperture on, for a unit density and T = 1."""
     covariance = _from_middle(lambda t: t ** (order - 1) / factorial(order - 1))
     squares = []
-    for n in range(ORDERS):
+    for n in range(ORDER_COUNT):
         earlier = integrate(expand(legendre(n, _m) * covariance(_m, _M)), (_m, 0, _M))
         one_side = 2 * integrate(expand(legendre(n, _M) * earlier), (_M, 0, 1))
         squares.append(Rational(2 * n + 1, 2) ** 2 * 2 * one_side)
@@ -123,12 +128,12 @@ def constant(order: int) -> Moments:
     history = (_x / 2) ** order / factorial(order)
     squares = tuple(
         (Rational(2 * n + 1, 2) * integrate(expand(history * legendre(n, _x)), (_x, -1, 1))) ** 2
-        for n in range(ORDERS)
+        for n in range(ORDER_COUNT)
     )
     return moments(squares, integrate(history**2, (_x, -1, 1)) / 2)
 
 
-class Figure(NamedTuple):
+class SensorFigure(NamedTuple):
     """A figure of an inertial sensor: symbol, name, explanation, and mean squares of the phase of one unit."""
 
     symbol: Symbol
@@ -138,12 +143,12 @@ class Figure(NamedTuple):
 
 
 @cache
-def inertial() -> tuple[Figure, ...]:
+def inertial() -> tuple[SensorFigure, ...]:
     """Figures of an inertial sensor over one aperture, in the order of the mission file. [rad²/unit²]"""
     k = one_way_phase(Integer(1))
 
-    def figure(symbol: str, name: str, says: str, of_range: Moments, size: Expr, power: Expr) -> Figure:
-        return Figure(positive(symbol), name, says, of_range.times((k * size) ** 2 * T ** (2 * power)))
+    def figure(symbol: str, name: str, says: str, of_range: Moments, size: Expr, power: Expr) -> SensorFigure:
+        return SensorFigure(positive(symbol), name, says, of_range.times((k * size) ** 2 * T ** (2 * power)))
 
     return (
         figure("b", "accelerometer bias", "an acceleration error", constant(2), along, Integer(2)),
@@ -181,13 +186,13 @@ def _gauss_markov_coefficients(m: int, n: int) -> Expr:
 @cache
 def gauss_markov() -> Moments:
     """Mean squares of a stationary process of variance 1 and correlation exp(−|t|/τ_c), in `ratio` and `decay`."""
-    return moments(tuple(_gauss_markov_coefficients(n, n) for n in range(ORDERS)), Integer(1))
+    return moments(tuple(_gauss_markov_coefficients(n, n) for n in range(ORDER_COUNT)), Integer(1))
 
 
 @cache
 def gauss_markov_place() -> PlaceMoments:
     """`PlaceMoments` of the process of `gauss_markov`, in `ratio` and `decay`."""
-    return PlaceMoments(*(LEADING[n] * _gauss_markov_coefficients(m, n) for m, n in _PLACE_ORDERS))
+    return PlaceMoments(*(LEADING_RATIONALS[n] * _gauss_markov_coefficients(m, n) for m, n in _PLACE_ORDERS))
 
 
 @cache
@@ -202,17 +207,17 @@ def _series(expression: Expr, variable: Symbol) -> Expr:
 
     Taylor polynomials replace these functions: they are exact up to their order, and SymPy is fast at sums of powers.
     """
-    powers = range(4 * ORDERS + 2 * TERMS)
+    powers = range(4 * ORDER_COUNT + 2 * SERIES_TERMS)
     taylor = {
         exp(-2 * variable): sum((-2 * variable) ** n / factorial(n) for n in powers),
         sin(variable): sum(Integer(-1) ** (n // 2) * variable**n / factorial(n) for n in powers if n % 2),
         cos(variable): sum(Integer(-1) ** (n // 2) * variable**n / factorial(n) for n in powers if n % 2 == 0),
     }
     # No term is divided by a higher power of the variable.
-    exact = Poly(expand(expand(expression).subs(taylor) * variable ** (2 * ORDERS)), variable)
-    terms = [(power - 2 * ORDERS, coefficient) for (power,), coefficient in exact.terms()]
+    exact = Poly(expand(expand(expression).subs(taylor) * variable ** (2 * ORDER_COUNT)), variable)
+    terms = [(power - 2 * ORDER_COUNT, coefficient) for (power,), coefficient in exact.terms()]
     first = min(power for power, _ in terms)
-    return sum(coefficient * variable**power for power, coefficient in terms if power < first + TERMS)
+    return sum(coefficient * variable**power for power, coefficient in terms if power < first + SERIES_TERMS)
 
 
 # ---------------------------------------------------------------------- spectra
@@ -226,9 +231,11 @@ def spherical_bessel(n: int) -> Expr:
 @cache
 def tone() -> Moments:
     """Amplitudes of the quadratic and the cubic phase of a tone of amplitude 1, and the share of its power left."""
-    amplitudes = [spherical_bessel(n) for n in range(ORDERS)]
+    amplitudes = [spherical_bessel(n) for n in range(ORDER_COUNT)]
     remaining_share = 1 - sum((2 * n + 1) * amplitude**2 for n, amplitude in enumerate(amplitudes))
-    return Moments(LEADING[2] * 5 * amplitudes[2], LEADING[3] * 7 * amplitudes[3], remaining_share)
+    return Moments(
+        LEADING_RATIONALS[2] * 5 * amplitudes[2], LEADING_RATIONALS[3] * 7 * amplitudes[3], remaining_share
+    )
 
 
 def tone_place() -> tuple[Expr, Expr]:
@@ -274,7 +281,7 @@ def power_law_integral(n: int, slope: int) -> Expr:
 def power_law(order: int) -> tuple[Expr, ...]:
     """Mean squares of the quadratic (2) or cubic (3) phase of a spectrum f⁰ … f⁻⁴ of density 1. [s^(n−1)]"""
     return tuple(
-        (LEADING[order] * (2 * order + 1)) ** 2 * power_law_integral(order, slope) * T ** (slope - 1)
+        (LEADING_RATIONALS[order] * (2 * order + 1)) ** 2 * power_law_integral(order, slope) * T ** (slope - 1)
         for slope in range(5)
     )
 
@@ -328,7 +335,7 @@ def of_spectrum(amplitude: Expr) -> Expr:
 
 # ---------------------------------------------------------------------- for a reader
 @cache
-def table() -> Table:
+def table() -> FormulaTable:
     """Table of the phases at the aperture edge by each figure of an inertial sensor."""
     rows = tuple(
         TableRow(
@@ -340,7 +347,7 @@ def table() -> Table:
         )
         for figure in inertial()
     )
-    return Table(
+    return FormulaTable(
         number="Inertial sensors",
         title="Phase by one figure of a platform's inertial sensor, one sigma",
         columns=("Quadratic phase [rad]", "Cubic phase [rad]", "Left after the cubic, rms [rad]"),

@@ -14,12 +14,12 @@ from sympy.printing.mathml import MathMLPresentationPrinter
 from sympy.printing.str import StrPrinter
 
 from bisar_budget.theory import full, published, random_errors
-from bisar_budget.theory.published import Equation, Table
+from bisar_budget.theory.published import Equation, FormulaTable
 
-_NAME = re.compile(
+_SYMBOL_PATTERN = re.compile(
     r"(?P<letter>[A-Za-z]+?)(?P<index>_\d)?(?P<accent>tilde|bar|hat|prime|dot|ddot|dddot|ddddot)?(?:_(?P<subscript>\w+))?"
 )
-_GREEK = {
+_GREEK_LETTERS = {
     "lambda": "λ",
     "tau": "τ",
     "phi": "φ",
@@ -32,7 +32,7 @@ _GREEK = {
     "epsilon": "ε",
     "Gamma": "Γ",
 }
-_ACCENTS = {
+_ACCENT_CHARACTERS = {
     "prime": "′",
     "tilde": "\u0303",
     "bar": "\u0304",
@@ -68,7 +68,7 @@ class _Name:
 
     @classmethod
     def of(cls, symbol_name: str) -> "_Name":
-        match = _NAME.fullmatch(symbol_name)
+        match = _SYMBOL_PATTERN.fullmatch(symbol_name)
         if match is None:
             return cls(symbol_name, "", "")
         subscript = (match["index"] or "").lstrip("_") or match["subscript"] or ""
@@ -77,14 +77,14 @@ class _Name:
     @property
     def head(self) -> str:
         letter = self.letter.replace("Delta", "Δ").replace("det", "det ").replace("adj", "adj ")
-        return _GREEK.get(letter, letter)
+        return _GREEK_LETTERS.get(letter, letter)
 
     def text(self) -> str:
-        head = unicodedata.normalize("NFC", self.head + _ACCENTS.get(self.accent, ""))
-        return f"{head}_{_GREEK.get(self.subscript, self.subscript)}" if self.subscript else head
+        head = unicodedata.normalize("NFC", self.head + _ACCENT_CHARACTERS.get(self.accent, ""))
+        return f"{head}_{_GREEK_LETTERS.get(self.subscript, self.subscript)}" if self.subscript else head
 
     def latex(self) -> str:
-        head = f"\\{self.letter}" if self.letter in _GREEK else _COMMANDS.get(self.letter, self.letter)
+        head = f"\\{self.letter}" if self.letter in _GREEK_LETTERS else _COMMANDS.get(self.letter, self.letter)
         for operator in ("det", "adj"):
             if head.startswith(operator):
                 head = rf"{_operator(operator)} {head.removeprefix(operator)}"
@@ -210,7 +210,7 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
         parts = _Name.of(name)
         head = self._leaf("mi", parts.head)
         if parts.accent == "prime":
-            head = self._leaf("mi", parts.head + _ACCENTS["prime"])
+            head = self._leaf("mi", parts.head + _ACCENT_CHARACTERS["prime"])
         elif parts.accent:
             over = self.dom.createElement("mover")
             over.setAttribute("accent", "true")
@@ -221,7 +221,7 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
             return head
         sub = self.dom.createElement("msub")
         sub.appendChild(head)
-        sub.appendChild(self._leaf("mi", _GREEK.get(parts.subscript, parts.subscript)))
+        sub.appendChild(self._leaf("mi", _GREEK_LETTERS.get(parts.subscript, parts.subscript)))
         return sub
 
     def _print_ImaginaryUnit(self, expr: Basic) -> object:
@@ -264,7 +264,7 @@ def as_mathml_content(expression: Basic) -> str:
 
 def derivation(selection: str, format_name: str) -> str:
     """Text of `bisar-budget derive`: `all`, `equations`, `I`, `II`, `vibration`, `full` or `random`."""
-    tables: dict[str, Callable[[], Table]] = {
+    tables: dict[str, Callable[[], FormulaTable]] = {
         "I": published.table_1,
         "II": published.table_2,
         "vibration": published.vibration,
@@ -273,23 +273,25 @@ def derivation(selection: str, format_name: str) -> str:
     }
     blocks = []
     if selection in ("all", "equations"):
-        blocks.append(_EQUATIONS[format_name](_TITLE, published.equations()))
+        blocks.append(_EQUATION_RENDERERS[format_name](_TITLE, published.equations()))
     for name, table in tables.items():
         if selection in ("all", name):
             if name == "random":
                 title = "Equations of random errors, spectra one-sided"
-                blocks.append(_EQUATIONS[format_name](title, random_errors.equations()))
+                blocks.append(_EQUATION_RENDERERS[format_name](title, random_errors.equations()))
             if name == "full":
-                blocks.append(_EQUATIONS[format_name]("Equations of the full model", full.equations()))
-            blocks.append(_TABLES[format_name](table()))
+                blocks.append(_EQUATION_RENDERERS[format_name]("Equations of the full model", full.equations()))
+            blocks.append(_TABLE_RENDERERS[format_name](table()))
             if name == "vibration":
-                blocks.append(_TABLES[format_name](full.vibration()))
+                blocks.append(_TABLE_RENDERERS[format_name](full.vibration()))
     return "\n".join(blocks)
 
 
 def numbered(number: int, format_name: str) -> str:
     """Write all parts of one equation of the paper."""
-    return _EQUATIONS[format_name](_TITLE, tuple(e for e in published.equations() if e.number == f"({number})"))
+    return _EQUATION_RENDERERS[format_name](
+        _TITLE, tuple(e for e in published.equations() if e.number == f"({number})")
+    )
 
 
 _TITLE = "Equations of Rigling & Moses"
@@ -348,7 +350,7 @@ def _mathml_equations(title: str, equations: tuple[Equation, ...]) -> str:
     return "\n".join([*lines, "</dl>"]) + "\n"
 
 
-def _cells(table: Table, write: Callable[[Basic], str]) -> list[list[str]]:
+def _cells(table: FormulaTable, write: Callable[[Basic], str]) -> list[list[str]]:
     rows = []
     for row in table.rows:
         cells = [write(cell) if cell != 0 else "-" for cell in row.cells]
@@ -356,11 +358,11 @@ def _cells(table: Table, write: Callable[[Basic], str]) -> list[list[str]]:
     return rows
 
 
-def _notes(table: Table) -> list[str]:
+def _notes(table: FormulaTable) -> list[str]:
     return [*table.notes, *(f"{as_text(row.error)}: {row.note}." for row in table.rows if row.note)]
 
 
-def _text_table(table: Table) -> str:
+def _text_table(table: FormulaTable) -> str:
     rows = [["Row", "Error", *table.columns], *_cells(table, as_text)]
     widths = [max(_width(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = [f"{table.number}. {table.title}", ""]
@@ -374,7 +376,7 @@ def _width(text: str) -> int:
     return sum(not unicodedata.combining(character) for character in text)
 
 
-def _latex_table(table: Table) -> str:
+def _latex_table(table: FormulaTable) -> str:
     heads = [column.replace("β̃", r"$\tilde{\beta}_").translate(_SUBSCRIPTS) for column in table.columns]
     heads = [f"{head}$" if "$" in head else head for head in heads]
     lines = [
@@ -391,7 +393,7 @@ def _latex_table(table: Table) -> str:
 _SUBSCRIPTS = str.maketrans("₀₁₂₃₄", "01234")
 
 
-def _markdown_table(table: Table) -> str:
+def _markdown_table(table: FormulaTable) -> str:
     lines = [
         f"## {table.number}. {table.title}",
         "",
@@ -404,7 +406,7 @@ def _markdown_table(table: Table) -> str:
     return "\n".join([*lines, "", *_notes(table)]) + "\n"
 
 
-def _mathml_table(table: Table) -> str:
+def _mathml_table(table: FormulaTable) -> str:
     heads = "".join(f'<th scope="col">{head}</th>' for head in ("Row", "Error", *table.columns))
     lines = [
         "<table>",
@@ -419,13 +421,13 @@ def _mathml_table(table: Table) -> str:
     return "\n".join([*lines, "</tbody>", "</table>", notes]) + "\n"
 
 
-_EQUATIONS: dict[str, Callable[[str, tuple[Equation, ...]], str]] = {
+_EQUATION_RENDERERS: dict[str, Callable[[str, tuple[Equation, ...]], str]] = {
     "text": _text_equations,
     "latex": _latex_equations,
     "markdown": _markdown_equations,
     "mathml": _mathml_equations,
 }
-_TABLES: dict[str, Callable[[Table], str]] = {
+_TABLE_RENDERERS: dict[str, Callable[[FormulaTable], str]] = {
     "text": _text_table,
     "latex": _latex_table,
     "markdown": _markdown_table,

@@ -88,4 +88,4 @@ def platform(name: str, subscript: str) -> PlatformSymbols:
 
 TRANSMITTER = platform("transmitter", "t")
 RECEIVER = platform("receiver", "r")
-PLATFORMS = (TRANSMITTER, RECEIVER)
+PLATFORM_SYMBOLS = (TRANSMITTER, RECEIVER)

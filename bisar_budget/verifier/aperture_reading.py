@@ -16,14 +16,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import GroundVector
 from bisar_budget.ranges.exact_ranges import ExactEffect
 from bisar_budget.simulator.autofocus import Focused
 from bisar_budget.simulator.collection import (
-    CELLS,
-    CONTRIBUTIONS,
-    OVERSAMPLING,
+    CUT_CELLS,
+    MAX_CONTRIBUTION_COUNT,
+    OVERSAMPLING_FACTOR,
     Chip,
     PointCollection,
     pulses_for,
@@ -100,7 +100,7 @@ def read_aperture(
     middle = lines // 2
     half = min(middle, lines - 1 - middle, half_lines) // _READ_STRIDE_LINES * _READ_STRIDE_LINES
     rows = slice(middle - half, middle + half + 1, _READ_STRIDE_LINES)
-    slow_time = cell_centres(collection.aperture_time, pulses_for(round(columns / OVERSAMPLING)))
+    slow_time = cell_centres(collection.aperture_time, pulses_for(round(columns / OVERSAMPLING_FACTOR)))
     pixels = chip.grid[rows].reshape(-1, 3)
     images = [member.image[rows] for member in (chip, reference)]
     fitting = _Fitting(collection, errors, centre, pixels, slow_time, images, bool(half_lines))
@@ -119,9 +119,9 @@ def read_aperture(
         else:
             raise ValueError("the response is not in the image")
     fit = solution.fit
-    # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING, which is twice its P₁ part.
+    # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING_FACTOR, which is twice its P₁ part.
     turn = 1 if collection.range_lines(errors).turns_left(centre) else -1
-    across = -turn * OVERSAMPLING / math.pi * float(fit[1])
+    across = -turn * OVERSAMPLING_FACTOR / math.pi * float(fit[1])
     scaled_time = 2 * slow_time / collection.aperture_time
     slope = np.polynomial.legendre.legder([0.0, 0.0, *fit[2:]])
     mean = float(np.mean(scaled_time * np.polynomial.legendre.legval(scaled_time, slope)))
@@ -172,7 +172,7 @@ class _Pixels:
             phase = (2 * math.pi * cycles).astype(np.float32)
             if remaining_range is not None:
                 range_difference -= remaining_range[block, None]
-            cells = (range_difference * (collection.radar.bandwidth / SPEED_OF_LIGHT)).astype(np.float32)
+            cells = (range_difference * (collection.radar.bandwidth / SPEED_OF_LIGHT_MPS)).astype(np.float32)
             if collection.is_tapered:
                 strength = np.interp(np.abs(cells), _KERNEL_CELLS, self.kernel, right=0.0) * by_time[block]
             else:
@@ -208,7 +208,7 @@ def _fit_to_pulses(
     scaled_time = 2 * slow_time / pulse_pixels.collection.aperture_time
     # A taper over the ends of a line, each half as long as a response without smear.
     inside = np.minimum(np.arange(columns) + 0.5, columns - np.arange(columns) - 0.5)
-    taper = np.sin(math.pi / 2 * np.clip(inside / round(CELLS * OVERSAMPLING / 2), 0, 1)) ** 2
+    taper = np.sin(math.pi / 2 * np.clip(inside / round(CUT_CELLS * OVERSAMPLING_FACTOR / 2), 0, 1)) ** 2
     tapered = np.stack([(image * taper).reshape(-1) for image in images])
     correlated = np.empty((2, slow_time.size), dtype=complex)
     block_pulses = max(1, _BLOCK_CONTRIBUTIONS_COUNT // pulse_pixels.places.shape[0])
@@ -261,7 +261,7 @@ class _Fitting:
         images: Sequence[Complexes],
         walks: bool,
     ) -> None:
-        selection = slice(None, None, -(-pixels.shape[0] * slow_time.size // CONTRIBUTIONS))
+        selection = slice(None, None, -(-pixels.shape[0] * slow_time.size // MAX_CONTRIBUTION_COUNT))
         self.seen, clean = (image.reshape(-1)[selection] for image in images)
         self.fitted_pixels = _Pixels(collection, errors, centre, pixels[selection])
         self.slow_time, self.fits = slow_time, _WALK_ROUNDS if walks else 1
@@ -403,7 +403,7 @@ def refocused(
     back to their frequencies. The estimate uses `half_lines` lines on either side of the middle.
     """
     lines, columns = chip.image.shape
-    slow_time = cell_centres(collection.aperture_time, max(64, round(columns / OVERSAMPLING)))
+    slow_time = cell_centres(collection.aperture_time, max(64, round(columns / OVERSAMPLING_FACTOR)))
     frequency = _frequency(collection, errors, centre, chip, slow_time)
     step = np.gradient(frequency)
     if not (step > 0).all() and not (step < 0).all():
@@ -418,7 +418,7 @@ def refocused(
     aperture *= np.abs(step)
     # A separate image, sampled like the chip, with the aperture in the middle of a band.
     count = slow_time.size
-    samples = math.ceil(OVERSAMPLING * count)
+    samples = math.ceil(OVERSAMPLING_FACTOR * count)
     spectrum = np.zeros((lines_used.shape[0], samples), dtype=complex)
     bins = (np.arange(count) - count // 2) % samples
     spectrum[:, bins] = aperture

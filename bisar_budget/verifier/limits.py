@@ -20,10 +20,17 @@ from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES, lines_of
 from bisar_budget.faults import printable
-from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict, VerifiedMission
+from bisar_budget.findings.images import CHIP_FLOOR_DB, ImageEvidence, PointImage, Verdict, VerifiedMission
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.simulator.collection import CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection, pulses_for
+from bisar_budget.simulator.collection import (
+    CUT_CELLS,
+    OVERSAMPLING_FACTOR,
+    RANGE_CELLS,
+    Chip,
+    PointCollection,
+    pulses_for,
+)
 from bisar_budget.simulator.impulse_response import line_at, row_of_peak, upsampled
 from bisar_budget.simulator.phase_history import Errors, Floats
 from bisar_budget.verifier import phase_cases
@@ -199,7 +206,11 @@ class _Sizes(PointCollection):
         self.asked: list[float] = []  # sizes, see `_size`
 
     def pair(
-        self, errors: Errors, ground_point: tuple[float, float], cells: int = CELLS, range_cells: int = RANGE_CELLS
+        self,
+        errors: Errors,
+        ground_point: tuple[float, float],
+        cells: int = CUT_CELLS,
+        range_cells: int = RANGE_CELLS,
     ) -> tuple[Chip, Chip]:
         """Note the size of two images."""
         self._require_room(cells, range_cells)
@@ -210,7 +221,7 @@ class _Sizes(PointCollection):
         """Refuse weights, so that no noise is drawn: that takes seconds for images of any size."""
         raise _NotFormedError(f"{count} weights are not needed")
 
-    def chip(self, centre: tuple[float, float], errors: Errors, *, cells: int = CELLS, **_: object) -> Chip:
+    def chip(self, centre: tuple[float, float], errors: Errors, *, cells: int = CUT_CELLS, **_: object) -> Chip:
         """Note the size of one of two images of a single line."""
         self._require_room(cells, 0)
         self.asked.append(_size(cells, 1))
@@ -236,12 +247,12 @@ def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float
     study = Study(mission)
     try:
         study.collection.chip((0.0, 0.0), Errors(), cells=2)  # compiled, imported
-        smallest_seconds = _seconds(study, CELLS)
+        smallest_seconds = _seconds(study, CUT_CELLS)
     except ValueError:
         return 0.0  # if these cannot be formed, hardly any image can
     try:
-        seconds_per_size = max(0.0, _seconds(study, _LARGE_IMAGE_FACTOR * CELLS) - smallest_seconds) / (
-            _size(_LARGE_IMAGE_FACTOR * CELLS, RANGE_CELLS) - 1
+        seconds_per_size = max(0.0, _seconds(study, _LARGE_IMAGE_FACTOR * CUT_CELLS) - smallest_seconds) / (
+            _size(_LARGE_IMAGE_FACTOR * CUT_CELLS, RANGE_CELLS) - 1
         )
     except ValueError:
         seconds_per_size = smallest_seconds  # no memory for a larger one
@@ -251,7 +262,7 @@ def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float
 
 def _size(cells: int, range_cells: int) -> float:
     """Pixels times pulses of an image, over the pixels times pulses of the smallest image."""
-    return cells * range_cells * pulses_for(cells) / (CELLS * RANGE_CELLS * pulses_for(CELLS))
+    return cells * range_cells * pulses_for(cells) / (CUT_CELLS * RANGE_CELLS * pulses_for(CUT_CELLS))
 
 
 def _seconds(study: Study, cells: int) -> float:
@@ -281,7 +292,7 @@ def _evidence(study: Study, file: str, subject: Subject, verdict: Verdict) -> Im
     evidence = ImageEvidence(
         file=file,
         verdict=verdict,
-        look_azimuth_rad=study.geometry.look_azimuth,
+        look_azimuth_rad=float(study.geometry.look_azimuth),
         at_limit=_shown(study.at_limit(subject, verdict.boundary_error)),
     )
     if verdict.boundary_autofocus is None or verdict.measured_residual_qpe_rad is None:
@@ -298,7 +309,7 @@ def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
     """Reduce a chip to the pixels that a report shows: the smeared response and its sidelobes."""
     spacing, middle = chip.spacing, chip.image.shape[1] // 2
     reach = _MARGIN_AROUND_SMEAR_CELLS + smear_cells / 2
-    half = min(math.ceil(reach * OVERSAMPLING), middle - 1)
+    half = min(math.ceil(reach * OVERSAMPLING_FACTOR), middle - 1)
     stride = math.ceil(2 * half / _MAX_CHIP_PX)
     half -= half % stride
     lines = reference.cut, line_at(chip.image, row_of_peak(chip.image))
@@ -309,7 +320,7 @@ def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
     line = chip.image.shape[0] // 2
     patch = chip.image[max(0, line - half) : line + half, middle - half : middle + half]  # no farther along x′
     magnitude = np.abs(patch).reshape(len(patch), -1, stride).max(axis=2)
-    grey = np.rint(255 * np.clip(1 - _decibel(magnitude, peak) / FLOOR_DB, 0, 1)).astype(np.uint8)
+    grey = np.rint(255 * np.clip(1 - _decibel(magnitude, peak) / CHIP_FLOOR_DB, 0, 1)).astype(np.uint8)
     upright = grey.T[::-1]
     return PointImage(
         columns=upright.shape[1],

@@ -1,7 +1,6 @@
 """Verdicts on the limits of quadratic and cubic phase, with and without autofocus, and of the location."""
 
 import math
-from typing import Any
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import ROOM, range_walk_cap
@@ -13,16 +12,16 @@ from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import ExactEffect
-from bisar_budget.simulator.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS
+from bisar_budget.simulator.collection import CUT_CELLS, MAX_CELLS, OVERSAMPLING_FACTOR, RANGE_CELLS
 from bisar_budget.simulator.impulse_response import highest, impulse_response, line_at, row_of_peak
 from bisar_budget.simulator.phase_history import Errors, NoGroundPointError, PathError, PathSinusoid
 from bisar_budget.simulator.point import sinusoids_of
 from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading
-from bisar_budget.verifier.study import Responses, Sizes, Study
+from bisar_budget.verifier.study import Responses, Sizes, Study, VerdictFields
 
 TOLERANCE_FRACTION = 0.05  # of the budget, within which a limit is confirmed
 INSIDE_FRACTION, BEYOND_FACTOR = 0.9, 1.1  # of the limit; between these sizes the phase must grow with the error
-FOCUSED_CELLS, FOCUSED_RAD = 2 * CELLS, 12.0  # of a small patch, and the largest phase that is read in it
+FOCUSED_CELLS, FOCUSED_RAD = 2 * CUT_CELLS, 12.0  # of a small patch, and the largest phase that is read in it
 _PEAK_CELLS = 3  # of range around the lines that autofocus reads: the peak is between two lines
 _LOCATION_FRACTION = 1e-6  # of the requirement of the location, to which errors are scaled
 _MAX_SMEAR_CELLS = 64  # with a longer smear, no images are formed on both sides of a limit
@@ -56,7 +55,7 @@ def slow_vibration(study: Study, vibration: Subject) -> Verdict:
     lines = sinusoids_of(mission, name, entry)
     use = float(tone.declared.judged(1.0)[0]) / budget
     if not use or (len(lines) == 1 and lines[0].axis is None):
-        lines, use = [PathSinusoid(size, line.frequency)], 1.0
+        lines, use = [PathSinusoid(size, float(line.frequency))], 1.0
     try:
         worst = [_worst_phase(study, name, sine._replace(amplitude=sine.amplitude / use)) for sine in lines]
         images = [study.images(errors) for errors in worst]
@@ -182,12 +181,12 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
     walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # λN/2 over c/B
     blank = study.blank("mission.autofocus_pull_in", phase, "rad", budget_rad=budget)
     clock = next(s for s in study.sources if s.id == "timing.quadratic")
-    fields = refocused(study, [(clock, phase / abs(clock.effect.qpe))], budget, holds_hidden=False)
+    fields = refocused(study, [(clock, phase / abs(float(clock.effect.qpe)))], budget, holds_hidden=False)
     reason = phrases.note("range-walk", cells=walk, n_pull=range_walk_cap(study.mission))
     return blank._replace(boundary_autofocus=phase, **fields, verdict=fields["verdict_autofocus"], reason=reason)
 
 
-def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool = True) -> dict[str, Any]:
+def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool = True) -> VerdictFields:
     """Refocus the image at the limit with autofocus, and compare the remaining phase with the plain budget.
 
     The phase hidden by the band and by turns is included if `holds_hidden`. It is not when only the pull-in range is
@@ -200,7 +199,7 @@ def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool =
         if room * spread.smear > MAX_CELLS:
             reason = phrases.note("patch-too-large", cells=room * spread.smear, most=MAX_CELLS)
             return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
-        across = math.ceil(2 * study.shared_lines(spread) / (OVERSAMPLING * spread.finer)) + _PEAK_CELLS
+        across = math.ceil(2 * study.shared_lines(spread) / (OVERSAMPLING_FACTOR * spread.finer)) + _PEAK_CELLS
         focused = study.focused(study.images(errors, min(RANGE_CELLS, across), room))
         residual = abs(_read_focused(study, focused).quadratic)
         hidden = focused.effect.hidden if holds_hidden else 0.0  # autofocus does not correct it
@@ -238,7 +237,7 @@ def _read_focused(study: Study, focused: Responses) -> ApertureReading:
     return study.read(large, is_focused=True)
 
 
-def predicted(effect: ExactEffect) -> dict[str, Any]:
+def predicted(effect: ExactEffect) -> VerdictFields:
     """Fields of a verdict that exact ranges fill."""
     return {
         "predicted_qpe_rad": abs(effect.quadratic),
@@ -300,7 +299,7 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
         measured_beyond_rad=beyond,
         displacement_published_m=published_displacement(study, sizes, scale),
         displacement_full_m=images.effect.displacement,
-        smear_azimuth_published_rad=(study.geometry.look_azimuth + math.pi / 2) % math.pi,
+        smear_azimuth_published_rad=(float(study.geometry.look_azimuth + math.pi / 2) % math.pi),
         verdict=verdict,
         reason=remark.then(unusual) if remark else unusual or None,
     )
@@ -328,9 +327,9 @@ def _through_the_limit(
     return verdict, phrases.phase_does_not_grow([(phase, position) for phase, position in sizes if phase is not None])
 
 
-def _of_response(study: Study, images: Responses, reading: ApertureReading) -> dict[str, Any]:
+def _of_response(study: Study, images: Responses, reading: ApertureReading) -> VerdictFields:
     """Measures of the response, without those that a long smear or a bent patch makes undefined."""
-    chip, reference, measures = images.chip, images.reference, dict[str, Any]()
+    chip, reference, measures = images.chip, images.reference, VerdictFields()
     try:
         shift = study.shift(images, reading)
         measures["measured_displacement_m"] = images.effect.moved(shift.displacement)

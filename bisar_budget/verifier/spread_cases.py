@@ -17,8 +17,8 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.spread import declared_powers, islr_db, islr_of, mainlobe_energy, spread_limit, tones
 from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo, tone_limits, vibration_limits
-from bisar_budget.budget.random_rows import HELD, ISLR, held_effect, limits_for, sizes_at
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.budget.random_rows import ISLR, RANDOM_REQUIREMENTS, held_effect, limits_for, sizes_at
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.air_delays import CONTENT, correlation_time_of, seen_course
 from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
@@ -40,7 +40,7 @@ from bisar_budget.image_plane import nodes
 from bisar_budget.mission.model import Simulation
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, ImagePoints, aperture_nodes
-from bisar_budget.simulator.collection import CELLS, PointCollection
+from bisar_budget.simulator.collection import CUT_CELLS, PointCollection
 from bisar_budget.simulator.impulse_response import upsampled
 from bisar_budget.simulator.phase_history import (
     SMOOTH_ORDER,
@@ -83,7 +83,7 @@ _STEPS_PER_CYCLE, _MAX_TONE_STEPS = 8, 1 << 17  # of a fast tone, and in all
 _MARGIN_SIGMA = 3.0  # standard errors of a sigma
 _IMAGE_DRAWS = 6  # time series of which images are formed
 _SERIES_SAMPLES = 513  # of a time series in an image
-_BLOCK_DRAWS = 250  # in memory at once
+_DELAY_BLOCK_DRAWS = 250  # in memory at once
 _CUBIC_ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
 
 _ISLR_SAMPLES = (
@@ -136,7 +136,7 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
             if cycles < SLOWEST_ECHO_CYCLES or not tone:
                 continue  # a phase, verified by `phase_cases`; or no requirement limits it
             vibration, alone = subject(name, "vibration", "sinusoidal", entry=index), {name: tone[name]}
-            unseen = blank(vibration, alone, pslr, per_metre)
+            unseen = blank(vibration, alone, pslr, float(per_metre))
             if pslr is not None:
                 yield vibration, partial(_sinusoidal, study, unseen, alone, frequency)
             else:
@@ -177,7 +177,9 @@ def _near(study: Study, blank: Verdict, name: str, limit: float, lines: Sequence
         return blank._replace(reason=phrases.note("lines-without-amplitude"))
     scale = limit / worst.amplitude
     sinusoids = tuple(
-        PathSinusoid(scale * line.amplitude, line.frequency, 0.0 if np.sinc(worst.cycles - n) >= 0 else math.pi)
+        PathSinusoid(
+            float(scale * line.amplitude), line.frequency, 0.0 if np.sinc(worst.cycles - n) >= 0 else math.pi
+        )
         for line, n in zip(lines, cycles, strict=True)
     )
     return echo(study, blank, {name: sinusoids}, "one platform's lines in their worst phases")
@@ -201,7 +203,7 @@ def echo(
     slowest, cycles = min(cycles_of_all), max(cycles_of_all)
     if slowest < 3:
         return blank._replace(reason=phrases.note("echoes-on-the-peak", cycles=slowest))
-    cells = 2 * math.ceil(min(cycles, 1e6)) + CELLS
+    cells = 2 * math.ceil(min(cycles, 1e6)) + CUT_CELLS
     errors = Errors()
     for name, platform_sinusoids in sinusoids.items():
         errors = errors.of(name, PathError(sinusoids=platform_sinusoids))
@@ -239,8 +241,8 @@ def _wideband(study: Study, blank: Verdict, limits: Mapping[str, float]) -> Verd
                 for flown_path, clean_path in zip(flown, clean, strict=True)
             ]
             if collection.has_direct_path:  # each platform's part alone
-                shifts[0] -= SPEED_OF_LIGHT * direct_path_error((flown[0], clean[1]))
-                shifts[1] -= SPEED_OF_LIGHT * direct_path_error((clean[0], flown[1]))
+                shifts[0] -= SPEED_OF_LIGHT_MPS * direct_path_error((flown[0], clean[1]))
+                shifts[1] -= SPEED_OF_LIGHT_MPS * direct_path_error((clean[0], flown[1]))
             if is_common:  # the second platform makes the first one's motion, at its own limit
                 first, second = limits.values()
                 shifts[1] = shifts[0] * second / first
@@ -284,7 +286,7 @@ def limits_of(study: Study, error: RandomError) -> dict[str, float]:
     model = _model(study, error)
     effect = held_effect(study.mission, error.effect(model), error.coverage(study.mission))
     sizes = map(float, sizes_at(effect, limits_for(study.mission, study.allocation, error.owner, model)))
-    return {name: size for name, size in zip(HELD, sizes, strict=True) if math.isfinite(size)}
+    return {name: size for name, size in zip(RANDOM_REQUIREMENTS, sizes, strict=True) if math.isfinite(size)}
 
 
 def _model(study: Study, error: RandomError) -> str:
@@ -319,7 +321,7 @@ def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
         is_fast = tone.frequency * study.collection.aperture_time >= SLOWEST_ECHO_CYCLES
         if tone.name in sizes and is_fast and tone.per_unit:
             sensitivity = 2 * math.pi / wavelength * sizes[tone.name] / tone.per_unit
-            yield case(tone.subject, sensitivity, "s^2/m", tone.frequency)
+            yield case(tone.subject, sensitivity, "s^2/m", float(tone.frequency))
 
 
 def _spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cycles: float) -> Verdict:
@@ -484,7 +486,7 @@ def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[F
         highest = min(highest, fastest_shake(mission, error))
         count = 1 + fast_steps(min(_MAX_TONE_STEPS, max(count - 1, math.ceil(_STEPS_PER_CYCLE * highest * T))))
     times, coefficients = _moments(study, count), list[Floats]()
-    block_draws = max(1, _BLOCK_DRAWS * _SERIES_SAMPLES // count)
+    block_draws = max(1, _DELAY_BLOCK_DRAWS * _SERIES_SAMPLES // count)
     for start in range(0, draws, block_draws):
         draw_count = min(block_draws, draws - start)
         phases = phase_courses(mission, error, times, draw_count, rng, highest)
@@ -498,10 +500,10 @@ def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator)
     if correlation_time is None:
         return zenith_delays(study.mission, error, aperture_nodes(T), _SIGMA_DRAWS, rng)
     times = _moments(study, _SERIES_SAMPLES)
-    smooth = _smooth_at_nodes(T, times).T * math.sqrt(_power_of_samples(times, correlation_time))
+    smooth = _smooth_at_nodes(T, times).T * math.sqrt(_power_of_samples(times, float(correlation_time)))
     drawn = [
-        zenith_delays(study.mission, error, times, _BLOCK_DRAWS, rng) @ smooth
-        for _ in range(_SIGMA_DRAWS // _BLOCK_DRAWS)
+        zenith_delays(study.mission, error, times, _DELAY_BLOCK_DRAWS, rng) @ smooth
+        for _ in range(_SIGMA_DRAWS // _DELAY_BLOCK_DRAWS)
     ]
     return np.concatenate(drawn)
 
@@ -514,9 +516,9 @@ def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) ->
     blocks = [
         {
             name: at_nodes @ course
-            for name, course in position_courses(study.mission, error, times, _BLOCK_DRAWS, rng).items()
+            for name, course in position_courses(study.mission, error, times, _DELAY_BLOCK_DRAWS, rng).items()
         }
-        for _ in range(_SIGMA_DRAWS // _BLOCK_DRAWS)
+        for _ in range(_SIGMA_DRAWS // _DELAY_BLOCK_DRAWS)
     ]
     scale = math.sqrt(_power_of_samples(times, correlation_time))
     return {name: np.concatenate([block[name] for block in blocks]) * scale for name in blocks[0]}
@@ -565,7 +567,7 @@ def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[
         groups = group_delays(study.mission, error, times, at_zenith)
         if error.subject.axis == CONTENT:
             return [Errors(electrons=electrons_at_1_hz(study.mission, times, course)) for course in groups]
-        return [Errors(clock_course=Course(times, course / SPEED_OF_LIGHT)) for course in groups]
+        return [Errors(clock_course=Course(times, course / SPEED_OF_LIGHT_MPS)) for course in groups]
     phases = phase_courses(study.mission, error, times, _IMAGE_DRAWS, rng)
     delays = [clock_seconds(course, study.collection.wavelength) for course in phases]
     return [Errors(clock_course=Course(times, course).smooth(_CUBIC_ORDER)) for course in delays]

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, Subject
 from bisar_budget.effects.sources import exact_ranges
@@ -16,14 +16,21 @@ from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import (
     FINE_NODE_COUNT,
+    NO_SHIFTS,
     QUADRATIC_OF_VARIANCE,
-    STILL,
     ExactEffect,
     ImagePoints,
     followed,
 )
 from bisar_budget.simulator.autofocus import ALGORITHMS
-from bisar_budget.simulator.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection
+from bisar_budget.simulator.collection import (
+    CUT_CELLS,
+    MAX_CELLS,
+    OVERSAMPLING_FACTOR,
+    RANGE_CELLS,
+    Chip,
+    PointCollection,
+)
 from bisar_budget.simulator.impulse_response import highest
 from bisar_budget.simulator.phase_history import Errors, Floats, PathError, cell_centres, look_sum, superposed
 from bisar_budget.verifier.aperture_reading import (
@@ -66,6 +73,10 @@ class Responses(NamedTuple):
     spread: Spread
     chip: Chip
     reference: Chip
+
+
+VerdictFields = dict[str, Any]
+"""Fields of a verdict by name."""
 
 
 class Study:
@@ -130,15 +141,19 @@ class Study:
     def errors(self, source: ErrorSource, size: float) -> Errors:
         """Return the errors of an image with one error of a size."""
         if source.clock is not None:
-            return Errors(clock=tuple(size * term for term in source.clock))
-        kind, errors = source.subject.kind, Errors()
-        if kind == "terrain":  # a higher scene: both platforms measured too high
-            kind = "position"
+            return Errors(clock=tuple(size * float(term) for term in source.clock))
+        errors = Errors()
         for platform_index in source.platforms:
-            components: Any = size
-            if not source.is_time_tag:
-                components = tuple(size * component for component in source.direction_of(platform_index))
-            errors = errors.of(PLATFORMS[platform_index], PathError(**{kind: components}))
+            if source.is_time_tag:
+                error = PathError(time_tag=size)
+            elif source.subject.kind == "terrain":
+                error = PathError(height=size)
+            else:
+                position, velocity, acceleration = (
+                    (size * x, size * y, size * z) for x, y, z in source.state_of(platform_index)
+                )
+                error = PathError(position, velocity, acceleration)
+            errors = errors.of(PLATFORMS[platform_index], error)
         return errors
 
     def together(self, sizes: Sizes, scale: float = 1.0) -> Errors:
@@ -157,7 +172,7 @@ class Study:
         """
         exact = exact_ranges(self.mission, self.geometry, FINE_NODE_COUNT)
         courses_by_draw = {name: np.ascontiguousarray(course.T) for name, course in courses.items()}
-        shifts = [courses_by_draw.get(name, STILL) for name in PLATFORMS]
+        shifts = [courses_by_draw.get(name, NO_SHIFTS) for name in PLATFORMS]
         draws = len(next(iter(courses.values())))
         clock = courses_by_draw.get("clock", np.zeros((FINE_NODE_COUNT, draws)))
         return followed(exact, clock, shifts, np.zeros(draws, dtype=int))
@@ -231,7 +246,7 @@ class Study:
         """
         effect = self.collection.effect(errors)
         spread = self.spread(errors, effect)
-        cells = min(MAX_CELLS, max(CELLS + spread.smear, math.ceil(room * spread.smear)))
+        cells = min(MAX_CELLS, max(CUT_CELLS + spread.smear, math.ceil(room * spread.smear)))
         high = cells if spread.is_round else range_cells + spread.walk
         chips = self.collection.pair(errors, effect.displacement, cells, high)
         return Responses(errors, effect, spread, *chips)
@@ -246,7 +261,7 @@ class Study:
             images.effect.displacement,
             images.chip,
             images.reference,
-            round(cells * OVERSAMPLING * spread.finer / 2),
+            round(cells * OVERSAMPLING_FACTOR * spread.finer / 2),
             None if is_focused else images.effect,
         )
 
@@ -286,7 +301,7 @@ class Study:
         )
         frequency = collection.radar.center_frequency + cell_centres(collection.radar.bandwidth, _DIRECT_SUM_SAMPLES)
         weights = collection.window(_DIRECT_SUM_SAMPLES)
-        phases = np.exp(2j * math.pi / SPEED_OF_LIGHT * np.outer(remaining_range, frequency))
+        phases = np.exp(2j * math.pi / SPEED_OF_LIGHT_MPS * np.outer(remaining_range, frequency))
         return -2 * math.log(abs(weights @ phases @ weights) / weights.sum() ** 2)
 
     def focused(self, images: Responses) -> Responses:
@@ -306,9 +321,9 @@ class Study:
         (a, c, east, _), (b, d, north, _) = (gradient[:, 0] for gradient in exact.gradient)
         # A metre of range along equal Doppler leads by (d, −c) over the determinant.
         area, bends = abs(a * d - b * c), abs(float(exact.k[0]) * (d * east - c * north))
-        per_line = bends * self.collection.range_cell / (OVERSAMPLING * spread.finer)
+        per_line = bends * self.collection.range_cell / (OVERSAMPLING_FACTOR * spread.finer)
         shared = int(min(_MAX_DIFFERENCE_RAD * area / per_line if per_line else 1e6, 1e6))
-        return max(shared, round(spread.walk * OVERSAMPLING * spread.finer / 2))
+        return max(shared, round(spread.walk * OVERSAMPLING_FACTOR * spread.finer / 2))
 
     def spread(self, errors: Errors, effect: ExactEffect) -> Spread:
         """Spread of a response by an error, from the range error that remains over the aperture.

@@ -26,7 +26,7 @@ from bisar_budget.catalogue import SYMBOLS
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission import readers
 from bisar_budget.mission.model import MISSION
-from bisar_budget.mission.parts import SECTIONS
+from bisar_budget.mission.parts import PART_SECTIONS
 from bisar_budget.phrases import CODES
 from bisar_budget.report import FORMATS
 from bisar_budget.units import DIMENSIONS
@@ -181,7 +181,7 @@ def mission_keys(_: Generated) -> str:
 def part_keys(_: Generated) -> str:
     """Every key of the file of a part, a kind after the other."""
     found: dict[str, readers.Section] = {}
-    for kind, section in SECTIONS.items():
+    for kind, section in PART_SECTIONS.items():
         found[f"kind: {kind}"] = section
         # A section within it has its own file's place: `random[]`.
         found |= {path: inner for path, inner in _all_sections(section).items() if path}

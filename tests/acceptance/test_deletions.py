@@ -14,14 +14,14 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import bisar_budget as bb
 from bisar_budget.budget.check import check_mission
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.load import parse_mission
-from tests.conftest import TODAY
+from tests.conftest import TODAY, examples
 from tests.mission.test_path_files import ephemeris
 from tests.paths.orbit_files import oem
 from tests.paths.test_accuracy import START, triangle, with_covariance
@@ -205,7 +205,7 @@ def breaks(document: Document) -> bool:
     return STATUS[status].fails
 
 
-@settings(max_examples=40)  # some five checks each
+@examples(40)  # some five checks each
 @given(missions())
 def test_no_deletion_makes_a_mission_pass(document: Document) -> None:
     try:
@@ -234,11 +234,11 @@ def orbit_breaks(covariance_m: float | None, limit_m: float, position: str | Non
         platforms__transmitter={"orbit": {"oem": "a.oem"}, "motion_error": error},
         requirements=requirements,
     )
-    found = check_mission(parse_mission(mission, beside={"a.oem": text.encode()}.__getitem__), TODAY)
+    found = check_mission(parse_mission(mission, read_path={"a.oem": text.encode()}.__getitem__), TODAY)
     return STATUS[found.status].fails
 
 
-@settings(max_examples=20)
+@examples(20)
 @given(st.floats(0, 4), st.floats(0, 3), st.none() | sizes("m", 0.1, 1e4))
 def test_no_deletion_about_an_orbit_makes_a_mission_pass(
     covariance_decade: float, limit_decade: float, position: str | None

@@ -4,13 +4,13 @@ import math
 from datetime import date
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.load import parse_mission
-from tests.conftest import TODAY, findings, mission_text, row
+from tests.conftest import TODAY, examples, findings, mission_text, row
 
 C = 299_792_458.0
 LAMBDA = C / 10e9
@@ -168,7 +168,7 @@ class TestAllocation:
         assert found.allocation.pslr.transmitter == found.allocation.islr.transmitter == 0.5
 
     @given(st.floats(0.05, 0.9), st.floats(0.0, 1.0))
-    @settings(max_examples=25)
+    @examples(25)
     def test_limits_are_total_times_share(self, transmitter: float, rest: float) -> None:
         receiver = (1 - transmitter) * max(0.05, rest)
         shares = {"transmitter": transmitter, "receiver": receiver, "reserve": 1 - transmitter - receiver}
@@ -587,7 +587,7 @@ signed = st.floats(-1e3, 1e3)
     frame=st.sampled_from(["scene", "track", "look"]),
     n_pull=st.floats(0.01, 50),
 )
-@settings(max_examples=80, deadline=None)  # absurd errors take exact ranges all their iterations
+@examples(80)  # absurd errors take exact ranges all their iterations
 def test_every_number_is_finite_and_every_row_consistent(velocity, error, rule, frame, n_pull) -> None:
     from bisar_budget.faults import MissionError
 

@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.mission.load import parse_mission
-from tests.conftest import findings, mission_text, row
+from tests.conftest import examples, findings, mission_text, row
 
 FREQUENCIES = (0.5, 1.0, 10.0, 100.0, 1000.0)
 HOLDOVER = {"method": "holdover", "age": "600 s", "averaging": "10 s", "time_error": "1 ns", "frequency_error": 1e-12}
@@ -42,7 +42,7 @@ def effects(levels: dict[float, float], sync: dict[str, Any] | None) -> np.ndarr
 _FALLS = st.lists(st.floats(0.0, 35.0), min_size=4, max_size=4)
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(
     falls=_FALLS,
     raised=st.integers(0, 4),

@@ -18,7 +18,7 @@ from bisar_budget.phrases.templates import fields, fill
 from bisar_budget.report import Style, render
 from bisar_budget.report.formats import verification
 from bisar_budget.verifier.limits import verify_mission
-from tests.conftest import ROOT, findings, found_in
+from tests.conftest import ROOT, by_turns, findings, found_in, name_of
 
 MISSIONS = [
     *sorted((ROOT / "specs" / "missions").glob("*.yaml")),
@@ -26,8 +26,7 @@ MISSIONS = [
 ]
 
 
-@pytest.mark.parametrize("model", ["published", "full", "strictest"])
-@pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(("path", "model"), by_turns(MISSIONS, ("published", "full", "strictest")), ids=name_of)
 def test_every_sentence_of_a_finding_has_its_code(path, model: str) -> None:
     found = found_in(path, model)
     for row in found.rows:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 import bisar_budget as bb
@@ -17,7 +17,7 @@ from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.paths.flight import smoothed
-from tests.conftest import TODAY, row
+from tests.conftest import TODAY, examples, row
 from tests.design.test_sweep import assert_as_checked, grid, swept
 from tests.mission.test_path_files import aircraft
 from tests.paths.flown import Flight, flight, geodetic_csv
@@ -170,7 +170,7 @@ class TestTheGrid:
             mission = logged(tmp_path, written(1), frame=frame, position=size)
             assert bool(is_coarse(mission, "receiver")) == is_doubted
 
-    @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+    @examples(12, suppress_health_check=[HealthCheck.function_scoped_fixture])
     @given(decimals=st.integers(1, 3), sigma=st.floats(1e-3, 30.0))
     def test_whatever_is_declared_a_tenth_decides(self, tmp_path: Path, decimals: int, sigma: float) -> None:
         """For steps above a millimetre."""

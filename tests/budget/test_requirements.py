@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from bisar_budget.findings.mission import MissionFindings
@@ -15,7 +15,7 @@ from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.words.requirements import requirement_lines, unjudged_effects
 from tests import reference
-from tests.conftest import findings, mission_text, row
+from tests.conftest import examples, findings, mission_text, row
 
 T, F = 6.0, 10e9
 K = 2 * math.pi * F / 299_792_458.0  # of BASE: rad of phase for each metre of range
@@ -533,7 +533,7 @@ def missions(draw: Any) -> dict[str, Any]:
     return {"changes": changes, "tone": tone, "noise": noise, "drift": drift}
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(missions())
 def test_a_pass_means_that_every_effect_is_judged_or_negligible(case: dict[str, Any]) -> None:
     changes = case["changes"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.budget.staying_air import AIR_CHANGES_IN_S, LONG_APERTURE_S
@@ -17,8 +17,8 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.explain.explanation import explain
+from tests.conftest import examples, mission_text, row
 from tests.conftest import findings as found_of
-from tests.conftest import mission_text, row
 from tests.design.test_sweep import assert_as_checked, grid, swept
 
 NEEDS = {
@@ -294,7 +294,7 @@ def test_an_explanation_has_the_numbers() -> None:
     assert "if their correlation time were 600 s" in text
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(
     size=st.floats(1e-5, 1e-2),
     aperture_time=st.floats(60.0, 1200.0),

@@ -5,14 +5,14 @@ import math
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.constants import STANDARD_GRAVITY
+from bisar_budget.constants import STANDARD_GRAVITY_MPS2
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import parse_mission
 from tests.conftest import TODAY
 
-G = STANDARD_GRAVITY
+G = STANDARD_GRAVITY_MPS2
 QUALIFICATION = "spectrum: {20 Hz: 0.04 g^2/Hz, 1 kHz: 0.04 g^2/Hz}"
 
 

@@ -36,7 +36,7 @@ from bisar_budget.findings.mission import Report
 from bisar_budget.mission import load
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import mission_schema
-from bisar_budget.mission.tree import MAX_FAULTS
+from bisar_budget.mission.tree import MAX_FAULT_COUNT
 from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.report import FORMATS, Style, render
 from bisar_budget.report.drawing import point_plot
@@ -682,14 +682,14 @@ class TestBounds:
         """Messages of 15 s of work were made of it: they are few now, and short."""
         with pytest.raises(MissionError) as caught:
             parse_mission(mission_text() + more)
-        assert len(caught.value.faults) <= MAX_FAULTS + 1
+        assert len(caught.value.faults) <= MAX_FAULT_COUNT + 1
         assert sum(map(len, caught.value.lines())) < 200_000
 
     def test_the_first_faults_are_said_and_that_there_are_more(self) -> None:
         with pytest.raises(MissionError) as caught:
             parse_mission(mission_text() + "".join(f"k{i:03d}: 1\n" for i in range(300)))
         more, first, *_ = caught.value.lines()
-        assert more == f"-: has {MAX_FAULTS} faults or more; what follows them was not read"
+        assert more == f"-: has {MAX_FAULT_COUNT} faults or more; what follows them was not read"
         assert "k000: is not a known key" in first
 
     @pytest.mark.parametrize("until", ["2009-01-01", "2099-01-01"])
@@ -746,12 +746,12 @@ class TestBounds:
     )
     def test_how_long_a_question_takes_is_said(self, monkeypatch, question) -> None:
         """Each value is a whole check: of a mission that takes 0.6 s, minutes went by in silence."""
-        monkeypatch.setattr("bisar_budget.front.progress.LONG", 1e-9)
+        monkeypatch.setattr("bisar_budget.front.progress.MIN_ANNOUNCED_S", 1e-9)
         done = run(*question, SECTION_V)
         assert done.returncode == 0
         said = rb"Checking Rigling & Moses, Section V for \d+ values or more will take about .*; .*--model published"
         assert re.match(said, done.stderr)
-        monkeypatch.setattr("bisar_budget.front.progress.LONG", 3600)
+        monkeypatch.setattr("bisar_budget.front.progress.MIN_ANNOUNCED_S", 3600)
         assert run(*question, SECTION_V).stderr == b""
 
     def test_a_table_of_cases_without_end(self) -> None:
@@ -765,7 +765,7 @@ class TestBounds:
     def test_a_table_of_cases_that_is_too_large(self, tmp_path, monkeypatch) -> None:
         from bisar_budget.design import cases
 
-        monkeypatch.setattr(cases, "LARGEST_TABLE", 1 << 20)
+        monkeypatch.setattr(cases, "MAX_TABLE_CHARACTERS", 1 << 20)
         (tmp_path / "cases.csv").write_bytes(b"0" * ((1 << 20) + 1))
         done = run("sweep", SECTION_V, "--cases", tmp_path / "cases.csv")
         assert done.returncode == 2
@@ -1020,7 +1020,7 @@ class TestFilesThatChange:
         assert resources.DISK.content(str(path), 100) == b"two"
 
     def test_one_too_large_to_be_kept_is_refused(self, tmp_path, monkeypatch) -> None:
-        monkeypatch.setattr(resources, "_MOST_HELD", 2)
+        monkeypatch.setattr(resources, "_MAX_HELD_BYTES", 2)
         path = tmp_path / "log.csv"
         path.write_bytes(b"one")
         resources.hold_files()

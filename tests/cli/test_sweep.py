@@ -287,7 +287,7 @@ def test_a_terminal_has_a_bar(tmp_path: Path) -> None:
 def watched_soon(*arguments: str) -> list[str]:
     """A command that has a bar after a tenth of a second; what follows is as long as that takes."""
     imports = "from bisar_budget.cli import main; from bisar_budget.front import progress"
-    code = f"{imports}; progress._MOMENT = 0.1; main()"
+    code = f"{imports}; progress._MIN_SHOWN_S = 0.1; main()"
     return [sys.executable, "-c", code, *arguments]
 
 

@@ -136,7 +136,7 @@ def test_how_long_many_draws_take(run, monkeypatch: pytest.MonkeyPatch) -> None:
     """By the time of some of them, shared by as many threads as there are."""
     monkeypatch.setattr(checks, "_MANY_DRAWS", 10_000)
     monkeypatch.setattr(progress, "_LEAST_TRIAL_S", 0.001)
-    monkeypatch.setattr(progress, "LONG", 0.0)
+    monkeypatch.setattr(progress, "MIN_ANNOUNCED_S", 0.0)
     found = run("check", "-q", DRONES, "--monte-carlo", "20e3")
     assert found.stderr.startswith("20,000 draws of Two drones with the same GNSS will take about ")
     assert found.stderr.endswith(" s.\n")

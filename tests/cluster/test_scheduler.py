@@ -51,7 +51,7 @@ IMPATIENT = f"""
 from bisar_budget.cli import main
 from bisar_budget.cluster import scheduler
 from bisar_budget.design import sweep
-sweep._FEW, scheduler._LOOK_PERIOD_S, scheduler._FETCH_TIMEOUT_S = {CASES}, 0.5, 2.0
+sweep._READ_PART_CASES, scheduler._LOOK_PERIOD_S, scheduler._FETCH_TIMEOUT_S = {CASES}, 0.5, 2.0
 main()
 """
 
@@ -60,7 +60,7 @@ main()
 def small_parts() -> Iterator[None]:
     """Parts of commands in this process too."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(sweep, "_FEW", CASES)
+        patched.setattr(sweep, "_READ_PART_CASES", CASES)
         yield
 
 

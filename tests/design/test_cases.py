@@ -9,7 +9,16 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from bisar_budget import units
-from bisar_budget.design.cases import MAX_VALUES, Cases, TableError, grid, in_unit, sample, some_of, table
+from bisar_budget.design.cases import (
+    MAX_TABLE_VALUE_COUNT,
+    Cases,
+    TableError,
+    grid,
+    in_unit,
+    sample,
+    sampled_cases,
+    table,
+)
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.units import parse_quantity
@@ -65,12 +74,12 @@ def test_the_last_key_is_the_fastest() -> None:
 
 def test_more_cases_than_an_array_could_count() -> None:
     time, bandwidth, slant_range = (
-        f"{key}=1:2:{MAX_VALUES}" for key in (TIME, "radar.bandwidth", "platforms.receiver.slant_range")
+        f"{key}=1:2:{MAX_TABLE_VALUE_COUNT}" for key in (TIME, "radar.bandwidth", "platforms.receiver.slant_range")
     )
     with pytest.raises(QuestionError, match="must be"):
         grid(TREE, [bandwidth])  # 1 Hz
     many = grid(TREE, [time, slant_range])
-    assert many.count == MAX_VALUES**2
+    assert many.count == MAX_TABLE_VALUE_COUNT**2
 
 
 def test_words() -> None:
@@ -195,7 +204,7 @@ def test_values_are_said_as_they_were_written(unit: str, value: float, digits: i
 def test_some_cases_are_cases_of_all_parts(first: int, second: int, data: st.DataObject) -> None:
     cases = grid(TREE, [f"{TIME}={','.join(map(str, range(1, first + 1)))}s", f"{AZIMUTH}=0:90deg:{second + 1}"])
     count = data.draw(st.integers(1, cases.count))
-    found = some_of(cases, count)
+    found = sampled_cases(cases, count)
     assert count <= found.count <= count + count // 100
     assert set(found.columns[0]) <= set(cases.columns[0])
     assert set(found.columns[1]) <= set(cases.columns[1])

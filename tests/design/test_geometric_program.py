@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.design.geometric_program import Rows, largest_sizes
+from tests.conftest import examples
 
 
 def drawn(seed: int) -> tuple[np.ndarray, Rows]:
@@ -29,7 +30,7 @@ def test_no_size_can_grow_unless_another_shrinks(seed: int) -> None:
     assert (1 - parts.sum(axis=1)) * found.multipliers == pytest.approx(0, abs=1e-6)
 
 
-@settings(deadline=None, max_examples=30)
+@examples(30)
 @given(seed=st.integers(0, 10_000))
 def test_no_other_sizes_are_better(seed: int) -> None:
     """Independent of the conditions: sizes drawn around, brought within the room, have no larger Σ w·log."""

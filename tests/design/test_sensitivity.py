@@ -14,7 +14,7 @@ import pytest
 
 from bisar_budget import evaluators
 from bisar_budget.budget.check import check_mission
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.design import sensitivity as asking
 from bisar_budget.design.sensitivity import Sensitivity, Slope
 from bisar_budget.faults import SetValue
@@ -56,7 +56,7 @@ def utilization(values: dict[str, complex], declared: float, kind: int, axis: in
     x, y, z = (values[f"platforms.transmitter.position.{index}"] for index in range(3))
     v = [values[f"platforms.transmitter.velocity.{index}"] for index in range(3)]
     slant_range = cmath.sqrt(x * x + y * y + z * z)
-    wavelength = SPEED_OF_LIGHT / values["radar.center_frequency"]
+    wavelength = SPEED_OF_LIGHT_MPS / values["radar.center_frequency"]
     rows = evaluators.published_motion(x, y, z, *v, slant_range, wavelength, values["collection.aperture_time"])
     phase = declared * rows[3 * kind + axis][2]
     limit = values["requirements.quadratic_phase_error"] / 2
@@ -311,7 +311,7 @@ class TestProgress:
         errors = StringIO()
         monkeypatch.setattr(errors, "isatty", lambda: is_watched)
         monkeypatch.setattr("sys.stderr", errors)
-        monkeypatch.setattr("bisar_budget.front.progress._MOMENT", moment)
+        monkeypatch.setattr("bisar_budget.front.progress._MIN_SHOWN_S", moment)
         with watched_checks("Section V") as progress:
             for done in range(1, 4):
                 progress(done, 3)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.ranges import exact_ranges
-from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, STILL, ExactRanges, Lanes, aperture_nodes, followed
+from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, NO_SHIFTS, ExactRanges, Lanes, aperture_nodes, followed
 from bisar_budget.simulator.phase_history import cell_centres, exact_effect
 from bisar_budget.verifier.study import Study
 from tests.conftest import mission_text
@@ -27,7 +27,7 @@ def by_courses(study: Study, source, sizes):
     shifts = [
         (one.measured - one.actual).T[..., None] * scale for one in study.collection.flight(errors, nodes).paths
     ]
-    clock = SPEED_OF_LIGHT * np.polynomial.polynomial.polyval(nodes, errors.clock)[:, None] * scale
+    clock = SPEED_OF_LIGHT_MPS * np.polynomial.polynomial.polyval(nodes, errors.clock)[:, None] * scale
     return followed(of_study(study), clock, shifts, np.zeros(len(sizes), dtype=int))
 
 
@@ -133,13 +133,13 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch, together: int) -
     """Seven lanes, of which the last block is shorter; one platform is still, and one lane has no point."""
     study = Study(parse_mission(mission_text()))
     exact, generator, case = of_study(study), np.random.default_rng(1), np.zeros(7, dtype=int)
-    shifts = [STILL, generator.normal(scale=5.0, size=(3, FINE_NODE_COUNT, 7))]
+    shifts = [NO_SHIFTS, generator.normal(scale=5.0, size=(3, FINE_NODE_COUNT, 7))]
     clock = generator.normal(size=(FINE_NODE_COUNT, 7))
     clock[:, 3] = -3e5
     at_once = exact.settled(clock, shifts, (0.0, 0.0), case)
     with monkeypatch.context() as changed:
-        settings = replace(exact_ranges.SETTINGS, samples_at_once=together)
-        changed.setattr(exact_ranges, "SETTINGS", settings)
+        settings = replace(exact_ranges.POINT_SETTINGS, samples_at_once=together)
+        changed.setattr(exact_ranges, "POINT_SETTINGS", settings)
         in_blocks = exact.settled(clock, shifts, (0.0, 0.0), case)
     assert in_blocks.is_settled.tolist() == [True] * 3 + [False] + [True] * 3
     for one, other in zip(in_blocks, at_once, strict=True):
@@ -153,7 +153,7 @@ def test_a_far_point_is_followed() -> None:
     nearest = float(exact.nearest[0])
     directions = np.random.default_rng(2).normal(size=(3, 1, 400))
     sizes = nearest * np.linspace(0.0, 0.9, 400)
-    shifts = [directions / np.linalg.norm(directions, axis=0) * sizes * np.ones((1, FINE_NODE_COUNT, 1)), STILL]
+    shifts = [directions / np.linalg.norm(directions, axis=0) * sizes * np.ones((1, FINE_NODE_COUNT, 1)), NO_SHIFTS]
     case, clock = np.zeros(400, dtype=int), np.zeros((FINE_NODE_COUNT, 400))
     at_once = exact.settled(clock, shifts, (0.0, 0.0), case)
     found = followed(exact, clock, shifts, case)
@@ -168,7 +168,7 @@ def test_a_far_point_is_followed() -> None:
         point = np.stack((east, north, 0 * east))[:, None]
         left = sum(
             np.linalg.norm(track, axis=0)
-            - np.linalg.norm(track + (np.stack(shift)[..., some] if shift is not STILL else 0) - point, axis=0)
+            - np.linalg.norm(track + (np.stack(shift)[..., some] if shift is not NO_SHIFTS else 0) - point, axis=0)
             for track, shift in zip(tracks, shifts, strict=True)
         )
         mean = exact.fit[0]
@@ -203,6 +203,7 @@ def test_a_point_that_meets_a_platform_has_no_image(part: float, is_found: bool)
         platforms = {"transmitter": still, "receiver": {**moving, "motion_error": {"velocity": 0.01}}}
         analysis = Analysis(parse_mission(mission_text(platforms=platforms)))
         ones = np.ones((len(analysis.exact.times), 1))
-        lanes = Lanes(np.zeros(1, dtype=int), ones, moves=(1.0, 0.0), direction=position, order=0)
+        directions = np.array((position, (0.0, 0.0, 0.0)))[..., None, None]
+        lanes = Lanes(np.zeros(1, dtype=int), ones, np.array(((1.0,), (0.0,))), directions, np.zeros(1, dtype=int))
         found = analysis.exact.phases(lanes, np.array([-part]), (0.0, 0.0))
         assert found.is_settled[0] == is_found

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.analysis.analysis import Analysis
@@ -18,7 +18,7 @@ from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.ranges import point_paths
 from bisar_budget.ranges.point_paths import PointPaths
 from tests import reference
-from tests.conftest import ROOT, findings, mission_text, row
+from tests.conftest import ROOT, examples, findings, mission_text, row
 from tests.families import FAMILIES
 from tests.families import mission_text as family_text
 
@@ -109,7 +109,7 @@ def test_the_two_signs_of_section_v_are_those_of_the_physics() -> None:
     assert abs(declared) == pytest.approx(0.78, abs=0.01)
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(
     st.tuples(*[st.floats(-8e3, 8e3)] * 2, st.floats(500, 4e3)), st.tuples(*[st.floats(-120, 120)] * 3),
     st.sampled_from(["position", "velocity", "acceleration"]), st.sampled_from("xyz"), st.floats(0.1, 3),
@@ -340,7 +340,7 @@ def test_of_few_lanes_and_of_many_the_same_is_found(family: str, monkeypatch: py
         return np.array((allowed.smallest, allowed.quadratic))
 
     of_few = found()
-    monkeypatch.setattr(point_paths, "SETTINGS", replace(point_paths.SETTINGS, few_lanes_count=0))
+    monkeypatch.setattr(point_paths, "PATH_SETTINGS", replace(point_paths.PATH_SETTINGS, few_lanes_count=0))
     assert np.isfinite(of_few).sum() > 30
     assert found() == pytest.approx(of_few, rel=1e-4, nan_ok=True)
 

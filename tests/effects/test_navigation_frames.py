@@ -17,7 +17,7 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import (
     FINE_NODE_COUNT,
-    STILL,
+    NO_SHIFTS,
     ExactRanges,
     ImagePoints,
     aperture_nodes,
@@ -82,7 +82,7 @@ def through(mission: Mission, receiver: np.ndarray | None, transmitter: np.ndarr
     """Effects of histories of position errors, (draws, nodes, 3) each."""
     exact = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE_NODE_COUNT)
     draws = len(receiver if receiver is not None else transmitter)
-    shifts = [STILL if one is None else np.ascontiguousarray(one.T) for one in (transmitter, receiver)]
+    shifts = [NO_SHIFTS if one is None else np.ascontiguousarray(one.T) for one in (transmitter, receiver)]
     return followed(exact, np.zeros((FINE_NODE_COUNT, draws)), shifts, np.zeros(draws, dtype=int))
 
 
@@ -545,7 +545,7 @@ class TestCourses:
         fine = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE_NODE_COUNT)
         x = TIMES[:, None]
         every = np.stack([1 + 0 * x, x, x**2 - x**3 / 5], axis=1)[..., 0] * 1e-4 * (1 + 0.05 * x)
-        found = followed(fine, every, (STILL, STILL), np.zeros(3, dtype=int))
+        found = followed(fine, every, (NO_SHIFTS, NO_SHIFTS), np.zeros(3, dtype=int))
         for one, drawn in zip((*full[:2], *full[3:5]), found[3:5] + found[1:3], strict=True):
             assert 1e-4 * one == pytest.approx(math.sqrt(np.square(drawn).sum()), rel=2e-3)
 

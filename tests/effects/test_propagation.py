@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import EARTH_RADIUS, SPEED_OF_LIGHT
+from bisar_budget.constants import EARTH_RADIUS_M, SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.air_delays import TROPOSPHERE_HEIGHT_M, group_delay, metres_per_unit, obliquity
 from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.effects.random_errors import random_errors
@@ -20,7 +20,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import with_number
 from bisar_budget.ranges.exact_ranges import (
     FINE_NODE_COUNT,
-    STILL,
+    NO_SHIFTS,
     ExactRanges,
     ImagePoints,
     aperture_nodes,
@@ -63,7 +63,7 @@ def through_exact_ranges(mission: Mission, range_error: Callable[[np.ndarray], n
     T = mission.collection.aperture_time
     heard = mission.has_direct_path
     exact = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE_NODE_COUNT, has_direct_path=heard)
-    return followed(exact, range_error(aperture_nodes(T))[:, None], (STILL, STILL), np.zeros(1, dtype=int))
+    return followed(exact, range_error(aperture_nodes(T))[:, None], (NO_SHIFTS, NO_SHIFTS), np.zeros(1, dtype=int))
 
 
 def is_what_was_found(error: RandomError, size: float, found: ImagePoints) -> None:
@@ -123,7 +123,7 @@ def test_the_air_of_a_sphere_is_a_shell_at_its_scale_height(degrees: float) -> N
     """Against the integral over heights of an atmosphere that falls by e in 7 km: below 1 % down to 10 degrees."""
     place = (math.cos(math.radians(degrees)) * 800e3, 0.0, math.sin(math.radians(degrees)) * 800e3)
     heights = np.linspace(0, 140e3, 200_001)
-    level = math.cos(math.radians(degrees)) * EARTH_RADIUS / (EARTH_RADIUS + heights)
+    level = math.cos(math.radians(degrees)) * EARTH_RADIUS_M / (EARTH_RADIUS_M + heights)
     density = np.exp(-heights / 7e3)
     want = np.sum(density / np.sqrt(1 - level**2)) / np.sum(density)
     assert obliquity(place, TROPOSPHERE_HEIGHT_M) == pytest.approx(want, rel=0.01 if degrees < 20 else 0.002)
@@ -175,9 +175,9 @@ class DirectSum:
         path = getattr(mission.geometry, name)
         x, y, z = path.place(self.times)
         # A shell at 350 km, whose point of passage is where the ray meets the sphere: length over height difference.
-        level = np.hypot(x, y) / np.sqrt(x**2 + y**2 + z**2) * EARTH_RADIUS / (EARTH_RADIUS + 350e3)
+        level = np.hypot(x, y) / np.sqrt(x**2 + y**2 + z**2) * EARTH_RADIUS_M / (EARTH_RADIUS_M + 350e3)
         electrons = content / np.sqrt(1 - level**2)
-        self.air = 2 * math.pi * 40.308 * np.multiply.outer(electrons, 1 / self.frequency) / SPEED_OF_LIGHT
+        self.air = 2 * math.pi * 40.308 * np.multiply.outer(electrons, 1 / self.frequency) / SPEED_OF_LIGHT_MPS
         self.half = mission.collection.aperture_time / 2
 
     def pulses(self, east: float, north: float) -> np.ndarray:
@@ -186,7 +186,7 @@ class DirectSum:
             np.linalg.norm(track - np.array([[east], [north], [0.0]]), axis=0) - np.linalg.norm(track, axis=0)
             for track in self.tracks
         )
-        phase = 2 * math.pi * np.multiply.outer(away, self.frequency) / SPEED_OF_LIGHT + self.air
+        phase = 2 * math.pi * np.multiply.outer(away, self.frequency) / SPEED_OF_LIGHT_MPS + self.air
         return np.exp(1j * phase).sum(axis=1)
 
     def peak(self, start: tuple[float, float], step: tuple[float, float]) -> tuple[float, float]:

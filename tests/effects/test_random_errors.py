@@ -18,7 +18,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import with_number
 from bisar_budget.ranges.exact_ranges import (
     FINE_NODE_COUNT,
-    STILL,
+    NO_SHIFTS,
     ExactRanges,
     ImagePoints,
     aperture_nodes,
@@ -71,14 +71,16 @@ def through_exact_ranges(mission: Mission, position_error: np.ndarray, times: np
     assert np.allclose(times, aperture_nodes(T))
     exact = ExactRanges.of(paths, mission.radar, T, FINE_NODE_COUNT)
     draws = len(position_error)
-    return followed(exact, np.zeros((FINE_NODE_COUNT, draws)), (STILL, position_error.T), np.zeros(draws, dtype=int))
+    return followed(
+        exact, np.zeros((FINE_NODE_COUNT, draws)), (NO_SHIFTS, position_error.T), np.zeros(draws, dtype=int)
+    )
 
 
 def through_the_clock(mission: Mission, phase: np.ndarray) -> ImagePoints:
     """Effects of phases of a clock, (draws, nodes), sampled at the nodes. [rad]"""
     exact = ExactRanges.of(mission.geometry.both, mission.radar, mission.collection.aperture_time, FINE_NODE_COUNT)
     moved = phase.T * mission.radar.wavelength / (2 * math.pi)
-    return followed(exact, moved, (STILL, STILL), np.zeros(len(phase), dtype=int))
+    return followed(exact, moved, (NO_SHIFTS, NO_SHIFTS), np.zeros(len(phase), dtype=int))
 
 
 def test_noise_of_a_link_displaces_by_its_slope_alone() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.analysis.analysis import Analysis, Case
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece, heard_parts, set_parts, tone
 from bisar_budget.faults import MissionError
@@ -36,7 +36,7 @@ YORK = tuple(
     PowerLawPiece(0.0, 1e3, (F_0 / 10e6) ** 2 * 10 ** (level / 10), slope)
     for level, slope in zip((-95, -90, -200, -130, -155), (4.0, 3.0, 2.0, 1.0, 0.0), strict=True)
 )
-PER_PHASE = SPEED_OF_LIGHT / (2 * math.pi * F_0)  # m per radian
+PER_PHASE = SPEED_OF_LIGHT_MPS / (2 * math.pi * F_0)  # m per radian
 HOLDOVER = {"method": "holdover", "age": "60 s", "averaging": "10 s"}
 LINK = {"interval": "1 s", "error": "1 deg"}
 OCXO = {"power_law": {"h-2": "4e-23", "h-1": "2e-24", "h0": "1e-25"}}
@@ -58,7 +58,7 @@ class TestIntegrals:
         """Values of an independent evaluation, printed with two or three digits."""
         found = one_case(YORK, 5.0, age, averaging)
         assert math.sqrt(2 * found.constant) * PER_PHASE == pytest.approx(metres, rel=2e-3)
-        slope = math.sqrt(2 * found.linear) * PER_PHASE / 2.5 / SPEED_OF_LIGHT
+        slope = math.sqrt(2 * found.linear) * PER_PHASE / 2.5 / SPEED_OF_LIGHT_MPS
         assert slope == pytest.approx(frequency, rel=2e-3)
 
     @pytest.mark.parametrize(("age", "averaging", "T"), [(60.0, 10.0, 5.0), (8.0, 10.0, 6.0), (1e4, 1.0, 0.1)])
@@ -66,7 +66,7 @@ class TestIntegrals:
         """σ_y² = 2π²h₋₂·[H − (9/70)(t_c + T)], exact where averaging and aperture do not overlap."""
         h = 4e-23
         found = one_case((PowerLawPiece(0.0, 1e3, F_0**2 * h, 4.0),), T, age, averaging)
-        square = found.linear * (PER_PHASE / (T / 2) / SPEED_OF_LIGHT) ** 2
+        square = found.linear * (PER_PHASE / (T / 2) / SPEED_OF_LIGHT_MPS) ** 2
         assert square == pytest.approx(2 * math.pi**2 * h * (age - 9 / 70 * (averaging + T)), rel=1e-4)
 
     def test_white_phase_noise_of_disjoint_fits_adds(self) -> None:
@@ -308,7 +308,7 @@ class TestDirectPath:
         assert [one.id for one in tones] == ["receiver.oscillator.spur.0"]
         geometry = parse_mission(mission_text()).geometry
         places = [geometry.transmitter.position, geometry.receiver.position]
-        delay = (sum(math.hypot(*one) for one in places) - math.dist(*places)) / SPEED_OF_LIGHT
+        delay = (sum(math.hypot(*one) for one in places) - math.dist(*places)) / SPEED_OF_LIGHT_MPS
         level = -90 + 20 * math.log10(1000 * 2 * math.sin(math.pi * 120 * delay))
         assert tones[0].declared == pytest.approx(level, abs=0.01)
 
@@ -352,7 +352,7 @@ def test_fast_noise_is_flown_with_its_power() -> None:
     mask = "{1 Hz: -150 dBc/Hz, 5 kHz: -150 dBc/Hz}"
     text = f"{HELD}\n    oscillator: {{frequency: 10 MHz, phase_noise: {mask}}}\n"
     analysis, pulses = Analysis(parse_mission(text)), (np.arange(4000) + 0.5) / 4000 * 6 - 3
-    phase = drawn_errors(analysis).clock_course.at(pulses) / PER_PHASE * SPEED_OF_LIGHT
+    phase = drawn_errors(analysis).clock_course.at(pulses) / PER_PHASE * SPEED_OF_LIGHT_MPS
     fit = np.polynomial.legendre.legfit(pulses / 3, phase, 3)
     left = np.mean(np.square(phase - np.polynomial.legendre.legval(pulses / 3, fit)))
     # 4000 pulses know a power to 2.2 %; eight samples of the fastest tone, joined by straight lines, lose 2 %.

@@ -8,7 +8,7 @@ import pytest
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.vibration_limits import highest_echo, level_of
 from bisar_budget.budget.check import check_mission
-from bisar_budget.constants import SPEED_OF_LIGHT, STANDARD_GRAVITY
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, STANDARD_GRAVITY_MPS2
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, pieces_by_acceleration
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import random_errors
@@ -18,7 +18,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import with_number
 from bisar_budget.ranges.exact_ranges import (
     FINE_NODE_COUNT,
-    STILL,
+    NO_SHIFTS,
     ExactRanges,
     ImagePoints,
     aperture_nodes,
@@ -26,7 +26,7 @@ from bisar_budget.ranges.exact_ranges import (
 )
 from tests.conftest import TODAY, row
 
-G = STANDARD_GRAVITY
+G = STANDARD_GRAVITY_MPS2
 QUALIFICATION = "{spectrum: {20 Hz: 0.04 g^2/Hz, 1 kHz: 0.04 g^2/Hz}}"
 CRYSTAL = "frequency: 10 MHz, power_law: {h0: 1e-30}"
 
@@ -133,7 +133,7 @@ def test_motion_and_oscillator_are_a_quarter_of_a_turn_apart() -> None:
     """The transform of what a receiver on a shaking mast records: displacement, and the phase that Γ·a adds up to."""
     f, T, A, gamma, f_0 = 25.0, 2.0, 1e-3, 5e-10 / G, 10e9
     t = (np.arange(8192) + 0.5) / 8192 * T
-    motion = 2 * math.pi / (SPEED_OF_LIGHT / f_0) * A * np.sin(2 * math.pi * f * t)
+    motion = 2 * math.pi / (SPEED_OF_LIGHT_MPS / f_0) * A * np.sin(2 * math.pi * f * t)
     acceleration = -A * (2 * math.pi * f) ** 2 * np.sin(2 * math.pi * f * t)
     y = gamma * acceleration
     clock = 2 * math.pi * f_0 * (np.cumsum(y) - y / 2) * T / t.size
@@ -192,7 +192,7 @@ def test_a_step_of_a_spectrum() -> None:
     error = of(mission("{spectrum: {30 Hz: 1e-2 g^2/Hz, 30.3 Hz: 1e-6 g^2/Hz}}"), "receiver.vibration.spectrum")
     f = np.linspace(30, 30.3, 100_001)
     steep = 1e-2 * (f / 30) ** (-4 / math.log10(1.01)) * G**2 / (2 * math.pi * f) ** 4
-    rms = 2 * math.pi / (SPEED_OF_LIGHT / 10e9) * math.sqrt(np.trapezoid(steep, f))
+    rms = 2 * math.pi / (SPEED_OF_LIGHT_MPS / 10e9) * math.sqrt(np.trapezoid(steep, f))
     assert error.full.spread == pytest.approx(rms, rel=5e-3)
 
 
@@ -228,10 +228,10 @@ def flown(found: Mission, metres: np.ndarray, *, is_path: bool) -> ImagePoints:
     exact = ExactRanges.of(paths, found.radar, T, FINE_NODE_COUNT)
     draws, none = len(metres), np.zeros(len(metres), dtype=int)
     if not is_path:
-        return followed(exact, metres.T, (STILL, STILL), none)
+        return followed(exact, metres.T, (NO_SHIFTS, NO_SHIFTS), none)
     places = np.array(paths[1].place(aperture_nodes(T)))
     shift = (places / np.linalg.norm(places, axis=0))[:, :, None] * metres.T
-    return followed(exact, np.zeros((FINE_NODE_COUNT, draws)), (STILL, shift), none)
+    return followed(exact, np.zeros((FINE_NODE_COUNT, draws)), (NO_SHIFTS, shift), none)
 
 
 def density(f: np.ndarray) -> np.ndarray:
@@ -261,7 +261,7 @@ def test_a_vibrating_oscillator_against_time_series() -> None:
     error = of(found, "receiver.oscillator.acceleration")
     gamma = 2e-9 / G
     metres = series(
-        lambda f: density(f) * (gamma * SPEED_OF_LIGHT / (2 * math.pi * f)) ** 2, 6.0, np.random.default_rng(2)
+        lambda f: density(f) * (gamma * SPEED_OF_LIGHT_MPS / (2 * math.pi * f)) ** 2, 6.0, np.random.default_rng(2)
     )
     drawn = flown(found, metres, is_path=False)
     for sizes, computed in zip(
@@ -287,7 +287,7 @@ def test_a_turn_is_a_frequency_that_changes() -> None:
     delay = np.cumsum((y[:, 1:] + y[:, :-1]) / 2 * (fine[1] - fine[0]), axis=1)
     delay = np.concatenate((np.zeros((2000, 1)), delay), axis=1)
     delay -= delay[:, 2000:2001]
-    metres = SPEED_OF_LIGHT * np.array([np.interp(aperture_nodes(4.0), fine, one) for one in delay])
+    metres = SPEED_OF_LIGHT_MPS * np.array([np.interp(aperture_nodes(4.0), fine, one) for one in delay])
     drawn = flown(found, metres, is_path=False)
     assert np.abs(drawn.quadratic).max() == pytest.approx(error.full.quadratic * error.declared, rel=5e-3)
     assert np.all(np.abs(drawn.quadratic) <= error.full.quadratic * error.declared * 1.005)

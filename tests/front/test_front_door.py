@@ -415,7 +415,7 @@ def test_bars_of_the_caller_keep_their_lock_and_their_thread(monkeypatch: pytest
     errors = io.StringIO()
     monkeypatch.setattr(errors, "isatty", lambda: True)
     monkeypatch.setattr("sys.stderr", errors)
-    monkeypatch.setattr(progress, "_MOMENT", 0.0)
+    monkeypatch.setattr(progress, "_MIN_SHOWN_S", 0.0)
     known = (tqdm.tqdm.monitor_interval, tqdm.tqdm.get_lock())
     with progress.watched("Working") as told:
         told(1, 2)

@@ -141,6 +141,14 @@ def test_ci_repeats_every_test_of_the_extras() -> None:
     assert (len(marked) > 5, elsewhere) == (True, [])
 
 
+def test_the_thorough_tests_are_run_before_a_release() -> None:
+    script = (ROOT / ".ci" / "before-release").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "contributing" / "index.md").read_text(encoding="utf-8")
+    assert "bash .ci/run\n" in script
+    assert "pytest -n auto -m thorough\n" in script
+    assert "```sh\npytest -n auto -m thorough\n```" in page
+
+
 def test_the_formats_of_the_command_are_those_of_the_registry() -> None:
     (choice,) = [option.type for option in check.params if option.name == "format_name"]
     assert set(choice.choices) == FORMATS.keys()

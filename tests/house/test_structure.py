@@ -1,11 +1,14 @@
 """The house rules of the code itself: floors, import cost, nothing of this machine."""
 
 import ast
+import importlib
+import importlib.util
 import subprocess
 import sys
 from collections import defaultdict
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -220,6 +223,20 @@ for name in [one.name for one in FORMATS.values() if one.is_illustrated == {is_f
 
 # Rooms whose modules are beside those of another: the command, the derivation.
 BESIDE = {"cli", "theory"}
+
+
+def is_submodule(package: ModuleType, name: str) -> bool:
+    return hasattr(package, "__path__") and importlib.util.find_spec(f"{package.__name__}.{name}") is not None
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("*.py")), ids=lambda path: path.stem)
+def test_a_benchmark_imports_names_that_the_package_has(path: Path) -> None:
+    """Nothing else runs them: one imported a table that had been removed."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("bisar_budget"):
+            module = importlib.import_module(str(node.module))
+            for alias in node.names:
+                assert hasattr(module, alias.name) or is_submodule(module, alias.name), f"{node.module}.{alias.name}"
 
 
 def test_no_name_has_two_meanings() -> None:

@@ -4,7 +4,7 @@ import math
 import re
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget import units
@@ -13,7 +13,7 @@ from bisar_budget.faults import InvalidValueError
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.other_units import value_of_unit
 from bisar_budget.units import format_limit, format_quantity, parse_quantity
-from tests.conftest import ROOT, TODAY
+from tests.conftest import ROOT, TODAY, examples
 
 
 @pytest.mark.parametrize(
@@ -194,7 +194,7 @@ def misspelt_units(draw: st.DrawFn) -> tuple[units.Dimension, str, str]:
     return dimension, unit, draw(st.sampled_from([slip for slip in slips if slip]))
 
 
-@settings(max_examples=2000)
+@examples(2000)
 @given(misspelt_units())
 def test_following_a_hint_never_changes_a_figure_by_a_factor(found: tuple[units.Dimension, str, str]) -> None:
     """A slip may give another unit, which is read or understood as what it is; a hint never gives another size."""

@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from bisar_budget.faults import MissionError
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.sampling.draws import eigensystem
-from tests.conftest import findings, mission_text, row
+from tests.conftest import examples, findings, mission_text, row
 
 ERROR = "platforms__receiver__motion_error"
 WAVELENGTH = 299_792_458.0 / 10e9
@@ -50,7 +50,7 @@ class TestEigenvalues:
 
 
 class TestWhatIsOne:
-    @settings(max_examples=60)
+    @examples(60)
     @given(loadings, sizes, st.integers(1, 6))
     def test_a_product_is_accepted_whatever_its_rank_and_scale(self, rows, scale, rank: int) -> None:
         factor = np.array(scale)[:, None] * np.array(rows)[:, :rank]
@@ -60,7 +60,7 @@ class TestWhatIsOne:
         back = np.array(covariance.correlation) * np.outer(covariance.sigmas, covariance.sigmas)
         assert back == pytest.approx(matrix, abs=1e-5 * np.outer(scale, scale).max())
 
-    @settings(max_examples=60)
+    @examples(60)
     @given(st.lists(unit_interval, min_size=15, max_size=15), sizes)
     def test_unit_diagonals_are_accepted_exactly_if_no_eigenvalue_is_negative(self, upper, scale) -> None:
         matrix = np.eye(6)

@@ -9,7 +9,7 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.check import check_mission
-from bisar_budget.constants import STANDARD_GRAVITY
+from bisar_budget.constants import STANDARD_GRAVITY_MPS2
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.instruments import PowerLaw
@@ -95,7 +95,7 @@ def test_figures_are_read() -> None:
         )
     ).platforms.receiver.motion_error
     assert error.imu is not None
-    assert error.imu.accelerometer_bias == pytest.approx([50e-6 * STANDARD_GRAVITY] * 3)
+    assert error.imu.accelerometer_bias == pytest.approx([50e-6 * STANDARD_GRAVITY_MPS2] * 3)
     assert error.imu.gyro_bias[2] == pytest.approx(2 * error.imu.gyro_bias[0])
     assert error.imu.attitude is None
     assert error.random[0].sigma == (0.01, 0.01, 0.01)
@@ -392,7 +392,7 @@ class TestCatalogue:
             file = tmp_path / "sub" / "mission.yaml"
             file.write_text(receiver(f"motion_error: {{sensor: {name}}}"))
             error = load_mission(str(file)).platforms.receiver.motion_error
-            assert error.imu.accelerometer_bias[0] == pytest.approx(bias * STANDARD_GRAVITY)
+            assert error.imu.accelerometer_bias[0] == pytest.approx(bias * STANDARD_GRAVITY_MPS2)
         assert "ours" in catalogue(folders(""))
 
     @pytest.mark.parametrize(

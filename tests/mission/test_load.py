@@ -5,7 +5,7 @@ from datetime import date
 
 import pytest
 import yaml
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
@@ -13,7 +13,7 @@ from bisar_budget.faults import MissionError
 from bisar_budget.mission import tree
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import MISSION, Mission
-from tests.conftest import BASE, ROOT, mission_text
+from tests.conftest import BASE, ROOT, examples, mission_text
 
 
 def faults_of(text: str | bytes):
@@ -235,25 +235,25 @@ def mission_or_error(data: str | bytes) -> None:
 @example("*a")
 @example("&a a")
 @example("a: |\n  b\n c")
-@settings(max_examples=400, deadline=None)
+@examples(400)
 def test_any_text_gives_a_mission_or_a_mission_error(text: str) -> None:
     mission_or_error(text)
 
 
 @given(st.binary(max_size=200))
-@settings(max_examples=200, deadline=None)
+@examples(200)
 def test_any_bytes_give_a_mission_or_a_mission_error(data: bytes) -> None:
     mission_or_error(data)
 
 
 @given(st.sampled_from(sorted(BASE)), trees)
-@settings(max_examples=300, deadline=None)
+@examples(300)
 def test_any_value_at_a_known_key(key: str, value) -> None:
     mission_or_error(yaml.safe_dump({**BASE, key: value}, allow_unicode=True))
 
 
 @given(st.sampled_from(KEYS), trees, st.sampled_from([(), ("radar",), ("platforms", "transmitter"), ("allocation",)]))
-@settings(max_examples=300, deadline=None)
+@examples(300)
 def test_any_value_anywhere(key: str, value, place) -> None:
     tree = yaml.safe_load(mission_text())
     node = tree
@@ -264,7 +264,7 @@ def test_any_value_anywhere(key: str, value, place) -> None:
 
 
 def test_recursion_limit_is_far_away() -> None:
-    assert sys.getrecursionlimit() > tree.MAX_DEPTH * 10
+    assert sys.getrecursionlimit() > tree.MAX_NESTING_LEVEL * 10
 
 
 @pytest.mark.parametrize(

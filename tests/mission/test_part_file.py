@@ -15,11 +15,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.faults import MissionError
-from bisar_budget.mission.instruments import FORMS
+from bisar_budget.mission.instruments import OSCILLATOR_NOISE_FORMS
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.parts import (
     FIGURES,
-    SECTIONS,
+    PART_SECTIONS,
     PartError,
     catalogue,
     folders,
@@ -167,10 +167,10 @@ ANY += ["imu", "oscillator", "[{name: a, sigma: 0, correlation_time: 1 s}]", "{1
 @st.composite
 def files(draw: st.DrawFn, *, changed: bool = True) -> str:
     """Text of a part's file that is right, with one key changed, added or removed if `changed`."""
-    kind = draw(st.sampled_from(list(SECTIONS)))
+    kind = draw(st.sampled_from(list(PART_SECTIONS)))
     figures = draw(st.sets(st.sampled_from(FIGURES[kind]), min_size=1))
     if kind == "oscillator":
-        figures = {"frequency", draw(st.sampled_from(FORMS))}
+        figures = {"frequency", draw(st.sampled_from(OSCILLATOR_NOISE_FORMS))}
     each = f"{{{', '.join(f'{figure}: y' for figure in sorted(figures))}}}"
     file = {"kind": kind, "name": "x", "source": draw(st.sampled_from(["y", each]))}
     file |= {figure: draw(st.sampled_from(RIGHT[figure])) for figure in sorted(figures)}
@@ -211,12 +211,12 @@ class TestSchema:
         schema = part_schema()
         jsonschema.Draft7Validator.check_schema(schema)
         assert (schema["$id"], schema["title"]) == ("urn:bisar-budget:schema:part", "bisar-budget part file")
-        assert len(schema["oneOf"]) == len(SECTIONS)
+        assert len(schema["oneOf"]) == len(PART_SECTIONS)
 
     def test_every_key_is_described(self) -> None:
         for section in part_schema()["definitions"].values():
             assert section["description"]
-        for kind, section in SECTIONS.items():
+        for kind, section in PART_SECTIONS.items():
             definition = part_schema()["definitions"][section.kind.__name__]
             beside = {"kind", "name", "source", "says"} | ({"in_orbit"} if kind in ("imu", "gnss") else set())
             assert definition["properties"].keys() == {*beside, *FIGURES[kind]}
@@ -247,7 +247,7 @@ class TestExamples:
     """The examples of the page; its build runs them too."""
 
     def test_there_is_one_of_each_kind(self) -> None:
-        assert {yaml.safe_load(text)["kind"] for text in EXAMPLES.values()} == SECTIONS.keys()
+        assert {yaml.safe_load(text)["kind"] for text in EXAMPLES.values()} == PART_SECTIONS.keys()
 
     @pytest.mark.parametrize("name", EXAMPLES)
     def test_each_is_a_part(self, name: str, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from bisar_budget.constants import STANDARD_GRAVITY
+from bisar_budget.constants import STANDARD_GRAVITY_MPS2
 from bisar_budget.design.varied import scaled
 from bisar_budget.faults import Fault, MissionError
 from bisar_budget.mission.load import parse_mission
@@ -13,7 +13,7 @@ from bisar_budget.mission.quantities import number_of, tree_of
 from bisar_budget.mission.vibrations import AcceleratedSinusoid, Sinusoid
 from tests.conftest import mission_text
 
-G = STANDARD_GRAVITY
+G = STANDARD_GRAVITY_MPS2
 VIBRATION = "platforms__receiver__motion_error__vibration"
 OSCILLATOR = "platforms__receiver__oscillator"
 NOISE = {"frequency": "10 MHz", "power_law": {"h0": "1e-24"}}

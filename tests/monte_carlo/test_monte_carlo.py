@@ -6,7 +6,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.analysis.analysis import Analysis
@@ -19,7 +19,7 @@ from bisar_budget.sampling.draws import Variable
 from bisar_budget.sampling.probability import _wilson, _within, monte_carlo
 from tests import reference
 from tests.cli.test_settings import project, table  # noqa: F401
-from tests.conftest import findings, mission_text, row
+from tests.conftest import examples, findings, mission_text, row
 
 N = 100_000
 T, F0 = 6.0, 10e9
@@ -488,7 +488,7 @@ class TestReproducible:
 distributions = st.sampled_from(["normal", "uniform", "bound"])
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(st.floats(0, 1e4), st.floats(0, 100), distributions, st.integers(1, 60), st.integers(0, 2**53))
 def test_any_error_gives_probabilities_in_order(position, velocity, distribution, count, seed) -> None:
     error = {"position": position, "velocity": velocity, "distribution": distribution}

@@ -25,6 +25,7 @@ _NEAR = 0.25  # cells from one point to the next in the search for the brightest
 _CLIMBS = 8
 _SETTLED = 1e-7  # m
 _ASIDE, _BEYOND = 3, 4  # cells of range about a cut, and of cross range beyond its ends, that can be read
+_STRIDE = 32  # frequencies from one block to the next
 _BLOCK = 1 << 18  # contributions of pulses to points formed at once
 
 
@@ -103,9 +104,19 @@ class Collection:
         return found
 
     # ------------------------------------------------------------------ phase over the aperture
+    def turned(self, signal: np.ndarray, farther: np.ndarray) -> np.ndarray:
+        """A signal, as if what is so much farther than the reference point were there: (pulses, 1) [m]."""
+        # Frequencies are even: the phase of sample n = 32·i + j is that of 32·i times that of j.
+        first, step = self.frequency[0, 0], self.frequency[0, 1] - self.frequency[0, 0]
+        coarse = first + step * np.arange(0, signal.shape[1], _STRIDE)
+        blocks, within = (np.exp(2j * np.pi / C * of * farther) for of in (coarse, step * np.arange(_STRIDE)))
+        turn = (blocks[:, :, None] * within[:, None]).reshape(len(signal), -1)[:, : signal.shape[1]]
+        found: np.ndarray = signal * turn
+        return found
+
     def compensated(self, farther: np.ndarray) -> np.ndarray:
         """The signal, as if what is so much farther than the reference point were there: (pulses, 1) [m]."""
-        return self.signal * np.exp(2j * np.pi / C * self.frequency * farther)
+        return self.turned(self.signal, farther)
 
     def range_errors(self, point: np.ndarray) -> np.ndarray:
         """Range sums in the data, less those of a point by the places in the file, (pulses,). [m]
@@ -116,7 +127,7 @@ class Collection:
         moved = self.compensated(self.farther(point[None]))
         step = np.angle(np.sum(moved[:, 1:] * moved[:, :-1].conj(), axis=1))
         coarse = -step * C / (2 * np.pi * (self.frequency[0, 1] - self.frequency[0, 0]))
-        moved = moved * np.exp(2j * np.pi / C * self.frequency * coarse[:, None])
+        moved = self.turned(moved, coarse[:, None])
         return coarse - np.angle(moved @ self.over_band) * self.wavelength / (2 * np.pi)
 
     def aperture(self) -> Aperture:
@@ -126,13 +137,13 @@ class Collection:
         that is even, B²/(12 f₀²) of its mean square. It is least by Gauss and Newton.
         """
         band = (float(np.ptp(self.frequency[0])) / self.centre) ** 2 / 12
-        weights = (1 + band) * np.diag(self.over_time) - np.outer(self.over_time, self.over_time)
         point, step = np.zeros(2), 0.1
         for _ in range(40):
             error = self.range_errors(point)
             sums = self.farther(point + np.vstack((np.zeros(2), step * np.eye(2))))
             beside = (sums[:, 1:] - sums[:, :1]) / step
-            move = np.linalg.solve(beside.T @ weights @ beside, beside.T @ weights @ error)
+            weighted = self.over_time[:, None] * ((1 + band) * beside - self.over_time @ beside)
+            move = np.linalg.solve(weighted.T @ beside, weighted.T @ error)
             point = point + move
             if np.abs(move).max() < _SETTLED:
                 break

@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 import bisar_budget as bb
-from bisar_budget.constants import STANDARD_GRAVITY
+from bisar_budget.constants import STANDARD_GRAVITY_MPS2
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, pieces_by_acceleration
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.spectra import PowerLawPiece
@@ -224,7 +224,7 @@ def at_1_g() -> float:
         ].allowable
         for one in ("1 g", "1 mm")
     ]
-    return STANDARD_GRAVITY * allowable[1] / allowable[0]
+    return STANDARD_GRAVITY_MPS2 * allowable[1] / allowable[0]
 
 
 def shaken_at_random() -> float:

@@ -13,7 +13,7 @@ from bisar_budget.paths.accuracy import (
     held_to_covariance,
     local_axes,
 )
-from bisar_budget.paths.earth import ROTATION_RATE
+from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.oem import read_oem
@@ -56,7 +56,7 @@ def state(text: str, at: Instant = MIDDLE) -> tuple[np.ndarray, np.ndarray]:
     """Place, and velocity against the stars, along the axes of the Earth."""
     orbit = read_oem(text.encode(), "c.oem", None, at)
     before, here, after = (np.array(orbit.place(at.after(time))) for time in (-0.1, 0.0, 0.1))
-    return here, (after - before) / 0.2 + np.cross([0, 0, ROTATION_RATE], here)
+    return here, (after - before) / 0.2 + np.cross([0, 0, ROTATION_RATE_RAD_PER_S], here)
 
 
 @pytest.mark.parametrize("frame", ["RTN", "RSW", "RIC", "QSW", "RTN_INERTIAL", "rsw_rotating"])
@@ -93,8 +93,27 @@ def test_a_velocity_over_the_ground_takes_the_place_with_it() -> None:
     """A place that is wrong by d turns with the Earth: the velocity over the ground is wrong by ω × d more."""
     text = with_covariance((600.0, "RTN", triangle((1e4, 1e4, 1e4), 0.1)))
     covariance = np.array(stated(text).covariance)
-    assert np.diag(covariance)[3:] == pytest.approx([0.01 + (ROTATION_RATE * 1e4) ** 2] * 2 + [0.01], rel=1e-6)
-    assert covariance[3, 1] == pytest.approx(ROTATION_RATE * 1e8, rel=1e-6)
+    assert np.diag(covariance)[3:] == pytest.approx(
+        [0.01 + (ROTATION_RATE_RAD_PER_S * 1e4) ** 2] * 2 + [0.01], rel=1e-6
+    )
+    assert covariance[3, 1] == pytest.approx(ROTATION_RATE_RAD_PER_S * 1e8, rel=1e-6)
+
+
+@pytest.mark.parametrize("frame", ["RTN_ROTATING", "TNW_ROTATING"])
+def test_velocities_in_axes_that_turn_with_the_orbit_become_those_against_the_stars(frame: str) -> None:
+    """An error at rest in turning axes is turned by the orbit: its velocity against the stars is n × d."""
+    text = with_covariance((600.0, frame, triangle((1e3, 1e3, 0.0))))
+    place, velocity = state(text)
+    momentum = np.cross(place, velocity)
+    rate = momentum / (place @ place)
+    if frame == "TNW_ROTATING":  # gravity turns the velocity
+        gravity = -3.986004418e14 * place / np.linalg.norm(place) ** 3
+        rate = np.cross(velocity, gravity) / (velocity @ velocity)
+    across = np.eye(3) - np.outer(momentum, momentum) / (momentum @ momentum)  # the variance in the orbit's plane
+    turning = np.array([np.cross(rate - (0, 0, ROTATION_RATE_RAD_PER_S), axis) for axis in np.eye(3)]).T
+    want = turning @ across @ turning.T * 1e6
+    got = np.array(stated(text).covariance)[3:, 3:]
+    assert got == pytest.approx(want, rel=2e-3, abs=2e-3 * np.abs(want).max())
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,13 @@ from functools import partial
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_usable_records
 from bisar_budget.paths.log_places import LogKeys, _longest_rise
 from bisar_budget.paths.path_formats import read_log
+from tests.conftest import examples
 from tests.paths.flown import flight, geodetic_csv, sbet
 from tests.paths.log_files import gpx, nmea, sentence, solution
 
@@ -130,7 +131,7 @@ def clean_start(log: Log) -> float:
     return log.start.since(whole)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.sampled_from(sorted(TEXTS)), st.data())
 def test_up_to_one_percent_far_away_leaves_the_path_as_it_is(kind: str, data: st.DataObject) -> None:
     whole = clean(kind)

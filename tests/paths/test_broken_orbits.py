@@ -5,7 +5,7 @@ import json
 import math
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from bisar_budget.paths import messages
@@ -17,7 +17,7 @@ from bisar_budget.paths.oem import read_oem
 from bisar_budget.paths.orientation import read_earth_rotation
 from bisar_budget.paths.path_formats import LOG_FORMATS, ORBIT_FORMATS, hold_to_format, hold_to_log, orbit_format
 from bisar_budget.paths.sp3 import read_sp3
-from tests.conftest import ROOT
+from tests.conftest import ROOT, examples
 from tests.paths.flown import flight, geodetic_csv
 from tests.paths.log_files import every_format
 from tests.paths.orbit_files import (
@@ -358,7 +358,7 @@ def edited(good: bytes, edits: list[tuple[float, int, bytes]]) -> bytes:
 
 
 @pytest.mark.parametrize("form", GOOD)
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@examples(150, suppress_health_check=[HealthCheck.too_slow])
 @given(edits=EDITS, mends=st.booleans(), wanted=st.sampled_from([None, "39634", "CIRCLE"]))
 def test_bytes_that_were_changed_give_an_orbit_or_an_error(
     form: str, edits: list[tuple[float, int, bytes]], mends: bool, wanted: str | None
@@ -391,7 +391,7 @@ def test_bytes_that_were_changed_give_an_orbit_or_an_error(
         assert str(error).isprintable()
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(
     turns=st.floats(1e-6, 19.9),
     eccentricity=st.floats(0, 1, exclude_max=True),

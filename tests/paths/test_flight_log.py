@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bisar_budget.paths import flight_log
@@ -17,7 +17,7 @@ from bisar_budget.paths.earth import Geodetic, earth_fixed
 from bisar_budget.paths.flight import PathFileError, slow_times, smoothed
 from bisar_budget.paths.flight_log import earth_fixed_places, read_csv
 from bisar_budget.paths.instant import parse_instant
-from tests.conftest import ROOT
+from tests.conftest import ROOT, examples
 from tests.paths.flown import earth_fixed_csv, flight, geodetic_csv, stamp
 
 GOOD = "time [s],latitude [deg],longitude [deg],height [m]\n0,48,11,3000\n1,48.001,11,3000\n2,48.002,11,3000\n"
@@ -93,7 +93,7 @@ def test_ways_to_write_the_same(text: str) -> None:
     assert (log.start is not None) == ("utc" in text.lower())
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(
     st.lists(st.integers(0, 10**7), min_size=1, max_size=20, unique=True).map(sorted),
     st.integers(0, 3),
@@ -288,7 +288,7 @@ def test_any_bytes(data: bytes) -> None:
     held_to_its_word(data)
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(
     st.sampled_from(
         [GOOD, STAMPED + "2026-06-01T05:20:32Z,7e6,0,0\n", GOOD.replace(",", ";"), GOOD.replace("1", '"1"')]

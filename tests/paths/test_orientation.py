@@ -8,7 +8,7 @@ import pytest
 
 from bisar_budget.paths.elements import read_tle
 from bisar_budget.paths.flight import PathFileError
-from bisar_budget.paths.instant import DAY, Instant, later
+from bisar_budget.paths.instant import DAY_S, Instant, later
 from bisar_budget.paths.oem import read_oem
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, from_teme, read_earth_rotation
 from tests.paths.orbit_files import CENTER, START, TLE, checked, oem, on_circle
@@ -26,10 +26,10 @@ def test_a_place_is_turned_as_erfa_has_it(frame: str) -> None:
     """To 0.1 mm; the matrix of polar motion is ERFA's pom00, with s' of 0.1 mas left out in TEME: below 1 mm."""
     at = START.after(615)
     orbit = read_oem(oem(frame=frame).encode(), "c.oem", None, at, TURNED)
-    dut1 = (2400000.5 + at.day, (at.seconds - 0.172) / DAY)
+    dut1 = (2400000.5 + at.day, (at.seconds - 0.172) / DAY_S)
     wobble = erfa.pom00(*TURNED.pole, 0.0)
     if frame == "GCRF":
-        tt = (2400000.5 + at.day, (at.seconds + 37 + 32.184) / DAY)
+        tt = (2400000.5 + at.day, (at.seconds + 37 + 32.184) / DAY_S)
         matrix = wobble @ erfa.c2tcio(erfa.c2i06a(*tt), erfa.era00(*dut1), np.eye(3))
     else:
         matrix = wobble @ erfa.rz(erfa.gmst82(*dut1), np.eye(3))
@@ -75,7 +75,7 @@ def test_words_and_doubts() -> None:
 )
 def test_the_table_of_the_iers(day: int, part: float, ut1: float, pole: tuple[float, float]) -> None:
     """To what the digits of the table give: 1e-7 s and 1e-6 arcsec. Astropy takes parts of a day as doubles."""
-    found = read_earth_rotation(FINALS, "finals", Instant(day, part * DAY))
+    found = read_earth_rotation(FINALS, "finals", Instant(day, part * DAY_S))
     assert found.ut1_minus_utc == pytest.approx(ut1, abs=2e-8)
     assert np.array(found.pole) / ARCSEC == pytest.approx(pole, abs=1e-7)
     assert 5e-6 < found.ut1_doubt < 2e-5
@@ -83,7 +83,9 @@ def test_the_table_of_the_iers(day: int, part: float, ut1: float, pole: tuple[fl
 
 
 def test_the_second_that_a_day_has_more_is_no_jump_of_the_earth() -> None:
-    before, after = (read_earth_rotation(FINALS, "f", Instant(57753, seconds)) for seconds in (DAY - 1, DAY + 0.5))
+    before, after = (
+        read_earth_rotation(FINALS, "f", Instant(57753, seconds)) for seconds in (DAY_S - 1, DAY_S + 0.5)
+    )
     assert after.ut1_minus_utc - before.ut1_minus_utc == pytest.approx(0, abs=1e-5)
 
 

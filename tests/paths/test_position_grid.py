@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.paths.earth import earth_fixed_places
 from bisar_budget.paths.position_grid import cartesian_grid, decimal_step, geodetic_grid
+from tests.conftest import examples
 
 TIMES = np.arange(200) / 10
 DEGREE, MINUTE = math.pi / 180, math.pi / 10_800
@@ -19,14 +20,14 @@ def wandering(seed: int, size: float) -> np.ndarray:
     return size * np.cumsum(np.random.default_rng(seed).normal(size=TIMES.size))
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(decimals=st.integers(0, 7), seed=st.integers(0, 2**32 - 1), offset=st.floats(-1e4, 1e4))
 def test_the_decimals_of_metres_are_found(decimals: int, seed: int, offset: float) -> None:
     written = np.round(offset + wandering(seed, 30 * 10.0**-decimals), decimals)
     assert decimal_step(TIMES, written, (1.0,)) == pytest.approx(10.0**-decimals)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(decimals=st.integers(3, 9), seed=st.integers(0, 2**32 - 1), is_minutes=st.booleans())
 def test_the_decimals_of_degrees_and_minutes_are_found(decimals: int, seed: int, is_minutes: bool) -> None:
     unit = MINUTE if is_minutes else DEGREE

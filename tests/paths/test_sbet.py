@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bisar_budget.paths import sbet as reader
@@ -17,6 +17,7 @@ from bisar_budget.paths.instant import Instant, parse_instant
 from bisar_budget.paths.log_places import NO_KEYS, LogKeys, utc_of
 from bisar_budget.paths.path_formats import LOG_FORMATS
 from bisar_budget.paths.sbet import WEEK_S, of_gps, read_accuracy, read_sbet
+from tests.conftest import examples
 from tests.paths.flown import SECOND, START, Flight, flight, geodetic_csv, sbet, smrmsg, stamp
 from tests.paths.flown import WEEK as GPS_WEEK
 
@@ -365,7 +366,7 @@ def test_any_bytes(data: bytes) -> None:
 SIGNALLING_NAN = b"\x01\0\0\0\0\0\xf0\x7f"
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(
     st.sampled_from([sbet(flight(10)), smrmsg(TIMES[:17])]),
     st.lists(

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.geometry import PlatformState
@@ -20,6 +20,7 @@ from bisar_budget.paths.flight import (
     widest_stretch,
 )
 from bisar_budget.paths.instant import Instant
+from tests.conftest import examples
 
 START = Instant(61192, 19201.25)  # 2026-06-01T05:20:01.250Z
 NOISE = 0.02  # m
@@ -128,7 +129,7 @@ def sigmas(at: Any, order: int) -> list[float]:
     return [math.sqrt(variance[n]) * factor for n, factor in enumerate((1, 1, 2))]
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(
     st.integers(1, 7),
     st.sampled_from([2.0, 10.0, 30.0]),

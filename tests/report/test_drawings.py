@@ -7,14 +7,14 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.report.drawing.geometry_views import geometry_elevation, geometry_plan
 from bisar_budget.report.drawing.svg import LINE_PX, Box, text_width
-from tests.conftest import ROOT, findings, found_in
+from tests.conftest import ROOT, examples, findings, found_in
 
 SVG = "{http://www.w3.org/2000/svg}"
 DRAWINGS = {"plan": geometry_plan, "elevation": geometry_elevation}
@@ -252,7 +252,7 @@ kilometres = st.floats(-5e4, 5e4)
 metres_per_second = st.floats(-300, 300)
 
 
-@settings(deadline=None, max_examples=60)  # a few drawings take tens of ms, more on a busy machine
+@examples(60)  # a few drawings take tens of ms, more on a busy machine
 @given(
     name=st.text(max_size=40),
     tx=st.tuples(kilometres, kilometres, st.floats(0, 5e4)),

@@ -16,7 +16,7 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain.explanation import explain
 from tests.budget.test_input_doubt import logged, noisy
-from tests.conftest import TODAY, mission_text, row
+from tests.conftest import TODAY, by_turns, mission_text, row
 from tests.effects.test_random_errors import MISSION as SENSORS
 from tests.effects.test_random_errors import OSCILLATORS
 from tests.report.test_report_explanation import evaluated, repeat_by_hand, sums
@@ -109,18 +109,16 @@ class TestHighestEcho:
         assert "No tone is declared" in text
 
 
-@pytest.mark.parametrize(
-    "requirements",
-    ["islr: -20 dB", "islr: -20 dB, pslr: -30 dB", "islr: -20 dB, cubic_phase_error: 45 deg", "pslr: -30 dB",
-     "quadratic_phase_error: 90 deg", "islr: -20 dB, location_error: 3 m, declare: [oscillator, velocity]"],
+REQUIRED = (
+    "islr: -20 dB", "islr: -20 dB, pslr: -30 dB", "islr: -20 dB, cubic_phase_error: 45 deg", "pslr: -30 dB",
+    "quadratic_phase_error: 90 deg", "islr: -20 dB, location_error: 3 m, declare: [oscillator, velocity]",
 )  # fmt: skip
-@pytest.mark.parametrize(
-    ("model", "combine", "coverage_factor"),
-    [("published", "sum", 3), ("full", "rss", 2), ("full", "each", 1), ("strictest", "rss", 3)],
-)
-def test_sensors_and_tones_repeat_by_hand_whatever_is_required(
-    requirements: str, model: str, combine: str, coverage_factor: int
-) -> None:
+RULES = (("published", "sum", 3), ("full", "rss", 2), ("full", "each", 1), ("strictest", "rss", 3))
+
+
+@pytest.mark.parametrize(("requirements", "rule"), by_turns(REQUIRED, RULES, REQUIRED[2], REQUIRED[-1]))
+def test_sensors_and_tones_repeat_by_hand_whatever_is_required(requirements: str, rule: tuple[str, str, int]) -> None:
+    model, combine, coverage_factor = rule
     repeat_by_hand(sensors(requirements, model=model, combine=combine, coverage_factor=coverage_factor))
 
 

@@ -8,7 +8,7 @@ from random import Random
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
@@ -18,7 +18,7 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.report.change.comparison import Gate, compare
 from bisar_budget.report.change.names import plain, plain_file
-from tests.conftest import TODAY, findings
+from tests.conftest import TODAY, examples, findings
 from tests.conftest import mission_text as base_text
 from tests.families import FAMILIES, mission_text
 from tests.fuzz import _with_instruments, places, tree_of
@@ -386,7 +386,7 @@ def _scaled(text: str, factor: float) -> str:
     return f"{float(number) * factor:.8g}{unit}"
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(st.sampled_from(FAMILIES), st.integers(0, 10_000), st.randoms(use_true_random=False), st.booleans())
 def test_a_random_figure_that_shrinks_or_goes_is_refused(family, seed, random, is_deleted) -> None:
     """Whichever figure it is: where a row's use falls, the gate says so."""
@@ -425,7 +425,7 @@ def test_a_total_that_makes_room_for_an_error_that_fails_alone_is_no_fall() -> N
     assert not compare(findings(**at(*each)), worse).loosened
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(st.sampled_from(FAMILIES), st.integers(0, 10_000), st.randoms(use_true_random=False))
 def test_a_random_error_that_grows_is_no_fall(family, seed, random) -> None:
     tree = _mission(family, seed)

@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
@@ -41,7 +41,7 @@ from bisar_budget.report.compliance.document import (
 from bisar_budget.report.compliance.summary import compliance
 from bisar_budget.report.words.sentences import sentence
 from bisar_budget.sampling.probability import monte_carlo
-from tests.conftest import COMPLIES, ROOT, findings, found_in, mission_text
+from tests.conftest import COMPLIES, ROOT, by_turns, examples, findings, found_in, mission_text, name_of
 from tests.page import Element, read_page
 
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
@@ -157,9 +157,11 @@ def illustrated() -> MissionFindings:
     return found._replace(verdicts=(VERDICT,), image_evidence=(evidence,))
 
 
+EXAMPLES = sorted((ROOT / "specs" / "missions").glob("*.yaml"))
+
+
 class TestView:
-    @pytest.mark.parametrize("model", ["published", "full", "strictest"])
-    @pytest.mark.parametrize("path", sorted((ROOT / "specs" / "missions").glob("*.yaml")), ids=lambda path: path.stem)
+    @pytest.mark.parametrize(("path", "model"), by_turns(EXAMPLES, ("published", "full", "strictest")), ids=name_of)
     def test_every_row_stands_once_with_its_numbers(self, path: Path, model: str) -> None:
         found = found_in(path, model)
         document = compliance(report(found), FULL)
@@ -632,7 +634,7 @@ PLAIN_TAGS = {}
 
 
 class TestNoNameDoesAnything:
-    @settings(max_examples=40)
+    @examples(40)
     @given(ACCEPTED, ACCEPTED, NASTY)
     def test_html(self, name: str, source: str, file: str) -> None:
         found = nasty_findings(name, source)._replace(file=file)
@@ -645,7 +647,7 @@ class TestNoNameDoesAnything:
         heading = next(head for head in page.all("h2") if head.attributes["id"] == "m1-h")
         assert heading.text == printable(found.name)
 
-    @settings(max_examples=40)
+    @examples(40)
     @given(ACCEPTED, ACCEPTED, NASTY)
     def test_markdown(self, name: str, source: str, file: str) -> None:
         found = nasty_findings(name, source)._replace(file=file)

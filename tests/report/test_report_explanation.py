@@ -12,7 +12,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.theory import render
-from tests.conftest import ROOT, TODAY, findings, mission_text
+from tests.conftest import ROOT, TODAY, by_turns, findings, mission_text, name_of
 from tests.effects.test_random_errors import MISSION as SENSORS
 from tests.effects.test_random_errors import OSCILLATORS
 from tests.report.test_text_width import too_long
@@ -135,8 +135,7 @@ def sums(text: str) -> list[tuple[str, str, float]]:
     return found
 
 
-@pytest.mark.parametrize("model", ["published", "full", "strictest"])
-@pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(("path", "model"), by_turns(MISSIONS, ("published", "full", "strictest")), ids=name_of)
 def test_every_row_can_be_repeated_by_hand(path, model: str) -> None:
     repeat_by_hand(load_mission(str(path), model))
 

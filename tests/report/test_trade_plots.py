@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
@@ -35,7 +35,7 @@ from bisar_budget.report.drawing.trades import (
     thinned,
 )
 from bisar_budget.report.tables import Described
-from tests.conftest import ROOT
+from tests.conftest import ROOT, examples
 from tests.drawing import SVG, Drawing
 
 FILE = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
@@ -139,7 +139,7 @@ class TestWhatIsDrawn:
         rows = np.array([["a", "a", "b", "b", "a", "a", "", ""]], dtype=object)
         assert [region.row for region in regions(rows)] == ["a", "b", "a"]
 
-    @settings(max_examples=30)
+    @examples(30)
     @given(st.sampled_from([1, 2, 7, 700]), st.integers(1, 9), st.integers(0, 5))
     def test_places_are_in_their_regions(self, first: int, second: int, seed: int) -> None:
         rows = np.random.default_rng(seed).choice(["a", "b"], (first, second)).astype(object)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import BistaticGeometry, PlatformState, state_from_angles
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulator import point
@@ -30,7 +30,7 @@ class Collection:
 
     @property
     def wavelength(self) -> float:
-        return SPEED_OF_LIGHT / self.center_frequency
+        return SPEED_OF_LIGHT_MPS / self.center_frequency
 
     @property
     def slow_time(self):

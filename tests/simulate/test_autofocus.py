@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.simulator.autofocus import (
@@ -20,6 +20,7 @@ from bisar_budget.simulator.autofocus import (
 from bisar_budget.simulator.image_formation import backprojection, ground_grid, taylor_window
 from bisar_budget.simulator.impulse_response import upsampled
 from bisar_budget.simulator.phase_history import cell_centres
+from tests.conftest import examples
 from tests.simulate.conftest import Collection, collection
 
 
@@ -153,7 +154,7 @@ class TestPhaseGradient:
         assert residual(s, phase_gradient_autofocus(s.image)) < 0.1
 
     @given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.1, 1.5))
-    @settings(max_examples=12, deadline=None)
+    @examples(12, default=4)
     def test_random_phases_in_random_scenes(self, seed: int, size: float) -> None:
         s = scene(smooth(seed, size), seed=seed)
         assert residual(s, phase_gradient_autofocus(s.image)) < 0.1
@@ -216,7 +217,7 @@ def of(quadratic_rad: float, cubic_rad: float):
 
 class TestMapDrift:
     @given(q=st.floats(-12, 12), c=st.floats(-6, 6))
-    @settings(max_examples=10, deadline=None)
+    @examples(10, default=4)
     def test_points(self, q: float, c: float) -> None:
         s = scene(of(q, c))
         assert residual(s, map_drift(s.image, 3)) < 0.03
@@ -224,7 +225,7 @@ class TestMapDrift:
         assert residual(s, map_drift(s.image)) < 0.03
 
     @given(q=st.floats(-12, 12), c=st.floats(-6, 6))
-    @settings(max_examples=4, deadline=None)
+    @examples(4)
     def test_textured_clutter(self, q: float, c: float) -> None:
         """Speckle of the sub-apertures is independent: the patches' edges alone tell, less precisely."""
         s = textured(of(q, c))

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.simulator.image_formation import backprojection, ground_grid, matched_filter
 from bisar_budget.simulator.phase_history import PhaseHistory
-from tests.conftest import ROOT
+from tests.conftest import ROOT, examples
 from tests.simulate.conftest import Collection, collection, platform
 
 NUMBA = importlib.util.find_spec("numba") is not None
@@ -137,7 +137,7 @@ class TestAgainstTheMatchedFilter:
     shape=st.tuples(st.integers(1, 40), st.integers(1, 70)),
     squint=st.floats(-60, 60),
 )
-@settings(max_examples=25, deadline=None)
+@examples(25)
 def test_compiled_and_numpy_form_the_same_image(at, turn, spacing, shape, squint) -> None:
     history = collection(squint, pulses=8, frequencies=33).record(np.array([*at, 0.0]) + SCATTERERS, AMPLITUDES)
     points = ground_grid(at, turn, (spacing * shape[0], spacing * shape[1]), shape)
@@ -154,7 +154,7 @@ def test_compiled_and_numpy_form_the_same_image(at, turn, spacing, shape, squint
     bend=st.floats(-0.5, 0.5),
     is_on_a_pixel=st.booleans(),
 )
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_no_pixel_is_outside_the_bounds_of_its_ranges(seed, shape, length, bend, is_on_a_pixel) -> None:
     """Profiles are refined between them. Bent lines, their pixels moved at random, some of them at a platform."""
     from bisar_budget.simulator.compiled import _boxes, _reach

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulator.phase_history import PathError, cell_centres, direct_path_error, path, phase_history
 from bisar_budget.verifier.limits import verify_mission
@@ -89,7 +89,7 @@ def test_the_history_of_a_scatterer_is_that_of_ranges_less_distances() -> None:
     (t, r), (mt, mr) = ([getattr(one, which)[5] for one in flown] for which in ("actual", "measured"))
     recorded = np.linalg.norm(t - scatterer) + np.linalg.norm(r - scatterer) - np.linalg.norm(t - r)
     subtracted = np.linalg.norm(mt) + np.linalg.norm(mr) - np.linalg.norm(mt - mr)
-    phase = -2 * math.pi * frequency[2] / SPEED_OF_LIGHT * (recorded - subtracted)
+    phase = -2 * math.pi * frequency[2] / SPEED_OF_LIGHT_MPS * (recorded - subtracted)
     assert history.samples[5, 2] == pytest.approx(np.exp(1j * phase), abs=1e-7)  # 40 km at 10 GHz, rounded
 
 

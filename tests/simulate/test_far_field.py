@@ -5,14 +5,15 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.simulator.far_field import far_field_filter, polar_format
 from bisar_budget.simulator.image_formation import backprojection, ground_grid, matched_filter
 from bisar_budget.simulator.phase_history import PathError, look_sum
+from tests.conftest import examples
 from tests.simulate.conftest import Collection, collection, measured_phase
 
 pytestmark = pytest.mark.extras
@@ -54,19 +55,19 @@ class TestFarFieldFilter:
                 fx = f / 2 * sum(math.cos(a) * math.cos(e) for a, e in angles)
                 fy = f / 2 * sum(math.sin(a) * math.cos(e) for a, e in angles)
                 fz = f / 2 * sum(math.sin(e) for _, e in angles)
-                turn = -4 * math.pi / SPEED_OF_LIGHT * (x * fx + y * fy + z * fz)
+                turn = -4 * math.pi / SPEED_OF_LIGHT_MPS * (x * fx + y * fy + z * fz)
                 total += history.samples[k, i] * complex(math.cos(turn), math.sin(turn))
         assert far_field_filter(history, np.array([x, y, z])) == pytest.approx(total / 6, abs=1e-6)
 
     @given(x=st.floats(-3, 3), y=st.floats(-3, 3), squint=st.floats(-60, 60))
-    @settings(max_examples=12, deadline=None)
+    @examples(12)
     def test_near_the_scene_centre_it_is_the_matched_filter(self, x, y, squint) -> None:
         """What (5) drops is at most |x|²/2R on each leg; that phase bounds the difference."""
         c = collection(squint, pulses=16, frequencies=8)
         history = c.record([0.0, 0.0, 0.0])
         point = np.array([x, y, 0.0])
         dropped = (x * x + y * y) / 2 * (1 / 30.9e3 + 1 / 8.4e3)  # ranges at the ends of the aperture or above
-        bound = 2 * math.pi * 10.15e9 / SPEED_OF_LIGHT * dropped
+        bound = 2 * math.pi * 10.15e9 / SPEED_OF_LIGHT_MPS * dropped
         assert abs(far_field_filter(history, point) - matched_filter(history, point)) <= bound + 1e-6
 
     def test_far_from_the_scene_centre_it_defocuses_by_itself(self, broadside: Collection) -> None:
@@ -105,7 +106,7 @@ class TestFarFieldFilter:
 def _plane_record(c: Collection, plane, shown):
     """Phase history for which (5) is exact."""
     history = c.record([0.0, 0.0, 0.0])
-    history.samples[:] = np.exp(2j * math.pi / SPEED_OF_LIGHT * np.outer(plane @ shown, history.frequency))
+    history.samples[:] = np.exp(2j * math.pi / SPEED_OF_LIGHT_MPS * np.outer(plane @ shown, history.frequency))
     return history
 
 
@@ -124,11 +125,11 @@ class TestPolarFormat:
             away = (np.arange(count) - count // 2) * extent / count - place
             step = f[1] - f[0]  # Bx/Nx
             with np.errstate(invalid="ignore"):
-                ratio = np.sin(2 * math.pi * away * step * f.size / SPEED_OF_LIGHT) / np.sin(
-                    2 * math.pi * away * step / SPEED_OF_LIGHT
+                ratio = np.sin(2 * math.pi * away * step * f.size / SPEED_OF_LIGHT_MPS) / np.sin(
+                    2 * math.pi * away * step / SPEED_OF_LIGHT_MPS
                 )
             dirichlet = np.where(np.isnan(ratio), f.size, ratio) / f.size
-            phase = np.exp(-2j * math.pi / SPEED_OF_LIGHT * away * (2 * f[0] + step * (f.size - 1)))
+            phase = np.exp(-2j * math.pi / SPEED_OF_LIGHT_MPS * away * (2 * f[0] + step * (f.size - 1)))
             want = want * np.expand_dims(dirichlet * phase, 1 - axis)
         # The point's own ranges bend by 11²/R, 1.4 µm: 3e-4 rad. Interpolation of twelve taps adds less than that.
         assert np.abs(image - want).max() < 6e-4
@@ -150,10 +151,10 @@ class TestPolarFormat:
         assert np.argmax(middle) == peak
         assert middle.flat[peak] == pytest.approx(want.flat[peak], abs=0.02)
         widths = (
-            c.geometry.range_resolution(c.bandwidth, SPEED_OF_LIGHT) * fx.size * (fx[1] - fx[0]),
+            c.geometry.range_resolution(c.bandwidth, SPEED_OF_LIGHT_MPS) * fx.size * (fx[1] - fx[0]),
             c.cross_range_resolution * fy.size * (fy[1] - fy[0]),
         )
-        trimmed = sum(1 - 2 * width / SPEED_OF_LIGHT for width in widths)
+        trimmed = sum(1 - 2 * width / SPEED_OF_LIGHT_MPS for width in widths)
         assert 0 < trimmed < 0.2
         assert np.abs(middle - want).max() < 1.22 * trimmed + 0.01
 
@@ -185,7 +186,7 @@ class TestPolarFormat:
             measured.append(measured_phase(c, *cuts, size[1] / n))
         assert measured[1] == pytest.approx(measured[0], rel=0.02)
         fine = polar_format(c.record([0, 0, 0]), look, (60.0, 400.0), (160, 1200)).frequency_y
-        kept = 2 * np.ptp(fine) / SPEED_OF_LIGHT * c.cross_range_resolution
+        kept = 2 * np.ptp(fine) / SPEED_OF_LIGHT_MPS * c.cross_range_resolution
         assert 0.945 < kept**2 < 0.98  # also the half pulse that is missing at either end
 
     def test_what_it_refuses(self, broadside: Collection) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.check import check_mission
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.faults import MissionError
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulator.phase_history import cell_centres, exact_effect, path
@@ -165,7 +165,7 @@ def test_a_height_error_defocuses_a_bistatic_image(separation: float, squint: fl
     up = np.array([0.0, 0.0, 10.0])
     # As a clock error: what the echo's path is longer by than one from the scene centre.
     longer = sum(np.linalg.norm(p.actual - up, axis=1) - np.linalg.norm(p.actual, axis=1) for p in flown)
-    effect = exact_effect(slow_time, *flown, longer / SPEED_OF_LIGHT, mission.radar, 6.0)
+    effect = exact_effect(slow_time, *flown, longer / SPEED_OF_LIGHT_MPS, mission.radar, 6.0)
     assert terrain.qpe_full_rad == pytest.approx(effect.quadratic, rel=0.02)
     assert abs(terrain.qpe_full_rad) == pytest.approx(size, rel=0.2)
     by_full = row_of(

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.simulator.image_formation import taylor_window
@@ -16,6 +16,7 @@ from bisar_budget.simulator.impulse_response import (
     upsampled,
 )
 from bisar_budget.simulator.phase_history import cell_centres
+from tests.conftest import examples
 
 APERTURE = 256  # samples
 OVERSAMPLING = 8  # of a cut
@@ -99,7 +100,7 @@ class TestOneCut:
         assert got.pslr_db == pytest.approx(pslr, abs=0.02)
 
     @given(quadratic=st.floats(-math.pi, math.pi), tapered=st.booleans())
-    @settings(max_examples=12, deadline=None)
+    @examples(12, default=6)
     def test_quadrature_says_the_same(self, quadratic: float, tapered: bool) -> None:
         window = taylor_window(APERTURE) if tapered else np.ones(APERTURE)
         null = first_null(window)
@@ -136,7 +137,7 @@ class TestOneCut:
         assert got.irw_m == pytest.approx(1.30, abs=0.005)
 
     @given(shift=st.floats(-3, 3))
-    @settings(max_examples=20, deadline=None)
+    @examples(20, default=6)
     def test_a_shift_moves_only_the_peak(self, shift: float) -> None:
         cut, spacing = response(1.0)
         frequency = np.fft.fftfreq(cut.size, spacing)
@@ -196,7 +197,7 @@ def chip(place=(0.0, 0.0), quadratic: float = 0.0, windows=(None, None), carrier
 
 class TestChip:
     @given(place=st.tuples(st.floats(-6, 6), st.floats(-6, 6)))
-    @settings(max_examples=8, deadline=None)
+    @examples(8, default=6)
     def test_uniform_apertures_wherever_the_peak_lies(self, place) -> None:
         image, spacing = chip(place)
         got = impulse_response_2d(image, (spacing, spacing))

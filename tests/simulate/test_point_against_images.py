@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulator import point as point_module
 from bisar_budget.simulator.impulse_response import upsampled
@@ -40,7 +40,7 @@ def peak_of_part(mission, first: float, last: float, start) -> np.ndarray:
         grid = here + np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
         sums = sum(np.linalg.norm(p[:, None, :] - np.pad(grid, ((0, 0), (0, 1))), axis=2) for p in paths)
         left = true[:, None] - sums
-        image = sum(np.exp(-2j * math.pi * f / SPEED_OF_LIGHT * left).sum(axis=0) for f in frequency)
+        image = sum(np.exp(-2j * math.pi * f / SPEED_OF_LIGHT_MPS * left).sum(axis=0) for f in frequency)
         here, half = grid[np.argmax(np.abs(image))], half / 3
     return here
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import legendre
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.load import parse_mission
@@ -101,7 +101,7 @@ def test_a_tone_of_an_oscillator_is_flown_from_one_cycle_per_aperture_on() -> No
     assert flown.frequency == 2.0
     # Δφ = Γ f₀ a/f, as a motion of λ/2π times as much; a = (2πf)² 1 µm.
     a = (2 * math.pi * 2) ** 2 * 1e-6
-    assert flown.amplitude == pytest.approx(SPEED_OF_LIGHT / (2 * math.pi) * 1e-9 / 9.80665 * a / 2, rel=1e-9)
+    assert flown.amplitude == pytest.approx(SPEED_OF_LIGHT_MPS / (2 * math.pi) * 1e-9 / 9.80665 * a / 2, rel=1e-9)
 
 
 @pytest.mark.parametrize("frequency", [9.96, 50.2, 1000.205])

@@ -8,7 +8,7 @@ from bisar_budget.image_plane import Sampling
 from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import full
-from bisar_budget.theory.symbols import PLATFORMS, RECEIVER, TRANSMITTER
+from bisar_budget.theory.symbols import PLATFORM_SYMBOLS, RECEIVER, TRANSMITTER
 
 B = Matrix(full.DIRECT_PATH)
 
@@ -22,7 +22,7 @@ def test_lines_of_sight_are_less_the_direct_path() -> None:
 def test_the_parts_of_both_platforms_are_the_whole() -> None:
     """With b written out; so that nothing is lost by looking at one platform at a time."""
     apart = dict(zip(full.DIRECT_PATH, (TRANSMITTER.position - RECEIVER.position) / full.baseline, strict=True))
-    parts = sum(full.direct_range_error(platform) for platform in PLATFORMS).subs(apart)
+    parts = sum(full.direct_range_error(platform) for platform in PLATFORM_SYMBOLS).subs(apart)
     assert simplify(parts - dr.direct_path_range_error()) == 0
 
 

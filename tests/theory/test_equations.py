@@ -8,14 +8,14 @@ import pytest
 from sympy import Expr, Function, Matrix, Symbol
 from sympy.core.function import AppliedUndef
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.simulator.far_field import far_field_filter
 from bisar_budget.simulator.image_formation import matched_filter
 from bisar_budget.simulator.phase_history import PathError, PhaseHistory, path, phase_history
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import published as paper
-from bisar_budget.theory.symbols import PLATFORMS, c, clock_coefficients, point, scatterer, tau
+from bisar_budget.theory.symbols import PLATFORM_SYMBOLS, c, clock_coefficients, point, scatterer, tau
 
 # Neither broadside nor level, azimuths in different quadrants, so that no term is zero by chance.
 GEOMETRY = BistaticGeometry(
@@ -43,7 +43,7 @@ def right(number: int, part: int = 0) -> Expr:
 def platforms_in_numbers(time: float = 0.0) -> dict[Expr, float]:
     """Symbols of both platforms: where they are then, speeds and mid-aperture ranges."""
     values = {}
-    for symbols, state in zip(PLATFORMS, STATES, strict=True):
+    for symbols, state in zip(PLATFORM_SYMBOLS, STATES, strict=True):
         position, velocity = state.at(time)
         values |= dict(zip((*symbols.position, *symbols.velocity), (*position, *velocity), strict=True))
         values[symbols.slant_range] = state.slant_range
@@ -53,7 +53,7 @@ def platforms_in_numbers(time: float = 0.0) -> dict[Expr, float]:
 
 def errors_in_numbers() -> dict[Expr, float]:
     values = dict(zip(clock_coefficients, CLOCK, strict=True))
-    for symbols, error in zip(PLATFORMS, ERRORS, strict=True):
+    for symbols, error in zip(PLATFORM_SYMBOLS, ERRORS, strict=True):
         for names, numbers in (
             (symbols.position_error, error.position),
             (symbols.velocity_error, error.velocity),
@@ -83,7 +83,7 @@ def clock(time: float) -> float:
 
 def exact_observed_range(place: np.ndarray, time: float) -> float:
     """True ranges to a point less measured ones to the scene centre. [m]"""
-    total = SPEED_OF_LIGHT * clock(time)
+    total = SPEED_OF_LIGHT_MPS * clock(time)
     for index in range(2):
         r, error = flown(time, index)
         total += np.linalg.norm(r - place) - np.linalg.norm(r + error)
@@ -107,7 +107,7 @@ def summed(expression: Expr, functions: dict[str, object]) -> complex:
     calls = done.atoms(AppliedUndef)
     assert len(calls) >= FREQUENCY.size * SLOW_TIME.size
     known = {call: functions[call.func.__name__](*map(float, call.args)) for call in calls}
-    return complex(done.subs(known).subs(c, SPEED_OF_LIGHT).evalf())
+    return complex(done.subs(known).subs(c, SPEED_OF_LIGHT_MPS).evalf())
 
 
 def sample(f: float, time: float) -> complex:
@@ -131,8 +131,8 @@ def test_every_number_from_1_to_31_is_there_in_order_and_says_where_it_comes_fro
 
 def test_1_is_the_exact_differential_range_that_is_observed() -> None:
     time, place = 1.5, SCATTERERS[0]
-    numbers = dict(zip(scatterer, place, strict=True)) | {c: SPEED_OF_LIGHT}
-    for index, symbols in enumerate(PLATFORMS):
+    numbers = dict(zip(scatterer, place, strict=True)) | {c: SPEED_OF_LIGHT_MPS}
+    for index, symbols in enumerate(PLATFORM_SYMBOLS):
         r, error = flown(time, index)
         numbers |= dict(zip((*symbols.position, *dr.measured_error(symbols)), (*r, *error), strict=True))
     observed = right(1, 1).subs(Function("ttilde")(tau), clock(time))
@@ -155,7 +155,7 @@ def test_2_and_3_are_the_samples_that_the_simulator_records() -> None:
     )
     for k, time in enumerate(SLOW_TIME):
         for i, f in enumerate(FREQUENCY):
-            put_in = {paper.f_i: f, c: SPEED_OF_LIGHT}
+            put_in = {paper.f_i: f, c: SPEED_OF_LIGHT_MPS}
             phases = [
                 value(right(2).subs(Function("DeltaRhat_m")(paper.tau_k), exact_observed_range(place, time)), put_in)
                 for place in SCATTERERS
@@ -174,7 +174,7 @@ def test_4_is_the_mean_over_samples_turned_back_by_the_phase_of_a_pixel() -> Non
 
     def tested(f: float, time: float) -> float:
         exact = sum(np.linalg.norm(r - place) - np.linalg.norm(r) for r in (flown(time, n)[0] for n in range(2)))
-        return -2 * math.pi * f * exact / SPEED_OF_LIGHT
+        return -2 * math.pi * f * exact / SPEED_OF_LIGHT_MPS
 
     image = summed(right(4), {"S": sample, "Phi_xyz": tested})
     assert image == pytest.approx(complex(matched_filter(history(), place)), abs=1e-7)
@@ -188,7 +188,7 @@ def test_5_and_6_are_the_exact_range_up_to_the_curvature_of_the_wave() -> None:
     curved = sum(place @ place / (2 * s.slant_range) for s in STATES)
     assert first_order == pytest.approx(exact, abs=curved)
     angles = {}
-    for symbols, state in zip(PLATFORMS, STATES, strict=True):
+    for symbols, state in zip(PLATFORM_SYMBOLS, STATES, strict=True):
         angles[Function(f"phi_{symbols.subscript}")(paper.tau_k)] = state.azimuth
         angles[Function(f"theta_{symbols.subscript}")(paper.tau_k)] = state.elevation
     assert value(right(6).subs(angles), numbers).real == pytest.approx(first_order, rel=1e-12)
@@ -197,7 +197,7 @@ def test_5_and_6_are_the_exact_range_up_to_the_curvature_of_the_wave() -> None:
 def test_8_is_half_the_frequency_along_the_sum_of_the_looks() -> None:
     time, f = float(SLOW_TIME[0]), 9.8e9
     angles = {}
-    for index, symbols in enumerate(PLATFORMS):
+    for index, symbols in enumerate(PLATFORM_SYMBOLS):
         x, y, z = flown(time, index)[0]
         angles[Function(f"phi_{symbols.subscript}")(paper.tau_k)] = math.atan2(y, x)
         angles[Function(f"theta_{symbols.subscript}")(paper.tau_k)] = math.atan2(z, math.hypot(x, y))
@@ -248,7 +248,7 @@ def test_11_is_the_azimuth_of_the_sum_of_the_looks() -> None:
     assert value(right(11), platforms_in_numbers()).real == pytest.approx(math.atan2(s_y, s_x))
 
 
-GRID = {paper.f_0: 1.8e10, paper.B_x: 5e8, paper.B_y: 3e8, paper.N_x: 5, paper.N_y: 4, c: SPEED_OF_LIGHT}
+GRID = {paper.f_0: 1.8e10, paper.B_x: 5e8, paper.B_y: 3e8, paper.N_x: 5, paper.N_y: 4, c: SPEED_OF_LIGHT_MPS}
 TURNED = np.array([[0.11, -0.2], [0.5, 0.37]])  # x′, y′ of two scatterers [m]
 
 
@@ -269,7 +269,7 @@ def samples_on_grid() -> np.ndarray:
     total = np.zeros((5, 4), dtype=complex)
     for (x, y), reflectivity in zip(TURNED, REFLECTIVITY, strict=True):
         far = -2 * (x * band(0)[:, None] + y * band(1))  # f·ΔR: two legs
-        total += reflectivity * np.exp(-2j * math.pi * far / SPEED_OF_LIGHT)
+        total += reflectivity * np.exp(-2j * math.pi * far / SPEED_OF_LIGHT_MPS)
     return total
 
 
@@ -286,7 +286,7 @@ def test_15_is_the_phase_history_of_plane_waves_and_its_print_is_not() -> None:
         assert value(got, {paper.k_x: int(k_x), paper.k_y: int(k_y)}) == pytest.approx(want[k_x, k_y], abs=1e-9)
     # The print has x′_m·f₀ + B_x·k_x/N_x, whose second part is no phase: 1e8 Hz without metres.
     printed = sum(
-        a * np.exp(4j * math.pi / SPEED_OF_LIGHT * (x * 1.8e10 + 5e8 / 5 + y * -1.5e8))
+        a * np.exp(4j * math.pi / SPEED_OF_LIGHT_MPS * (x * 1.8e10 + 5e8 / 5 + y * -1.5e8))
         for a, (x, y) in zip(REFLECTIVITY, TURNED, strict=True)
     )
     assert abs(printed - want[1, 0]) > 0.1
@@ -294,7 +294,7 @@ def test_15_is_the_phase_history_of_plane_waves_and_its_print_is_not() -> None:
 
 def polar_image(x: float, y: float) -> complex:
     """The double sum of (14) by NumPy, of the samples above."""
-    turn = 4j * math.pi / SPEED_OF_LIGHT
+    turn = 4j * math.pi / SPEED_OF_LIGHT_MPS
     return complex(np.mean(samples_on_grid() * np.exp(-turn * x * band(0))[:, None] * np.exp(-turn * y * band(1))))
 
 
@@ -315,7 +315,7 @@ def test_16_is_14_of_15_and_its_print_has_neither_the_scale_nor_the_sign() -> No
     assert complex(got.evalf()) == pytest.approx(want, abs=1e-9)
     printed = 0j  # as printed: +j in the phase, no 1/(N_x·N_y)
     for (x, y), reflectivity in zip(TURNED, REFLECTIVITY, strict=True):
-        dx, dy, k = 0.32 - x, -0.06 - y, 2 * math.pi / SPEED_OF_LIGHT
+        dx, dy, k = 0.32 - x, -0.06 - y, 2 * math.pi / SPEED_OF_LIGHT_MPS
         turn = np.exp(1j * k * (dx * (2 * 1.8e10 + 5e8 - 1e8) - dy * 3e8 / 4))
         kernels = [math.sin(k * d * b) / math.sin(k * d * b / n) for d, b, n in ((dx, 5e8, 5), (dy, 3e8, 4))]
         printed += reflectivity * turn * kernels[0] * kernels[1]
@@ -367,15 +367,15 @@ def test_21_and_22_are_the_error_that_the_simulator_flies() -> None:
 
 def test_23_is_the_error_to_first_order_while_ranges_are_held() -> None:
     """−Σ r̃·r(τ)/R + c·t̃ in numbers, and at mid-aperture, where nothing is held, the exact one."""
-    numbers = platforms_in_numbers() | errors_in_numbers() | {c: SPEED_OF_LIGHT}
+    numbers = platforms_in_numbers() | errors_in_numbers() | {c: SPEED_OF_LIGHT_MPS}
     for time in (-3.0, 0.0, 2.5):
-        want = SPEED_OF_LIGHT * clock(time)
+        want = SPEED_OF_LIGHT_MPS * clock(time)
         for index in range(2):
             r, error = flown(time, index)
             want -= error @ r / STATES[index].slant_range
         assert value(right(23, 1), numbers | {tau: time}).real == pytest.approx(want, rel=1e-12)
         tracks = {Function("ttilde")(tau): clock(time)}
-        for index, symbols in enumerate(PLATFORMS):
+        for index, symbols in enumerate(PLATFORM_SYMBOLS):
             tracks |= dict(zip(dr.error_track(symbols), flown(time, index)[1], strict=True))
         assert value(right(23).subs(tracks), numbers | {tau: time}).real == pytest.approx(want, rel=1e-12)
     at_middle = value(right(23, 1), numbers | {tau: 0.0}).real
@@ -385,7 +385,7 @@ def test_23_is_the_error_to_first_order_while_ranges_are_held() -> None:
 
 def polynomial(numbers: dict[Expr, float]) -> dict[Expr, float]:
     """β̃₀ … β̃₃ of (23), in numbers."""
-    put_in = platforms_in_numbers() | errors_in_numbers() | {c: SPEED_OF_LIGHT}
+    put_in = platforms_in_numbers() | errors_in_numbers() | {c: SPEED_OF_LIGHT_MPS}
     terms = dr.coefficients(right(23, 1))
     return {Symbol(f"beta_{n}tilde", real=True): value(t, put_in).real for n, t in enumerate(terms)} | numbers
 
@@ -394,7 +394,9 @@ def test_24_is_the_range_of_a_point_and_the_error_together() -> None:
     place, time = np.array([40.0, -70.0, 0.0]), 2.5
     at_point = platforms_in_numbers() | dict(zip(point, place, strict=True))
     beta = {Symbol(f"beta_{n}", real=True): value(right(17, n + 1), at_point).real for n in range(2)}
-    error = value(right(23, 1), platforms_in_numbers() | errors_in_numbers() | {c: SPEED_OF_LIGHT, tau: time}).real
+    error = value(
+        right(23, 1), platforms_in_numbers() | errors_in_numbers() | {c: SPEED_OF_LIGHT_MPS, tau: time}
+    ).real
     got = value(right(24), polynomial(beta) | {tau: time}).real
     assert got == pytest.approx(held_range(place, time) + error, rel=1e-12)
 
@@ -414,7 +416,7 @@ def test_26_to_28_touch_the_range_error_at_the_middle_of_a_piece_and_the_print_d
     numbers, centre, width = polynomial({}), 2.0, 2.0
     numbers[paper.tau_i] = centre
     piece = {symbol: value(right(n), numbers).real for n, symbol in zip((27, 28), paper.piece, strict=True)}
-    put_in = platforms_in_numbers() | errors_in_numbers() | {c: SPEED_OF_LIGHT}
+    put_in = platforms_in_numbers() | errors_in_numbers() | {c: SPEED_OF_LIGHT_MPS}
     bend = [abs(numbers[Symbol(f"beta_{n}tilde", real=True)]) for n in (2, 3)]
     bound = bend[0] * (width / 2) ** 2 + bend[1] * (width / 2) ** 2 * (3 * centre + width / 2)
     for time in (centre - width / 2, centre, centre + width / 2):
@@ -446,7 +448,7 @@ def test_30_inverts_q_at_the_middle_of_the_aperture_and_of_a_piece() -> None:
         adjugate = np.array(right(30, parts[1]).subs(platforms_in_numbers() | {paper.tau_i: time}), dtype=float)
         assert adjugate / determinant == pytest.approx(np.linalg.inv(Q), rel=1e-9)
     angles = {}
-    for symbols, state in zip(PLATFORMS, STATES, strict=True):
+    for symbols, state in zip(PLATFORM_SYMBOLS, STATES, strict=True):
         angles[Function(f"phi_{symbols.subscript}")(paper.tau_i)] = state.azimuth
         angles[Function(f"theta_{symbols.subscript}")(paper.tau_i)] = state.elevation
     by_angles = np.array(right(30, 4).subs(angles).subs(platforms_in_numbers()), dtype=float)

@@ -9,10 +9,10 @@ from bisar_budget.image_plane import nodes
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import full, published
-from bisar_budget.theory.symbols import PLATFORMS, RECEIVER, TRANSMITTER, clock_coefficients, tau
+from bisar_budget.theory.symbols import PLATFORM_SYMBOLS, RECEIVER, TRANSMITTER, clock_coefficients, tau
 from tests.conftest import mission_text
 
-ERRORS = [error for platform in PLATFORMS for error in published.motion_errors(platform)]
+ERRORS = [error for platform in PLATFORM_SYMBOLS for error in published.motion_errors(platform)]
 
 
 @pytest.mark.parametrize("order", range(5))
@@ -39,9 +39,11 @@ def test_the_series_of_the_line_of_sight_is_its_derivative(order: int) -> None:
 def test_at_constant_range_the_coefficients_are_table_1(error, order: int) -> None:
     """With u for (r + vτ)/R, which is (17), every coefficient of every error is the printed one."""
     ours = published.single_error(full.range_error()[order], error)
-    for platform in PLATFORMS:
+    for platform in PLATFORM_SYMBOLS:
         held = (platform.position / platform.slant_range, platform.velocity / platform.slant_range)
-        for derivative, value in zip(platform.look, (*held, *[Matrix([0, 0, 0])] * (full.ORDER - 1)), strict=True):
+        for derivative, value in zip(
+            platform.look, (*held, *[Matrix([0, 0, 0])] * (full.SLOW_TIME_ORDER - 1)), strict=True
+        ):
             ours = ours.subs(dict(zip(derivative, value, strict=True)))
     printed = published.single_error(dr.coefficients(dr.range_error())[order], error)
     assert simplify(ours - printed) == 0
@@ -91,7 +93,7 @@ def test_a_monostatic_radar_at_broadside_loses_no_phase_to_the_displacement_of_a
 
     def put_in(expression):
         expression = expression.subs(alone).subs(both)
-        for platform in PLATFORMS:
+        for platform in PLATFORM_SYMBOLS:
             for symbols, values in zip(platform.look, looks, strict=True):
                 expression = expression.subs(dict(zip(symbols, values, strict=True)))
         return expression.subs(same).subs(broadside)
@@ -113,7 +115,7 @@ def test_displacement_phases_are_quadratic_and_cubic_terms_at_the_edge(order, ax
     """One metre of displacement, s⁽ⁿ⁾ of 1: a range of τⁿ/n!."""
     phase = {2: full.quadratic_phase, 3: full.cubic_phase}[order](full.displacement_coefficients())
     per_metre = published.sensitivity(phase, full.DISPLACEMENT[axis])
-    still = {symbol: 0 for platform in PLATFORMS for look in platform.look for symbol in look}
+    still = {symbol: 0 for platform in PLATFORM_SYMBOLS for look in platform.look for symbol in look}
     one = still | {TRANSMITTER.look[order][axis]: 1}
     assert simplify(per_metre.subs(one) - published.edge_phase(factor, order)) == 0
 

@@ -12,7 +12,7 @@ import pytest
 from sympy import lambdify
 
 from bisar_budget import evaluators
-from bisar_budget.constants import STANDARD_GRAVITY
+from bisar_budget.constants import STANDARD_GRAVITY_MPS2
 from bisar_budget.effects.spectra import (
     PowerLawPiece,
     gauss_markov,
@@ -141,11 +141,11 @@ def test_an_oscillator_leaves_what_is_beyond_the_cubic_and_no_more_than_the_cut(
 def test_walks_have_the_moments_of_their_covariance() -> None:
     """√(5/224) of a velocity walk, 0.02739 of an angle walk; 0.020 rms is left after the quadratic."""
     k = 2 * math.pi  # a wavelength of 1 m
-    rows = evaluators.inertial_phases(1.0, STANDARD_GRAVITY, 1.0, 1.0, 1.0)
+    rows = evaluators.inertial_phases(1.0, STANDARD_GRAVITY_MPS2, 1.0, 1.0, 1.0)
     velocity, angle = rows[4], rows[5]
     assert velocity[0] == pytest.approx(math.sqrt(5 / 224) * k, rel=1e-12)
     assert velocity[0] / k == pytest.approx(0.1494, abs=5e-5)
-    assert angle[0] == pytest.approx(0.02739 * k * STANDARD_GRAVITY, rel=2e-4)
+    assert angle[0] == pytest.approx(0.02739 * k * STANDARD_GRAVITY_MPS2, rel=2e-4)
     after_quadratic = math.hypot(velocity[2], velocity[1] * 2 / 5 / math.sqrt(7))
     assert after_quadratic / k == pytest.approx(0.020, abs=5e-4)
     assert velocity[1] * 2 / 5 / math.sqrt(7) > 0.7 * after_quadratic, "most of it is cubic"
@@ -163,13 +163,13 @@ def test_biases_are_the_taylor_terms() -> None:
 
 def test_figures_of_real_units_at_3_cm_and_6_s() -> None:
     """HG9900 0.23 rad by bias and 0.11 by velocity random walk, HG1700 9.2 and 0.15, STIM300 0.46 and 0.46."""
-    rows = evaluators.inertial_phases(1.0, STANDARD_GRAVITY, 1.0, 0.03, 6.0)
+    rows = evaluators.inertial_phases(1.0, STANDARD_GRAVITY_MPS2, 1.0, 0.03, 6.0)
     for bias_ug, walk, expected in (
         (25, 0.0143, (0.23, 0.11)),
         (1000, 0.0198, (9.2, 0.15)),
         (50, 0.06, (0.46, 0.46)),
     ):
-        assert bias_ug * 1e-6 * STANDARD_GRAVITY * rows[0][0] == pytest.approx(expected[0], rel=0.02)
+        assert bias_ug * 1e-6 * STANDARD_GRAVITY_MPS2 * rows[0][0] == pytest.approx(expected[0], rel=0.02)
         assert walk / 60 * rows[4][0] == pytest.approx(expected[1], rel=0.03)
 
 

@@ -7,12 +7,12 @@ import pytest
 from sympy import cos, sin
 
 from bisar_budget.theory import differential_range as dr
-from bisar_budget.theory.symbols import PLATFORMS
+from bisar_budget.theory.symbols import PLATFORM_SYMBOLS
 
 
 def test_31_is_the_printed_vector() -> None:
-    east = sum(sin(p.azimuth) * cos(p.elevation) for p in PLATFORMS)
-    north = -sum(cos(p.azimuth) * cos(p.elevation) for p in PLATFORMS)
+    east = sum(sin(p.azimuth) * cos(p.elevation) for p in PLATFORM_SYMBOLS)
+    north = -sum(cos(p.azimuth) * cos(p.elevation) for p in PLATFORM_SYMBOLS)
     smear = dr.smear_direction()
     assert (smear[0] - east).simplify() == 0
     assert (smear[1] - north).simplify() == 0
@@ -40,7 +40,7 @@ def test_a_range_rate_moves_the_image_along_31(velocities) -> None:
     slopes = np.stack([(value_and_rate(e) - value_and_rate(-e)) / 2 for e in np.eye(2)], axis=1)
     moved = np.linalg.solve(slopes, [0.0, 1e-3])
     numbers = {}
-    for platform, position, velocity in zip(PLATFORMS, POSITIONS, velocities, strict=True):
+    for platform, position, velocity in zip(PLATFORM_SYMBOLS, POSITIONS, velocities, strict=True):
         numbers |= dict(zip(platform.position, position, strict=True))
         numbers |= dict(zip(platform.velocity, velocity, strict=True))
         numbers[platform.slant_range] = math.dist(position, (0, 0, 0))

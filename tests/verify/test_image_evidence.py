@@ -9,7 +9,7 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.verdicts import rows_worth_showing
-from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, Verdict
+from bisar_budget.findings.images import CHIP_FLOOR_DB, ImageEvidence, Verdict
 from bisar_budget.findings.mission import Report
 from bisar_budget.front.checks import checked
 from bisar_budget.mission.load import load_mission, parse_mission
@@ -137,7 +137,9 @@ class TestChips:
                 assert abs(column - image.columns // 2) <= 1
         assert max(found.at_limit.chip) == 255
         # -4.04 dB at π; a sample of 2.5 to a cell may lie a fifth of a cell off the peak, half a dB.
-        assert max(found.before_autofocus.chip) == pytest.approx(255 * (1 - 4.04 / -FLOOR_DB), abs=0.6 * 255 / 40)
+        assert max(found.before_autofocus.chip) == pytest.approx(
+            255 * (1 - 4.04 / -CHIP_FLOOR_DB), abs=0.6 * 255 / 40
+        )
 
     def test_x_is_to_the_right_and_y_up(self) -> None:
         """One bright sample, three pixels along x′ and five along y′ from the middle."""

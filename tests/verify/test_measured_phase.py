@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.image_plane import nodes
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.ranges.exact_ranges import ExactEffect
@@ -15,7 +15,7 @@ from bisar_budget.simulator.collection import PointCollection
 from bisar_budget.simulator.phase_history import Errors, PathError, cell_centres, superposed
 from bisar_budget.verifier.aperture_reading import _distance, _squares, measured_shift, read_aperture
 from bisar_budget.verifier.limits import verify_mission
-from tests.conftest import mission_text
+from tests.conftest import examples, mission_text
 from tests.simulate.conftest import collection
 
 pytestmark = pytest.mark.extras
@@ -72,7 +72,7 @@ triple = st.tuples(component, component, component)
     clock=component,
     who=st.sampled_from(["transmitter", "receiver"]),
 )
-@settings(max_examples=15, deadline=None)
+@examples(15)
 def test_measured_phases_are_those_of_exact_ranges(
     squint, receiver_squint, velocity, acceleration, clock, who
 ) -> None:
@@ -128,7 +128,7 @@ def brute_force_phase(c: PointCollection, errors: Errors, order: int) -> float:
     def left(point, times):
         flown = c.flight(errors, times).paths
         legs = [np.linalg.norm(p.actual, axis=1) - np.linalg.norm(p.measured - [*point, 0.0], axis=1) for p in flown]
-        return sum(legs) + SPEED_OF_LIGHT * c.flight(errors, times).clock
+        return sum(legs) + SPEED_OF_LIGHT_MPS * c.flight(errors, times).clock
 
     place = cell_centres(2.0, 4001)
     times, point = half * place, np.zeros(2)

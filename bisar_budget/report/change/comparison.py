@@ -4,17 +4,19 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from bisar_budget.constants import GATING_MODELS, UTILIZATION_TOLERANCE
+from bisar_budget.constants import GATING_MODELS, UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission, Requirements, Waiver
 from bisar_budget.mission.parts import figure_text
+from bisar_budget.mission.readers import SectionValue
 from bisar_budget.report.change.fallen_effects import SUMS, fallen_effects
 from bisar_budget.report.change.lost_doubts import lost_doubts
 from bisar_budget.report.words.sentences import dotted, percent
@@ -80,9 +82,9 @@ def _set_values(mission: Mission) -> Iterator[tuple[KeyPath, str]]:
         yield changed.get(".".join(parts), parts), change.text
 
 
-def _value(mission: Mission, path: KeyPath) -> Any:
+def _value(mission: Mission, path: KeyPath) -> SectionValue:
     """The value at a path; None if the mission has no such attribute."""
-    value: Any = mission
+    value: SectionValue = mission
     for key in path:
         if isinstance(value, Mapping):
             value = value.get(key)
@@ -104,15 +106,15 @@ def moved_geometry(before: MissionFindings, after: MissionFindings) -> Iterator[
 def _numbers(findings: MissionFindings) -> Iterator[tuple[str, str, float | None]]:
     geometry = findings.geometry
     for name, state in (("transmitter", geometry.transmitter), ("receiver", geometry.receiver)):
-        yield f"{name} slant range", "m", state.slant_range
+        yield f"{name} slant range", "m", float(state.slant_range)
         yield f"{name} azimuth", "deg", math.degrees(state.azimuth)
         yield f"{name} elevation", "deg", math.degrees(state.elevation)
         yield f"{name} squint", "deg", None if state.squint is None else math.degrees(state.squint)
     yield "bistatic angle", "deg", math.degrees(geometry.bistatic_angle)
     yield "look azimuth", "deg", math.degrees(geometry.look_azimuth)
     yield "angle between range and Doppler gradients", "deg", math.degrees(geometry.gradient_angle)
-    yield "range resolution", "m", findings.resolution.range
-    yield "cross-range resolution", "m", findings.resolution.cross_range
+    yield "range resolution", "m", float(findings.resolution.range)
+    yield "cross-range resolution", "m", float(findings.resolution.cross_range)
 
 
 # ---------------------------------------------------------------------- loosened rules
@@ -122,7 +124,7 @@ _COMPUTED_KINDS = (
     "dispersion",
 )  # kinds of rows with a computed size, so that a zero is a result
 # Rules in the order of their strictness, the strictest last.
-_RULES = {"combine": ("each", "rss", "sum"), "model": GATING_MODELS}
+_RULES_BY_STRICTNESS = {"combine": ("each", "rss", "sum"), "model": GATING_MODELS}
 
 _WIDEST_FIRST = ("normal", "bound", "uniform")
 _NAMED_KINDS = ("other", "random")  # kinds of error that a file may state several times, each with a name
@@ -166,7 +168,7 @@ def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loos
     yield from _sources(before, after)
 
 
-def loosened_settings(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Loosened]:
+def loosened_settings(before: Mapping[str, object], after: Mapping[str, object]) -> Iterator[Loosened]:
     """Settings of a project that are looser than before: `strict` removed, or `exit-zero` added."""
     for key, strict_value in (("strict", True), ("exit-zero", False)):
         old, new = (values.get(key, False) for values in (before, after))
@@ -219,7 +221,7 @@ def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened
         yield from _shares(before, after)
     words = {"combine": (before.combine, after.combine), "model": (before.model, after.model)}
     for key, (old_rule, new_rule) in words.items():
-        if _RULES[key].index(new_rule) < _RULES[key].index(old_rule):
+        if _RULES_BY_STRICTNESS[key].index(new_rule) < _RULES_BY_STRICTNESS[key].index(old_rule):
             yield Loosened(f"allocation.{key}", old_rule, new_rule)
 
 
@@ -257,7 +259,7 @@ def _waived_rows(before: MissionFindings, after: MissionFindings) -> Iterator[Lo
     """Rows and requirements that are waived and were not."""
     named_ids = {waiver.id for waiver in _waivers(before.analysed().mission, after.analysed().mission)}
     for collection in ("rows", "requirements"):
-        old: Mapping[str, Any] = {item.id: item for item in getattr(before, collection)}
+        old: Mapping[str, Row | JudgedRequirement] = {item.id: item for item in getattr(before, collection)}
         for item in getattr(after, collection):
             old_status = old[item.id].status if item.id in old else "none"
             if item.status == "waived" != old_status and item.id not in named_ids:
@@ -375,7 +377,7 @@ class Change(NamedTuple):
         if before == after:
             return 0.0
         remaining = 1 - before
-        return (after - before) / remaining if remaining > UTILIZATION_TOLERANCE else after / before - 1
+        return (after - before) / remaining if remaining > UTILIZATION_TOLERANCE_FRACTION else after / before - 1
 
     @property
     def is_newly_failing(self) -> bool:
@@ -388,7 +390,7 @@ class Change(NamedTuple):
         if self.is_newly_failing:
             return _worse(_status(self.after))
         before, after = self.use
-        if 1 - before <= UTILIZATION_TOLERANCE:
+        if 1 - before <= UTILIZATION_TOLERANCE_FRACTION:
             return f"had used up its limit and uses more: {percent(before)} -> {percent(after)}"
         return f"uses up {percent(self.erosion)} of what was left of its limit"
 
@@ -412,7 +414,7 @@ class Change(NamedTuple):
         """
         is_judged = self.after is not None and STATUS[self.after.status].is_held
         is_judged = is_judged or _status(self.before) == _status(self.after) == "waived"
-        return self.is_newly_failing or (is_judged and self.erosion > tolerated + UTILIZATION_TOLERANCE)
+        return self.is_newly_failing or (is_judged and self.erosion > tolerated + UTILIZATION_TOLERANCE_FRACTION)
 
 
 class RequirementMove(NamedTuple):

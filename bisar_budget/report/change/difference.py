@@ -179,7 +179,15 @@ def _summary(mission: MissionChange, gate: Gate | None, all_rows: bool) -> str:
     return text
 
 
-_COLUMNS = ("row", "declared", "allowable", "use before", "use after", "erosion", "status")  # of a pull request
+_CHANGE_COLUMNS = (
+    "row",
+    "declared",
+    "allowable",
+    "use before",
+    "use after",
+    "erosion",
+    "status",
+)  # of a pull request
 
 
 def as_markdown(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False) -> str:
@@ -193,7 +201,7 @@ def as_markdown(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False
         lines += [""] if lines[-1] else []
         changes = _shown(mission, gate, all_rows)
         if changes:
-            lines += [markdown_row(_COLUMNS), markdown_row("---" for _ in _COLUMNS)]
+            lines += [markdown_row(_CHANGE_COLUMNS), markdown_row("---" for _ in _CHANGE_COLUMNS)]
         for change in changes:
             cells = (
                 markdown_text(change.id),

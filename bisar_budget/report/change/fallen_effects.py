@@ -15,7 +15,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.requirement import NAMES
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.mission.model import MetricSplits, Mission
 from bisar_budget.mission.paths import with_radial
@@ -26,9 +26,9 @@ from bisar_budget.report.change.names import plain, plain_file
 from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.units import format_quantity
 
-SUMS = (*NAMES, "autofocus_pull_in")  # kinds of rows that are no error
+SUMS = (*REQUIREMENT_NAMES, "autofocus_pull_in")  # kinds of rows that are no error
 _RESULTS = (*SUMS, "spatial_variance", "dispersion")  # kinds of rows that only other rows make
-_ROUNDING = 1e-6  # part by which the same error may use less of the same limit, as searches for limits settle
+_SIZE_TOLERANCE_FRACTION = 1e-6  # by which the same error may use less of the same limit, as searches settle
 _ANY_DAY = date(2000, 1, 1)  # waivers decide no use of a limit
 
 
@@ -81,25 +81,25 @@ def fallen_effects(before: MissionFindings, after: MissionFindings) -> Sequence[
     """
     mission = _held_alike(before, after)
     if mission is None:
-        held = after
+        rechecked = after
     elif misfits := [NotComparable(dotted(path), problem) for path, problem in _misfits(mission).items()]:
         return misfits
     else:
-        held = check_mission(mission, _ANY_DAY)
-    falls = list(_falls(_errors(before, held), _errors(held, before)))
+        rechecked = check_mission(mission, _ANY_DAY)
+    falls = list(_falls(_errors(before, rechecked), _errors(rechecked, before)))
     renamed = _named_anew(before, after)
     if falls:
         return [fall for fall in falls if fall.id not in renamed]
     # With `each` the row of a total is there only where no error fails alone.
     is_judged = before.combine != "each"
-    return [fall for fall in _falls(_sums(before), _sums(held)) if is_judged or fall.after is not None]
+    return [fall for fall in _falls(_sums(before), _sums(rechecked)) if is_judged or fall.after is not None]
 
 
 def _held_alike(before: MissionFindings, after: MissionFindings) -> Mission | None:
     """The later errors in the earlier collection; None where that is the later mission."""
-    old, new = (found.analysed().mission for found in (before, after))
+    old, new = (findings.analysed().mission for findings in (before, after))
     split = MetricSplits(before.allocation.qpe, before.allocation.pslr, before.allocation.islr)
-    held = new._replace(
+    mission = new._replace(
         radar=old.radar,
         collection=old.collection,
         requirements=old.requirements,
@@ -108,16 +108,16 @@ def _held_alike(before: MissionFindings, after: MissionFindings) -> Mission | No
         autofocus=new.autofocus._replace(n_pull=old.autofocus.n_pull),
     )
     if before.geometry != after.geometry:
-        places = old.scene._replace(radius=new.scene.radius, height_error=new.scene.height_error)
+        scene = old.scene._replace(radius=new.scene.radius, height_error=new.scene.height_error)
         flown = {
             name: _flown_before(getattr(old.platforms, name), getattr(new.platforms, name), new.scene.axes)
             for name in PLATFORMS
         }
-        held = held._replace(scene=places, platforms=old.platforms._replace(**flown))
-    is_same = held._replace(allocation=new.allocation, specifications=new.specifications) == new
-    if is_same and new.allocation == old.allocation and new.allocation.split == "equal":
+        mission = mission._replace(scene=scene, platforms=old.platforms._replace(**flown))
+    is_unchanged = mission._replace(allocation=new.allocation, specifications=new.specifications) == new
+    if is_unchanged and new.allocation == old.allocation and new.allocation.split == "equal":
         return None
-    return held
+    return mission
 
 
 def _flown_before(old: Platform, new: Platform, axes: SceneAxes | None) -> Platform:
@@ -131,27 +131,27 @@ def _flown_before(old: Platform, new: Platform, axes: SceneAxes | None) -> Platf
     return old._replace(motion_error=new.motion_error, oscillator=new.oscillator, path=path)
 
 
-def _misfits(held: Mission) -> dict[KeyPath, str]:
+def _misfits(mission: Mission) -> dict[KeyPath, str]:
     """Keys of errors that do not go with the collection that they are held to, and why."""
-    problems = [(problem.at, problem.problem) for problem in Mission.problems(held._asdict())]
-    for name, platform in held.platforms._asdict().items():
+    problems = [(problem.at, problem.problem) for problem in Mission.problems(mission._asdict())]
+    for name, platform in mission.platforms._asdict().items():
         problems += [
             (("platforms", name, *problem.at), problem.problem)
             for problem in platform.without_image(platform.motion_error)
         ]
-    T, common = held.collection.aperture_time, held.common_motion_error
-    wrong = [*without_image(held.platforms, held.radar, T, common, has_direct_path=held.has_direct_path)]
-    if held.propagation is not None:
-        wrong += too_low(held.propagation, held.platforms, T)
+    T, common = mission.collection.aperture_time, mission.common_motion_error
+    wrong = [*without_image(mission.platforms, mission.radar, T, common, has_direct_path=mission.has_direct_path)]
+    if mission.propagation is not None:
+        wrong += too_low(mission.propagation, mission.platforms, T)
     return dict(problems + [(problem.at, problem.problem) for problem in wrong])
 
 
-def _errors(found: MissionFindings, other: MissionFindings) -> list[Row]:
+def _errors(findings: MissionFindings, other: MissionFindings) -> list[Row]:
     """Rows of declared errors; motion along other axes than before by the axes of the scene, which both have."""
     ids = {row.id for row in other.rows}
-    elsewhere = {(row.owner, row.subject.kind) for row in found.rows if row.is_independent and row.id not in ids}
+    elsewhere = {(row.owner, row.subject.kind) for row in findings.rows if row.is_independent and row.id not in ids}
     rows = []
-    for row in found.rows:
+    for row in findings.rows:
         kind = row.subject.kind
         if row.declared is None or row.metric == SPECIFICATION or kind in _RESULTS:
             continue
@@ -162,8 +162,8 @@ def _errors(found: MissionFindings, other: MissionFindings) -> list[Row]:
     return rows
 
 
-def _sums(found: MissionFindings) -> list[Row]:
-    return [row for row in found.rows if row.subject.kind in _RESULTS and row.declared is not None]
+def _sums(findings: MissionFindings) -> list[Row]:
+    return [row for row in findings.rows if row.subject.kind in _RESULTS and row.declared is not None]
 
 
 def _falls(before: Sequence[Row], after: Sequence[Row]) -> Iterator[FallenEffect]:
@@ -196,7 +196,7 @@ def _is_less(before: Row, after: Row | None) -> bool:
         sizes = (before.utilization or 0.0, after.utilization or 0.0)
     elif before.unit != after.unit:
         return False
-    return sizes[0] - sizes[1] > _ROUNDING * abs(sizes[0])
+    return sizes[0] - sizes[1] > _SIZE_TOLERANCE_FRACTION * abs(sizes[0])
 
 
 def _family(row: Row) -> tuple[str, ...]:
@@ -219,7 +219,7 @@ def _named_anew(before: MissionFindings, after: MissionFindings) -> set[str]:
         for row in after.rows
         if row.id in old
         and (
-            not _is_known(_source(mission, row), old_mission, old[row.id])
+            not _is_named(_source(mission, row), old_mission, old[row.id])
             or not _parts(mission, row) <= _sensors(old_mission, row)
         )
     }
@@ -233,7 +233,7 @@ def _source(mission: Mission, row: Row) -> str:
     return plain_file(path and path.file)
 
 
-def _is_known(source: str, mission: Mission, row: Row) -> bool:
+def _is_named(source: str, mission: Mission, row: Row) -> bool:
     """Whether a mission names a source for a row, or for the whole of its section, or a part of that name."""
     if source in ("", _source(mission, row)):
         return True
@@ -243,8 +243,8 @@ def _is_known(source: str, mission: Mission, row: Row) -> bool:
     section = platform.oscillator if row.subject.kind == "oscillator" else platform.motion_error
     if section is None:
         return False
-    overridden = [plain(one.part) for one in section.overridden]
-    return source == plain(section.source) or any(source.startswith(part) for part in overridden if part)
+    overridden = [plain(override.part) for override in section.overridden]
+    return source == plain(section.source) or any(source.startswith(name) for name in overridden if name)
 
 
 def _parts(mission: Mission, row: Row) -> set[str]:
@@ -263,5 +263,5 @@ def _sensors(mission: Mission, row: Row) -> set[str]:
         return set()
     platform: Platform = getattr(mission.platforms, row.owner)
     named = [platform.motion_error.sensor, platform.oscillator and platform.oscillator.sensor]
-    listed = [name for one in named if one for name in ((one,) if isinstance(one, str) else one)]
+    listed = [name for entry in named if entry for name in ((entry,) if isinstance(entry, str) else entry)]
     return {plain_file(name) for name in listed}

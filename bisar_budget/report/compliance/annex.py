@@ -4,11 +4,10 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from shlex import quote
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bisar_budget.arrays import NumbersOrWords
 from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.effects.effect import MOTION_UNITS
 from bisar_budget.faults import changes_words, printable
@@ -198,7 +197,7 @@ def _stretches(trade: Trade) -> Iterator[tuple[doc.Line, str]]:
         yield (value_range, badge, name, use), text
 
 
-def _uses(uses: NDArray[Any]) -> str:
+def _uses(uses: NumbersOrWords) -> str:
     """Range of the finite utilizations, from the lowest to the highest."""
     finite_uses = sorted(float(use) for use in uses if math.isfinite(use))
     if not finite_uses:
@@ -209,7 +208,7 @@ def _uses(uses: NDArray[Any]) -> str:
 
 def _binding_lines(trade: Trade, by_word: Mapping[str, Trade]) -> Iterator[tuple[doc.Line, str]]:
     """Lines of a sweep along two axes, each with its sentence: cases by word, or by worst row, most cases first."""
-    cases: dict[str, Mapping[str, NDArray[Any]]] = {printable(word): each.values for word, each in by_word.items()}
+    cases: dict[str, Mapping[str, NumbersOrWords]] = {printable(word): each.values for word, each in by_word.items()}
     if not by_word:
         values = {name: trade.values[name].ravel() for name in ("status", "worst_row", "utilization")}
         rows = values["worst_row"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.effects.declared import END_OF_IMAGE
-from bisar_budget.effects.effect import MOTION_UNITS, Subject
+from bisar_budget.effects.effect import MOTION_UNITS, Subject, plain
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row, worst_first
 from bisar_budget.findings.status import STATUS
@@ -267,7 +267,7 @@ def phase_contributions(page: Page) -> list[Contribution]:
     by_model: dict[str, dict[str, float]] = {}
     for model in ("published", "full"):
         phases = page.analysis.together(model).phases
-        by_model[model] = {phase.row_id: float(phase.judged(1.0)[0]) for phase in phases}
+        by_model[model] = {phase.row_id: plain(phase.judged(1.0)) for phase in phases}
     subjects = {row.id: row.subject for row in page.findings.rows}
     gating = [name for name in by_model if page.findings.model in (name, "strictest")]
     sizes = {row_id: max(by_model[name][row_id] for name in gating) for row_id in by_model["full"]}

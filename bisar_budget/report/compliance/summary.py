@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 from hashlib import sha256
 
 from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.effect import MOTION_UNITS
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
-from bisar_budget.findings.requirement import NAMES
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Document
@@ -64,7 +64,7 @@ _NOTHING_JUDGED = "Nothing was judged"
 _EACH_ALONE = "; each error alone"
 _WITH_CHANGES = "; with values set by options"
 _MAX_DRIVER_ROWS = 3
-_DISTRIBUTIONS = {
+_DISTRIBUTION_WORDS = {
     "normal": "one-sigma values",
     "uniform": "uniform within the values given",
     "bound": "values that are not exceeded",
@@ -84,7 +84,7 @@ _VALIDITY = {
         "(exact ranges). Each row has the stricter verdict."
     ),
 }
-_RULES = {
+_COMBINATION_SENTENCES = {
     "each": "each error alone is limited by its share of the budget",
     "sum": "the worst-case sum of a platform's errors is limited by its share",
     "rss": "the errors of a platform are independent; their root-sum-square is limited by its share",
@@ -493,8 +493,8 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
         for kind, file in path.beside.items():
             if file is not None:
                 yield f"{_PATH_FILE_NAMES[kind]} of the {name}’s path", "{}, SHA-256 {}".format(*file)
-    yield "Combination", _RULES[findings.combine]
-    yield "Phases", f"at the centre frequency, c = {SPEED_OF_LIGHT / 1e3:.3f} km/s; at the aperture edge, ±T/2"
+    yield "Combination", _COMBINATION_SENTENCES[findings.combine]
+    yield "Phases", f"at the centre frequency, c = {SPEED_OF_LIGHT_MPS / 1e3:.3f} km/s; at the aperture edge, ±T/2"
     factor = (
         f"{findings.coverage_factor:g} times the file’s value"
         if findings.coverage_factor != 1
@@ -504,12 +504,12 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
     for name in ("transmitter", "receiver"):
         error = getattr(mission.platforms, name).motion_error
         if any(error.stated(kind) for kind in MOTION_UNITS):
-            text = _DISTRIBUTIONS[error.distribution]
+            text = _DISTRIBUTION_WORDS[error.distribution]
             text += ", position and velocity by their covariance" if error.covariance is not None else ""
             yield f"Errors of the {name}", f"along the axes of the frame “{error.frame}”; {text}"
     common = mission.common_motion_error
     if common is not None:
-        text = _DISTRIBUTIONS[common.distribution]
+        text = _DISTRIBUTION_WORDS[common.distribution]
         frame = (
             "along the axes of the scene"
             if common.frame == "scene"
@@ -595,7 +595,7 @@ def _inputs(page: Page) -> Iterator[tuple[str, str, str]]:
         "aperture time", format_quantity(mission.collection.aperture_time, "s", 6), ("collection", "aperture_time")
     )
     judged = {requirement.key: requirement for requirement in findings.requirements}
-    for key, name in NAMES.items():
+    for key, name in REQUIREMENT_NAMES.items():
         if key == "declare":
             continue
         if key not in judged:

@@ -5,7 +5,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
+from bisar_budget.findings.images import CHIP_FLOOR_DB, ImageEvidence, PointImage, Verdict
 from bisar_budget.report.drawing import svg
 from bisar_budget.units import format_limit, format_quantity
 
@@ -95,7 +95,7 @@ def chip_caption(image: PointImage) -> str:
     along, across = (format_quantity(side, "m") for side in image.extent_m)
     return (
         f"{along} along x′ (look, to the right) by {across} along y′ (cross-range, up); "
-        f"{svg.axis_number(FLOOR_DB)} dB (black) to 0 dB (white) of the peak without error"
+        f"{svg.axis_number(CHIP_FLOOR_DB)} dB (black) to 0 dB (white) of the peak without error"
     )
 
 
@@ -139,7 +139,7 @@ def cut_panel(
     frame = svg.Box(_CUTS_LEFT_PX, top + _CUTS_TITLE_PX, width - _CUTS_EDGE_PX, top + _CUTS_TITLE_PX + height)
     positions = [position for curve in curves for position in curve.positions]
     across = svg.Scale(min(positions), max(positions), frame.left, frame.right)
-    up = svg.Scale(FLOOR_DB, max(0.0, *(max(curve.levels_db) for curve in curves)), frame.bottom, frame.top)
+    up = svg.Scale(CHIP_FLOOR_DB, max(0.0, *(max(curve.levels_db) for curve in curves)), frame.bottom, frame.top)
     canvas.text((frame.left, top + 14), [title], "small")
     svg.outline(canvas, frame, "grid")
     svg.grid(canvas, frame, across, up)

@@ -4,13 +4,19 @@ import os
 import re
 from collections.abc import Mapping
 from io import BytesIO
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.path import Path
+
 
 _POINTS_PER_PIXEL, _PIXELS_PER_INCH = 0.75, 96.0  # pixels of an SVG drawing
 
 
-def new_figure(**settings: Any) -> Any:
+def new_figure(**settings: Any) -> "Figure":
     """A Matplotlib figure that does not depend on a user's matplotlibrc and MPLBACKEND."""
     os.environ.pop("MPLBACKEND", None)  # an unknown name would make the import of Matplotlib fail
     import logging
@@ -24,7 +30,7 @@ def new_figure(**settings: Any) -> Any:
     return Figure(**{"layout": "constrained", **settings})
 
 
-def figure_file(figure: Any, kind: str, dpi: int = 110) -> bytes:
+def figure_file(figure: "Figure", kind: str, dpi: int = 110) -> bytes:
     """Content of a `png`, `svg` or `pdf` file of a figure. The same input gives the same bytes."""
     undated = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
     file = BytesIO()
@@ -43,7 +49,7 @@ def drawing_file(svg: str, kind: str, dpi: int = 192) -> bytes:
     return figure_file(page, kind, dpi)
 
 
-def paint(panel: Any, drawing: ElementTree.Element) -> None:
+def paint(panel: "Axes", drawing: ElementTree.Element) -> None:
     """Paint the elements of a drawing of `svg.Canvas` on Matplotlib axes with the size of the drawing."""
     from matplotlib.patches import Circle, PathPatch
     from matplotlib.patheffects import withStroke
@@ -118,11 +124,11 @@ def _style(rules: list[tuple[str, Mapping[str, str]]], element: ElementTree.Elem
     return style
 
 
-def _colour(name: str, opacity: str | None) -> Any:
+def _colour(name: str, opacity: str | None) -> tuple[str, float] | str:
     return (name, float(opacity or 1)) if name != "none" else "none"
 
 
-def _path(data: str) -> Any:
+def _path(data: str) -> "Path":
     """Matplotlib path of a path of `svg.Canvas`, which has absolute commands M, L, H, V and Z."""
     from matplotlib.path import Path
 

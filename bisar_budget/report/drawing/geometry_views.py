@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, norm
+from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, Vectors, norm, plain_vector
 from bisar_budget.report.drawing import svg
 from bisar_budget.units import format_quantity
 
@@ -28,7 +28,7 @@ _VELOCITY_PX, _LOOK_PX, _SMEAR_PX = 44.0, 62.0, 40.0  # lengths of arrows
 _END_ON_RATIO = 0.3  # component of a velocity in the plane of the drawing, below which its arrow is drawn end on
 _MIN_PATH_PX = 20.0  # shorter paths are hidden by marker and arrow
 _NOTE_CHARACTERS = 88
-_SCENE: PlanePoint = (0.0, 0.0)
+_SCENE_CENTRE: PlanePoint = (0.0, 0.0)
 _PATH_STEPS, _STEPS_PER_PIECE = 32, 4
 _ENLARGEMENT_HEIGHT_RATIO = 0.75  # largest height of an enlargement over the largest height of the main panel
 # Smallest and largest height of a panel, and its margins around the points: left and right, above, below. [px]
@@ -56,7 +56,7 @@ class _Platform(NamedTuple):
     @property
     def motion(self) -> str:
         """Speed in words."""
-        return "fixed" if self.is_still else format_quantity(norm(self.state.velocity), "m/s")
+        return "fixed" if self.is_still else format_quantity(float(norm(self.state.velocity)), "m/s")
 
 
 class _View(NamedTuple):
@@ -78,7 +78,7 @@ def geometry_plan(findings: MissionFindings) -> str:
         _seen(name, state, findings, lambda vector: (vector[0], vector[1]), _direction(state.velocity)[2])
         for name, state in _named(findings.geometry)
     ]
-    look = findings.geometry.look_azimuth
+    look = float(findings.geometry.look_azimuth)
     description = (
         f"Plan view to scale, east to the right and north up, scene centre at the origin. "
         f"{' '.join(_in_words(name, state) for name, state in _named(findings.geometry))} "
@@ -125,17 +125,18 @@ def _flown(state: PlatformState, aperture_time: float) -> tuple[Vector, ...]:
     if state.curve is not None:
         steps = max(steps, _STEPS_PER_PIECE * state.curve.count)
     times = (aperture_time * (index / steps - 0.5) for index in range(steps + 1))
-    return tuple(state.at(time)[0] for time in times)
+    return tuple(plain_vector(state.at(time)[0]) for time in times)
 
 
-def _direction(velocity: Vector) -> Vector:
-    speed = norm(velocity)
-    return (velocity[0] / speed, velocity[1] / speed, velocity[2] / speed) if speed else velocity
+def _direction(velocity: Vectors) -> Vector:
+    x, y, z = plain_vector(velocity)
+    speed = norm((x, y, z))
+    return (x / speed, y / speed, z / speed) if speed else (x, y, z)
 
 
 def _planes_apart(geometry: BistaticGeometry) -> float:
     """Angle between the vertical planes through the platforms, 0 to π. [rad]"""
-    turn: float = geometry.receiver.azimuth - geometry.transmitter.azimuth
+    turn = float(geometry.receiver.azimuth - geometry.transmitter.azimuth)
     return abs((turn + math.pi) % (2 * math.pi) - math.pi)
 
 
@@ -146,7 +147,7 @@ def _is_on_other_side(geometry: BistaticGeometry, turned: float) -> bool:
     pair = geometry.transmitter, geometry.receiver
     in_drawing = math.dist(*((math.hypot(*p.position[:2]), p.position[2]) for p in pair))
     in_space = math.dist(*(p.position for p in pair))
-    widest: float = max(p.slant_range for p in pair)
+    widest = max(float(p.slant_range) for p in pair)
     return in_drawing < 0.08 * widest < in_space
 
 
@@ -163,7 +164,9 @@ def _seen(
 ) -> _Platform:
     """A platform in the plane on which `projected` projects."""
     path = tuple(map(projected, _flown(state, findings.aperture_time)))
-    return _Platform(name, state, projected(state.position), projected(_direction(state.velocity)), toward, path)
+    return _Platform(
+        name, state, projected(plain_vector(state.position)), projected(_direction(state.velocity)), toward, path
+    )
 
 
 def _in_own_plane(name: str, state: PlatformState, side: float, findings: MissionFindings) -> _Platform:
@@ -182,25 +185,26 @@ def _in_own_plane(name: str, state: PlatformState, side: float, findings: Missio
 
 
 def _in_words(name: str, state: PlatformState) -> str:
-    east, north = state.position[:2]
-    if norm(state.velocity) == 0:
+    east, north, _ = plain_vector(state.position)
+    speed = float(norm(state.velocity))
+    if speed == 0:
         motion = "it is fixed"
-    elif math.hypot(*state.velocity[:2]) < 1e-6 * norm(state.velocity):
-        motion = f"it moves vertically at {format_quantity(norm(state.velocity), 'm/s')}"
+    elif math.hypot(*state.velocity[:2]) < 1e-6 * speed:
+        motion = f"it moves vertically at {format_quantity(speed, 'm/s')}"
     else:
         azimuth = math.atan2(state.velocity[1], state.velocity[0])
-        motion = f"it moves at {format_quantity(norm(state.velocity), 'm/s')} towards {_degrees(azimuth)} from east"
+        motion = f"it moves at {format_quantity(speed, 'm/s')} towards {_degrees(azimuth)} from east"
     return (
         f"The {name} is {_compass(east, 'east', 'west')} and {_compass(north, 'north', 'south')} of the scene "
-        f"centre, slant range {format_quantity(state.slant_range, 'm')}; {motion}."
+        f"centre, slant range {format_quantity(float(state.slant_range), 'm')}; {motion}."
     )
 
 
 def _side_in_words(name: str, state: PlatformState) -> str:
     return (
-        f"The {name} is {format_quantity(state.position[2], 'm')} high at a ground distance of "
+        f"The {name} is {format_quantity(float(state.position[2]), 'm')} high at a ground distance of "
         f"{format_quantity(math.hypot(*state.position[:2]), 'm')}: slant range "
-        f"{format_quantity(state.slant_range, 'm')}, elevation {_degrees(state.elevation)}."
+        f"{format_quantity(float(state.slant_range), 'm')}, elevation {_degrees(float(state.elevation))}."
     )
 
 
@@ -251,9 +255,9 @@ def _drawing(view: _View, kind: str, side: str, description: str, note: str = ""
 
 def _main_panel(view: _View) -> _Panel:
     """Panel with the platforms and the scene. A scene far larger than the collection is clipped."""
-    points = [_SCENE, *(p.at for p in view.platforms), *(point for p in view.platforms for point in p.path)]
+    points = [_SCENE_CENTRE, *(p.at for p in view.platforms), *(point for p in view.platforms for point in p.path)]
     if view.radius <= 2 * max(math.hypot(*point) for point in points):
-        points += _extent(view, _SCENE, view.radius)
+        points += _extent(view, _SCENE_CENTRE, view.radius)
     return _fitted(view, points, _VIEW_EDGE_PX)
 
 
@@ -268,17 +272,17 @@ def _enlargement(view: _View, main: _Panel) -> _Panel | None:
     separation = math.dist(first.state.position, second.state.position)
     if platforms_at_scene := _platforms_at_scene(view, main):
         reach = max(p.state.slant_range for p in platforms_at_scene)
-        points = [_SCENE, *(place for p in platforms_at_scene for place in (p.at, *p.path))]
-        points += _extent(view, _SCENE, view.radius if view.radius <= 2 * reach else 0.0)
+        points = [_SCENE_CENTRE, *(place for p in platforms_at_scene for place in (p.at, *p.path))]
+        points += _extent(view, _SCENE_CENTRE, view.radius if view.radius <= 2 * reach else 0.0)
     elif _COINCIDENT_PX < separation * main.scale < _ENLARGED_PX and _pixels_apart(main, first, second) < _SPOT_PX:
         reach = separation
         points = [first.at, second.at]
     else:
         return None
     east, north = ((min(values) + max(values)) / 2 for values in zip(*points, strict=True))
-    middle = _SCENE if platforms_at_scene else (east, north)
+    middle = _SCENE_CENTRE if platforms_at_scene else (east, north)
     panel = _fitted(
-        view, [*points, *_extent(view, middle, _MIN_SPREAD_RATIO * reach)], top, _ENLARGEMENT_HEIGHT_RATIO
+        view, [*points, *_extent(view, middle, float(_MIN_SPREAD_RATIO * reach))], top, _ENLARGEMENT_HEIGHT_RATIO
     )
     is_still_one_spot = not platforms_at_scene and _pixels_apart(panel, first, second) < _SPOT_PX
     return None if is_still_one_spot or panel.scale < _MIN_ENLARGEMENT_RATIO * main.scale else panel
@@ -363,7 +367,7 @@ def _outline(canvas: svg.Canvas, panel: _Panel) -> None:
 
 def _draw_panel(canvas: svg.Canvas, panel: _Panel, view: _View, is_detail: bool, enlarged: _Panel | None) -> None:
     """Draw lines, then markers, then labels, which are placed in the remaining space."""
-    frame, scene = panel.frame, panel.pixel(_SCENE)
+    frame, scene = panel.frame, panel.pixel(_SCENE_CENTRE)
     if view.is_plan:
         if view.radius * panel.scale >= 3:
             radius = view.radius * panel.scale
@@ -403,7 +407,7 @@ def _labels(
     panel: _Panel, view: _View, visible: Sequence[_Platform], has_scene: bool, enlarged: _Panel | None
 ) -> Iterator[svg.DrawnLabel]:
     """Labels of platforms and scene. Objects on one spot share a label."""
-    frame, scene = panel.frame, panel.pixel(_SCENE)
+    frame, scene = panel.frame, panel.pixel(_SCENE_CENTRE)
     # From the side, labels of platforms are above the ground.
     above = frame if view.is_plan else frame._replace(bottom=min(frame.bottom, scene[1]))
     at_scene = [p for p in visible if has_scene and math.dist(panel.pixel(p.at), scene) < _SPOT_PX]
@@ -436,13 +440,13 @@ def _labels(
 
 
 def _range(view: _View, platform: _Platform) -> str:
-    slant = format_quantity(platform.state.slant_range, "m")
-    return slant if view.is_plan else f"{slant} at {_degrees(platform.state.elevation)}"
+    slant = format_quantity(float(platform.state.slant_range), "m")
+    return slant if view.is_plan else f"{slant} at {_degrees(float(platform.state.elevation))}"
 
 
 def _directions(canvas: svg.Canvas, panel: _Panel, view: _View) -> Iterator[svg.DrawnLabel]:
     """Draw φ_b of (11), and perpendicular to it the line along which errors smear, (31)."""
-    scene, look = panel.pixel(_SCENE), view.findings.geometry.look_azimuth
+    scene, look = panel.pixel(_SCENE_CENTRE), float(view.findings.geometry.look_azimuth)
     tip = _turned(scene, _LOOK_PX, look)
     ends = [_turned(scene, sign * _SMEAR_PX, look + math.pi / 2) for sign in (-1, 1)]
     canvas.arrow(scene, tip)
@@ -457,7 +461,7 @@ def _turned(origin: svg.Point, length: float, azimuth: float) -> svg.Point:
 
 def _arc(canvas: svg.Canvas, panel: _Panel, platform: _Platform, radius: float) -> None:
     """Draw the elevation angle at the scene as an arc."""
-    scene = panel.pixel(_SCENE)
+    scene = panel.pixel(_SCENE_CENTRE)
     end = math.atan2(platform.at[1], platform.at[0])
     start = 0.0 if end <= math.pi / 2 else math.pi
     steps = [start + (end - start) * index / 16 for index in range(17)]

@@ -7,7 +7,7 @@ rotated about the same centre. A response is at its displaced position, not at t
 import math
 from collections.abc import Callable, Sequence
 from io import BytesIO
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -24,7 +24,13 @@ from bisar_budget.simulator.phase_history import Complexes, Floats
 from bisar_budget.simulator.point import PointImages
 from bisar_budget.simulator.realisations import has_unset_clocks
 
-FLOOR_DB = -35.0
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+    from matplotlib.figure import Figure
+
+
+PICTURE_FLOOR_DB = -35.0
 _FINE_FACTOR, _CUT_FACTOR = 4, 8  # largest interpolation of a picture, and that of a cut, to resolve a mainlobe
 _MAX_PICTURE_PIXELS = 3e5
 _DRAWN_DB = -20.0  # level above which pixels are within the pictures
@@ -224,7 +230,11 @@ def drawn(images: PointImages, title: str, kind: str) -> bytes:
     return figure_file(figure(sheet(images), title), kind)
 
 
-def figure(drawn: Sheet, title: str) -> Any:
+MarkStyle = dict[str, Any]
+"""Arguments of Matplotlib for a mark."""
+
+
+def figure(drawn: Sheet, title: str) -> "Figure":
     """Lay all panels on one Matplotlib figure."""
     page = new_figure(figsize=(16.5, 8))
     panels = page.subplots(2, 4)
@@ -397,7 +407,7 @@ def _peak_and_width(response: ImpulseResponse | None, clean: ImpulseResponse | N
     return f"{20 * math.log10(response.peak / clean.peak):>+7.2f} {response.irw_m:>6.3f}"
 
 
-def _range_error(panel: Any, drawn: Sheet) -> None:
+def _range_error(panel: "Axes", drawn: Sheet) -> None:
     panel.plot(drawn.slow_time, drawn.range_error_mm, color="black")
     for segment in drawn.segments:
         panel.plot(*segment.T, "--", color=_MARK_COLOR)
@@ -405,7 +415,7 @@ def _range_error(panel: Any, drawn: Sheet) -> None:
     panel.grid(color=_GRID_COLOR, lw=0.5)
 
 
-def _points(panel: Any, drawn: Sheet) -> None:
+def _points(panel: "Axes", drawn: Sheet) -> None:
     panel.plot(*drawn.points.T, "o-", color=_MARK_COLOR, zorder=3)
     panel.plot(0, 0, **_target_mark("#1b7fa3"))
     panel.plot(*drawn.points[1], **_prediction_mark("#2a8f4f"))
@@ -422,13 +432,13 @@ def _points(panel: Any, drawn: Sheet) -> None:
     panel.grid(color=_GRID_COLOR, lw=0.5)
 
 
-def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any:
+def _image(panel: "Axes", picture: ImagePanel, *, with_points: bool = False) -> "QuadMesh":
     """Draw an image. Each pixel is drawn between its corners, since the pixels follow lines of equal range."""
     mesh = panel.pcolormesh(
         picture.corners[..., 0],
         picture.corners[..., 1],
         picture.level_db,
-        vmin=FLOOR_DB,
+        vmin=PICTURE_FLOOR_DB,
         vmax=0,
         cmap="magma",
         shading="flat",
@@ -455,7 +465,7 @@ def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any
     return mesh
 
 
-def _target_mark(color: str) -> dict[str, Any]:
+def _target_mark(color: str) -> MarkStyle:
     """Mark of the position of a target: a cross with a free middle."""
     from matplotlib.path import Path
 
@@ -464,12 +474,12 @@ def _target_mark(color: str) -> dict[str, Any]:
     return {"ls": "none", "marker": cross, "color": color, "ms": 17, "mew": 1.5, "mfc": "none"}
 
 
-def _prediction_mark(color: str) -> dict[str, Any]:
+def _prediction_mark(color: str) -> MarkStyle:
     """Mark of the image point of a target by (25): a circle."""
     return {"ls": "none", "marker": "o", "color": color, "ms": 12, "mfc": "none", "mew": 1.2}
 
 
-def _peak_mark(color: str) -> dict[str, Any]:
+def _peak_mark(color: str) -> MarkStyle:
     """Mark of a peak of an image: a square."""
     return {"ls": "none", "marker": "s", "color": color, "ms": 12, "mfc": "none", "mew": 1.2}
 
@@ -478,7 +488,7 @@ def _is_within(point: Floats, limits: Limits) -> bool:
     return bool(limits[0] <= point[0] <= limits[1] and limits[2] <= point[1] <= limits[3])
 
 
-def _point_to(panel: Any, point: Floats, middle: Floats, color: str) -> None:
+def _point_to(panel: "Axes", point: Floats, middle: Floats, color: str) -> None:
     """Write the distance of a target outside the panel, with an arrow in its direction."""
     away = point - middle
     distance = float(np.hypot(*away))
@@ -498,11 +508,11 @@ def _cuts_drawing(drawn: Sheet) -> str:
     return canvas.document((_CUT_SIZE_PX[0], bottom + 4), "cuts", "Cross-range cuts", "Power along y′.")
 
 
-def _cuts(panel: Any, drawn: Sheet) -> None:
+def _cuts(panel: "Axes", drawn: Sheet) -> None:
     paint(panel, ElementTree.fromstring(_cuts_drawing(drawn)))
 
 
-PANELS: dict[str, Callable[[Any, Sheet], Any]] = {
+PANELS: dict[str, Callable[["Axes", Sheet], Any]] = {
     "fig3": _range_error,
     "fig4": _points,
     "fig5": lambda panel, drawn: _image(panel, drawn.in_scene, with_points=True),

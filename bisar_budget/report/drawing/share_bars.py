@@ -1,7 +1,7 @@
 """Shares of errors in the limit of each row, as stacked bars. Errors have their numbers from the sheet."""
 
 from bisar_budget.faults import printable
-from bisar_budget.findings.requirement import NAMES
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.specification import RowUse, SpecificationSheet
 from bisar_budget.report.drawing import svg
 from bisar_budget.report.words.sentences import percent
@@ -25,7 +25,7 @@ _SHARES_STYLE = (
 def limiting(sheet: SpecificationSheet) -> list[RowUse]:
     """Rows that limit a specification, in the order of their requirements."""
     rows = [row for row in sheet.rows if row.multiplier > LEAST_WEIGHT_FRACTION]
-    order = [*NAMES, None]
+    order = [*REQUIREMENT_NAMES, None]
     return sorted(rows, key=lambda row: order.index(row.requirement))
 
 

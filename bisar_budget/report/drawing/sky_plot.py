@@ -11,7 +11,7 @@ from datetime import timedelta
 from bisar_budget.design.passes import Passes, SatellitePass, bearing
 from bisar_budget.faults import printable
 from bisar_budget.findings.status import RANK
-from bisar_budget.paths.instant import DAY, Instant
+from bisar_budget.paths.instant import DAY_S, Instant
 from bisar_budget.report.drawing import svg
 
 _SKY_WIDTH_PX = 900.0
@@ -116,7 +116,7 @@ def _sky(canvas: svg.Canvas, middle: svg.Point, passes: Passes) -> None:
         if overpass.state is None:
             marks.append(track[len(track) // 2])
             continue
-        marks.append(_at(middle, overpass.state.azimuth, overpass.state.elevation))
+        marks.append(_at(middle, float(overpass.state.azimuth), float(overpass.state.elevation)))
         canvas.circle(marks[-1], 4, f"dot is-{overpass.status}")
     _numbers(
         canvas,
@@ -212,6 +212,6 @@ def _dates(start: Instant, span: float, width: float) -> Iterator[tuple[float, s
     time = first * step - start.seconds
     while time <= span * (1 + 1e-9):
         moment = start.after(time).as_datetime() + timedelta(milliseconds=1)
-        is_midnight = abs((start.seconds + time) % DAY) < 1e-3 or hours >= 24
+        is_midnight = abs((start.seconds + time) % DAY_S) < 1e-3 or hours >= 24
         yield time, moment.strftime("%m-%d") if is_midnight else moment.strftime("%H:%M")
         time += step

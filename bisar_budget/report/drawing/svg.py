@@ -27,7 +27,7 @@ Mark = TypeVar("Mark")
 FONT_PX = 12.0
 LINE_PX = 14.5  # from a line of text to the next
 _DARK = "--ink:#e6e6e6;--muted:#a9adb3;--grid:#3a3f46;--paper:#16191d;--transmitter:#7db4f2;--receiver:#f0a06a"
-STYLE = (
+DRAWING_STYLE = (
     "svg.drawing{max-width:100%;height:auto;font:12px system-ui,'Segoe UI',Roboto,'DejaVu Sans',sans-serif}"
     "svg.drawing text{fill:var(--ink,#222);paint-order:stroke}"
     "svg.drawing text{stroke:var(--paper,#fff);stroke-width:3px;stroke-linejoin:round}"
@@ -286,7 +286,7 @@ class Canvas:
     def document(self, size: tuple[float, float], key: str, title: str, description: str, style: str = "") -> str:
         """The drawing as SVG, with a title and a description for readers who cannot see it.
 
-        `style` are CSS rules of this kind of drawing, in addition to `STYLE`.
+        `style` are CSS rules of this kind of drawing, in addition to `DRAWING_STYLE`.
         """
         name = "d" + sha256(key.encode("utf-8", "surrogatepass")).hexdigest()[:10]
         width, height = (_number(side) for side in size)
@@ -296,7 +296,7 @@ class Canvas:
             f'width="{width}" height="{height}" aria-labelledby="{name}-title" aria-describedby="{name}-desc">\n'
             f'<title id="{name}-title">{xml_text(title)}</title>\n'
             f'<desc id="{name}-desc">{xml_text(description)}</desc>\n'
-            f"<style>{STYLE}{style}</style>\n{body}\n</svg>\n"
+            f"<style>{DRAWING_STYLE}{style}</style>\n{body}\n</svg>\n"
         )
 
 
@@ -380,7 +380,7 @@ def _number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
-_MIN_STEP = 1e-9  # smallest step of an axis, if all values are equal
+_MIN_AXIS_STEP_SIZE = 1e-9  # smallest step of an axis, if all values are equal
 _NUMBER_ROOM_PX = {"x": 46.0, "y": 26.0}  # space for a number at an axis
 _LEGEND_INDENT_PX = 18.0
 _LEGEND_CHARACTERS = 76  # of a line of a legend
@@ -400,7 +400,7 @@ def ticks(lower: float, upper: float, step: float) -> Sequence[float]:
 
 def round_step(least: float) -> float:
     """Smallest number of the form 1, 2 or 5 times a power of ten that is not below a value."""
-    least = max(least, _MIN_STEP)
+    least = max(least, _MIN_AXIS_STEP_SIZE)
     power = 10.0 ** math.floor(math.log10(least))
     return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9))
 

@@ -3,12 +3,12 @@
 All bars are for the same change: 1 % of a number, of a radian, of a power, of the smaller slant range.
 """
 
-from bisar_budget.design.sensitivity import EVEN, Sensitivity, Slope
+from bisar_budget.design.sensitivity import COMPARED_CHANGE_FRACTION, Sensitivity, Slope
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.report.drawing import svg
 from bisar_budget.report.words.sentences import percent
 
-MAX_BARS = 20
+MAX_BAR_COUNT = 20
 _TORNADO_WIDTH_PX, _TORNADO_EDGE_PX = 860.0, 12.0  # width of the drawing, and of the margin at its right
 _MAX_NAME_WIDTH_PX = 580.0  # of the names of numbers
 _BOLD_RATIO = 0.86  # width of a plain text over the width of the bold text
@@ -26,7 +26,7 @@ def tornado(sensitivity: Sensitivity) -> str:
     A strong bar is the effect of a larger number, a pale bar that of a smaller number; both have the same slope.
     """
     canvas = svg.Canvas()
-    shown = sensitivity.shown[:MAX_BARS]
+    shown = sensitivity.shown[:MAX_BAR_COUNT]
     name = printable(f"{sensitivity.name} {changes_words(sensitivity.changes)}".rstrip())
     subject = printable(
         f"row {sensitivity.row}" if sensitivity.row else f"worst utilization: {sensitivity.worst_row}"
@@ -77,7 +77,7 @@ def _label(slope: Slope) -> str:
 
 def _even(slope: Slope) -> str:
     """Change of the number for which its bar is drawn."""
-    if slope.measure == EVEN:
+    if slope.measure == COMPARED_CHANGE_FRACTION:
         return slope.per_text
     size, _, unit = slope.per_text.partition(" ")
-    return f"{float(size) * EVEN / slope.measure:.2g} {unit}"
+    return f"{float(size) * COMPARED_CHANGE_FRACTION / slope.measure:.2g} {unit}"

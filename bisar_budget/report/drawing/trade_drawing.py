@@ -9,11 +9,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from operator import itemgetter
 from textwrap import wrap
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.arrays import NumbersOrWords
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.status import STATUS
 from bisar_budget.findings.trade import Axis, Trade
@@ -35,7 +36,7 @@ _CURVE_COLOURS = ("transmitter", "receiver", "clock", "pass", "mission", "doubt"
 _CURVE_DASHES = ("", "7 3", "2 3", "9 3 2 3", "5 5", "1 4", "12 4")
 _MAX_WORD_CELLS = 60  # of a map with words in each cell
 _MAX_DOTTED_SAMPLES = 40  # of a curve with a dot for each sample
-_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_REGION_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _HEAD_LINES = ((60, 2), (88, 3))  # characters and lines of the name above a drawing, and of its subtitle
 _CURVE_STEP_RAD = math.radians(3)  # angle of a segment of a curved line
 _VIRIDIS = ("440154", "482878", "3e4989", "31688e", "26828e", "1f9e89", "35b779", "6ece58", "b5de2b", "fde725")
@@ -423,7 +424,7 @@ def _in_cells(canvas: svg.Canvas, trade: Trade, columns: Sequence[float], lines:
 
 
 def _names(
-    canvas: svg.Canvas, rows: NDArray[Any], plane: _Plane, columns: Sequence[float], lines: Sequence[float]
+    canvas: svg.Canvas, rows: NumbersOrWords, plane: _Plane, columns: Sequence[float], lines: Sequence[float]
 ) -> list[svg.LegendLine]:
     """Write the name of its row in each region: level, upright in a tall region, or as a letter.
 
@@ -447,7 +448,7 @@ def _names(
             canvas.upright_text((x + 4, min(max(y, min(lines) + half), max(lines) - half)), row, "")
             continue
         if region.size[0] * cell[0] < 2 * half:
-            row = letters.setdefault(region.row, _LETTERS[len(letters) % len(_LETTERS)])
+            row = letters.setdefault(region.row, _REGION_LETTERS[len(letters) % len(_REGION_LETTERS)])
             half = 8.0
         canvas.text((min(max(x, columns[0] + half), columns[-1] - half), y + 4), [row], "", "middle")
     entries = [

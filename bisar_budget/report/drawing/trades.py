@@ -2,21 +2,21 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.arrays import Floats, NumbersOrWords
 from bisar_budget.design.cases import Cases, Values
 from bisar_budget.design.table import Part
 from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.mission.quantities import Number, QuestionError, Varied
 from bisar_budget.mission.readers import DIRECTION
-from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.report.drawing.svg import Point
 from bisar_budget.report.tables import Described
 
-MAX_CASES = 4_000_000  # of a plot, about as many as a screen has pixels
+MAX_PLOT_CASES = 4_000_000  # of a plot, about as many as a screen has pixels
 MAX_ROWS = 7  # rows with a curve each
 _LABELLED_FRACTION = 0.02  # of the area of a map: smaller regions have no name
 _MAX_MAP_CELLS = 500  # along an axis of a map, about as many as a drawing has pixels
@@ -39,8 +39,8 @@ def check_plot(cases: Cases, *, is_polar: bool) -> None:
     varying = varying_keys(cases)
     if not 1 <= len(varying) <= 2:
         raise QuestionError(f"--plot draws one axis or two, and {len(varying)} keys vary; {accepted}")
-    if cases.count > MAX_CASES:
-        raise QuestionError(f"--plot draws up to {MAX_CASES} cases, and there are {cases.count}")
+    if cases.count > MAX_PLOT_CASES:
+        raise QuestionError(f"--plot draws up to {MAX_PLOT_CASES} cases, and there are {cases.count}")
     if not is_polar:
         return
     if len(varying) != 2 or not any(varied.reader is DIRECTION for varied in varying):
@@ -73,7 +73,7 @@ class Gathered:
             )
         self.column, self.heading = column or "", columns[column].heading if column is not None else ""
         needed = (*_NEEDED_COLUMNS, *names, *((column,) if column is not None else ()))
-        self.pieces: dict[str, list[NDArray[Any]]] = {name: [] for name in needed}
+        self.pieces: dict[str, list[NumbersOrWords]] = {name: [] for name in needed}
 
     def add(self, part: Part) -> None:
         """Keep the needed columns of a part."""
@@ -183,7 +183,7 @@ def stretches(begins: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     return pairwise([0, *(np.flatnonzero(begins) + 1).tolist(), begins.size + 1])
 
 
-def runs(axis: Axis, statuses: NDArray[Any]) -> Iterator[tuple[str, float, float]]:
+def runs(axis: Axis, statuses: NumbersOrWords) -> Iterator[tuple[str, float, float]]:
     """Stretches of an axis with the same status: status, first edge, last edge."""
     edges = cell_edges(axis)
     for start, stop in stretches(statuses[1:] != statuses[:-1]):
@@ -214,7 +214,7 @@ def thinned(trade: Trade) -> Trade:
     return trade._replace(axes=axes, values={name: values[np.ix_(*picks)] for name, values in trade.values.items()})
 
 
-def regions(rows: NDArray[Any]) -> list[MapRegion]:
+def regions(rows: NumbersOrWords) -> list[MapRegion]:
     """Regions of a map that are large enough for a name.
 
     The name is in the cell farthest from other regions. `rows` (n, m) are the worst rows of the cells.
@@ -234,7 +234,7 @@ def regions(rows: NDArray[Any]) -> list[MapRegion]:
     return map_regions
 
 
-def _connected(rows: NDArray[Any], seen: NDArray[np.bool_], start: tuple[int, int]) -> list[tuple[int, int]]:
+def _connected(rows: NumbersOrWords, seen: NDArray[np.bool_], start: tuple[int, int]) -> list[tuple[int, int]]:
     """Cells with the same row that are connected with a first cell side by side. They are marked as seen."""
     cells = [start]
     seen[start] = True
@@ -269,7 +269,7 @@ def _run(line: NDArray[np.bool_], index: int) -> int:
     return int(high - low - 1)
 
 
-def borders(rows: NDArray[Any], first: Floats, second: Floats) -> Floats:
+def borders(rows: NumbersOrWords, first: Floats, second: Floats) -> Floats:
     """Lines between cells of a map with different rows: (count, 2, 2), from edges (n + 1,) and (m + 1,)."""
     lines = []
     i, j = np.nonzero(rows[1:] != rows[:-1])

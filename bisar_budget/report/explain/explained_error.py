@@ -8,13 +8,13 @@ import numpy as np
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS, ErrorSource, subject
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.row import Row
-from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState
-from bisar_budget.image_plane import LEADING
+from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState, plain_vector
+from bisar_budget.image_plane import LEGENDRE_LEADING
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.report.explain import notation
@@ -37,7 +37,7 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     elif platform in PLATFORMS:
         error = getattr(mission.platforms, platform).motion_error
         values = error.stated(kind)
-        if error.frame != "scene" and axis in notation.AXES:
+        if error.frame != "scene" and axis in notation.AXIS_LETTERS:
             yield from _rotated_declaration(mission, source, axis)
             return
         if error.covariance is not None and error.covariance.is_matrix and kind != "acceleration":
@@ -59,7 +59,7 @@ def _rotated_declaration(mission: Mission, source: ErrorSource, axis: str) -> It
     covariance = error.covariance if kind != "acceleration" else None
     k = mission.allocation.coverage_factor
     products = [
-        f"{number(k * value)}*{number(direction[notation.AXES.index(axis)])}"
+        f"{number(k * value)}*{number(direction[notation.AXIS_LETTERS.index(axis)])}"
         for value, direction in zip(error.stated(kind), axes, strict=True)
     ]
     if covariance is not None:
@@ -94,7 +94,7 @@ def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterat
     size = 1.0 if source.declared is None else abs(source.declared)
     each = " of one unit" if source.declared is None else ""
     signed = math.copysign(size, source.declared or 1.0)
-    qpe = abs(source.effect.qpe) * size
+    qpe = abs(float(source.effect.qpe)) * size
     platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     gates_by_full = model == "full"
     if gates_by_full and source.is_motion and (source.owner != "mission" or source.is_time_tag):
@@ -112,7 +112,7 @@ def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterat
         yield step("Published model: a height error moves the image, no quadratic term")
     elif source.clock is not None:
         yield from _clock_effect(analysis.mission, source, signed, each)
-    elif axis in notation.AXES:
+    elif axis in notation.AXIS_LETTERS:
         values = _motion_values(analysis, platform, kind, axis, signed)
         for order, formula in notation.motion_coefficients(kind, axis, platform).items():
             result = signed * _coefficient(analysis.mission, source, order)
@@ -136,19 +136,19 @@ def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
     """Coefficient β̃ of one unit. β̃₂ and β̃₃ follow from their phases at the aperture edge, (2π/λ)·β·(T/2)ⁿ."""
     if order < 2:
         return float(source.effect[order])
-    phase: float = source.effect.qpe if order == 2 else source.effect.cubic
+    phase = float(source.effect.qpe if order == 2 else source.effect.cubic)
     return phase * mission.radar.wavelength / (2 * math.pi * (mission.collection.aperture_time / 2) ** order)
 
 
 def _motion_values(analysis: Analysis, platform: str, kind: str, axis: str, size: float) -> dict[str, float]:
     state: PlatformState = getattr(analysis.geometry, platform)
-    index, s = notation.AXES.index(axis), platform[0]
+    index, s = notation.AXIS_LETTERS.index(axis), platform[0]
     return {
         "T": analysis.mission.collection.aperture_time,
         "λ": analysis.mission.radar.wavelength,
-        f"R_{s}": state.slant_range,
-        f"{axis}_{s}": state.position[index],
-        f"v_{axis}{s}": state.velocity[index],
+        f"R_{s}": float(state.slant_range),
+        f"{axis}_{s}": float(state.position[index]),
+        f"v_{axis}{s}": float(state.velocity[index]),
         notation.motion_symbol(kind, axis, platform): size,
     }
 
@@ -165,7 +165,7 @@ _TERM_UNITS = tuple(CLOCK_UNITS.values())
 def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     kind, sync = source.subject.kind, mission.synchronization
     values = {
-        "c": SPEED_OF_LIGHT,
+        "c": SPEED_OF_LIGHT_MPS,
         "T": mission.collection.aperture_time,
         "f_0": mission.radar.center_frequency,
     }
@@ -173,7 +173,7 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
         order = tuple(CLOCK_UNITS).index(source.subject.axis)
         terms = {order: size}
     else:
-        terms = {order: size * term for order, term in enumerate(source.clock or ()) if term}
+        terms = {order: size * float(term) for order, term in enumerate(source.clock or ()) if term}
         title = "Terms of the clock error t̃ at mid-aperture"
         lines: list[str | WorkedEquation] = []
         if kind == "frequency" and mission.has_direct_path:
@@ -190,17 +190,17 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
                 )
         yield step(f"{title}{each}", *lines)
     for order, term in terms.items():
-        known_values, result = {**values, f"t̃_{order}": term}, SPEED_OF_LIGHT * term
+        known_values, result = {**values, f"t̃_{order}": term}, SPEED_OF_LIGHT_MPS * term
         formula = notation.clock_coefficient(order)
         yield step(f"Table I row 1{each}", WorkedEquation(f"β̃_{order}", formula, known_values, result, RATES[order]))
         if order == 2:
-            qpe = abs(source.effect.qpe * size)
+            qpe = abs(float(source.effect.qpe) * size)
             title = "Table I row 1, step of Table II"
             yield step(f"{title}{each}", WorkedEquation("QPE", notation.CLOCK_PHASE, known_values, qpe, "rad"))
 
 
 def _table_i(kind: str, axis: str) -> str:
-    return f"Table I row {2 + 3 * notation.AXES.index(axis) + list(MOTION_UNITS).index(kind)}"
+    return f"Table I row {2 + 3 * notation.AXIS_LETTERS.index(axis) + list(MOTION_UNITS).index(kind)}"
 
 
 def _source_of(analysis: Analysis, platform: str, kind: str, axis: str) -> ErrorSource:
@@ -214,7 +214,7 @@ def _common_effect(analysis: Analysis, source: ErrorSource, size: float, each: s
     values = {}
     for platform in PLATFORMS:
         leg, phase = _source_of(analysis, platform, kind, axis), f"φ_{platform[0]}"
-        values[phase] = leg.effect.qpe * size
+        values[phase] = float(leg.effect.qpe) * size
         leg_values = _motion_values(analysis, platform, kind, axis, size)
         for order, formula in notation.motion_coefficients(kind, axis, platform).items():
             leg_values[f"β̃_{order}"] = result = size * _coefficient(analysis.mission, leg, order)
@@ -226,7 +226,7 @@ def _common_effect(analysis: Analysis, source: ErrorSource, size: float, each: s
     if kind == "position":
         yield step(f"Table I: a position error moves the image, no quadratic term{each}")
         return
-    qpe = abs(source.effect.qpe * size)
+    qpe = abs(float(source.effect.qpe) * size)
     yield step(f"{source.equation}{each}, signed", WorkedEquation("QPE", "|φ_t + φ_r|", values, qpe, "rad"))
 
 
@@ -236,7 +236,10 @@ def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each:
         state: PlatformState = getattr(analysis.geometry, name)
         values = {"δt": size}
         lines: list[str | WorkedEquation | Sum] = []
-        for symbol, vector, unit in (("v", state.velocity, "m/s"), ("a", state.acceleration, "m/s^2")):
+        for symbol, vector, unit in (
+            ("v", plain_vector(state.velocity), "m/s"),
+            ("a", plain_vector(state.acceleration), "m/s^2"),
+        ):
             components = ", ".join(with_unit(component + 0.0, unit) for component in vector)
             lines.append(f"{symbol} = [{components}] of the {name}")
             speed = math.sqrt(math.fsum(component * component for component in vector))
@@ -249,15 +252,15 @@ def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each:
     unit = f"rad per {source.unit}"
     yield step(
         f"{source.equation}: Table II times v, a and the jerk, added",
-        f"QPE/unit = {with_unit(source.effect.qpe, unit)}",
+        f"QPE/unit = {with_unit(float(source.effect.qpe), unit)}",
     )
     yield _times_declared(source, size, each)
 
 
 def _times_declared(source: ErrorSource, size: float, each: str) -> Step:
     """Step from the effect of one unit to that of the declared size."""
-    values = {"QPE/unit": abs(source.effect.qpe), "declared": size}
-    qpe = abs(source.effect.qpe) * size
+    values = {"QPE/unit": abs(float(source.effect.qpe)), "declared": size}
+    qpe = abs(float(source.effect.qpe)) * size
     return step(f"Quadratic phase error{each}", WorkedEquation("QPE", "QPE/unit*declared", values, qpe, "rad"))
 
 
@@ -265,8 +268,8 @@ def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[
     """Effects along the axes of the scene, projected on the axis of the error: text and value of the sum."""
     _, _, kind, axis, frame, _ = source.subject
     state: PlatformState = getattr(analysis.geometry, platform)
-    direction = state.frame(frame)[FRAME_AXES[frame].index(axis)]
-    effects = [_source_of(analysis, platform, kind, letter).effect.qpe for letter in notation.AXES]
+    direction = plain_vector(state.frame(frame)[FRAME_AXES[frame].index(axis)])
+    effects = [float(_source_of(analysis, platform, kind, letter).effect.qpe) for letter in notation.AXIS_LETTERS]
     pairs = list(zip(effects, direction, strict=True))
     return " + ".join(f"{number(q)}*{number(d)}" for q, d in pairs), math.fsum(q * d for q, d in pairs)
 
@@ -285,7 +288,7 @@ def _common_projected_effect(analysis: Analysis, source: ErrorSource, size: floa
             Sum(f"{symbol} = {terms} = {with_unit(leg, unit)}"),
         )
     values["declared"] = size
-    qpe = abs(source.effect.qpe) * size
+    qpe = abs(float(source.effect.qpe)) * size
     worked = WorkedEquation("QPE", "|φ_t/unit + φ_r/unit|*declared", values, qpe, "rad")
     yield step(f"{source.equation}{each}, signed", worked)
 
@@ -296,7 +299,7 @@ def _projected_effect(analysis: Analysis, source: ErrorSource, size: float, each
     unit = f"rad per {source.unit}"
     yield step(
         f"{source.equation}, {unit.replace('^2', '²')} along x, y, z times the {source.subject.axis} axis",
-        Sum(f"QPE/unit = |{terms}| = {with_unit(abs(source.effect.qpe), unit)}"),
+        Sum(f"QPE/unit = |{terms}| = {with_unit(abs(float(source.effect.qpe)), unit)}"),
     )
     yield _times_declared(source, size, each)
 
@@ -352,7 +355,7 @@ def as_written(mission: Mission, path: KeyPath) -> str:
 
 
 RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
-_SLOPE, _QUADRATIC, _CUBIC = 1, 2, 3  # rows of a fit
+_SLOPE_ORDER, _QUADRATIC_ORDER, _CUBIC_ORDER = 1, 2, 3  # rows of a fit
 _SAME_PHASE_FRACTION = 1e-6  # difference between the phases of both signs that may be rounding
 _MIN_SHOWN_BEYOND_RAD = 1e-6  # rms phase beyond the cubic that may be rounding
 
@@ -393,7 +396,9 @@ class Residual:
     @cached_property
     def beyond(self) -> list[float]:
         """Range error at the nodes less orders 0 to 3. [m]"""
-        fitted_orders = np.polynomial.legendre.legvander(self.exact.sampling.places, _CUBIC) @ (self.orders / LEADING)
+        fitted_orders = np.polynomial.legendre.legvander(self.exact.sampling.places, _CUBIC_ORDER) @ (
+            self.orders / LEGENDRE_LEADING
+        )
         return _without_rounding((np.array(self.ranges) - fitted_orders).tolist(), self.rms(self.ranges))
 
     def rms(self, values: Sequence[float]) -> float:
@@ -422,15 +427,15 @@ class Residual:
     @property
     def hidden(self) -> float:
         """Quadratic phase with the same loss of peak as the range errors that band and turn hide. [rad]"""
-        square = float(self.exact.band[0]) * self.rms(self.ranges) ** 2 + self.orders[_SLOPE] ** 2 / 3
+        square = float(self.exact.band[0]) * self.rms(self.ranges) ** 2 + self.orders[_SLOPE_ORDER] ** 2 / 3
         if self.is_turned:
-            square += 4 * self.orders[_CUBIC] ** 2 / 175 + self.rms(self.beyond) ** 2
+            square += 4 * self.orders[_CUBIC_ORDER] ** 2 / 175 + self.rms(self.beyond) ** 2
         return self.k * math.sqrt(45 / 4 * square)
 
     @property
     def judged(self) -> float:
         """Phase that is compared with a limit, which contains the gain of autofocus. [rad]"""
-        return math.hypot(self.phase(_QUADRATIC), self.gain * self.hidden)
+        return math.hypot(self.phase(_QUADRATIC_ORDER), self.gain * self.hidden)
 
     def sum(self, symbol: str, order: int) -> Sum:
         """The sum that gives the phase of an order."""
@@ -446,17 +451,22 @@ class Residual:
         orders: list[WorkedEquation | str] = [
             WorkedEquation("b", "B/(sqrt(12)*f_0)", values, b, ""),
             self._squares("ρ_rms", self.ranges),
-            Sum(f"ρ_1 = {self._terms(_SLOPE)} = {with_unit(self.orders[_SLOPE], 'm')}"),
+            Sum(f"ρ_1 = {self._terms(_SLOPE_ORDER)} = {with_unit(self.orders[_SLOPE_ORDER], 'm')}"),
         ]
         formula, turn_words = "b^2*ρ_rms^2 + ρ_1^2/3", ""
-        values = {"λ": self.radar.wavelength, "b": b, "ρ_rms": self.rms(self.ranges), "ρ_1": self.orders[_SLOPE]}
+        values = {
+            "λ": self.radar.wavelength,
+            "b": b,
+            "ρ_rms": self.rms(self.ranges),
+            "ρ_1": self.orders[_SLOPE_ORDER],
+        }
         if self.is_turned:
             orders += [
-                Sum(f"ρ_3 = {self._terms(_CUBIC)} = {with_unit(self.orders[_CUBIC], 'm')}"),
+                Sum(f"ρ_3 = {self._terms(_CUBIC_ORDER)} = {with_unit(self.orders[_CUBIC_ORDER], 'm')}"),
                 self._squares("ρ_rest", self.beyond),
             ]
             formula += " + 4*ρ_3^2/175 + ρ_rest^2"
-            values |= {"ρ_3": self.orders[_CUBIC], "ρ_rest": self.rms(self.beyond)}
+            values |= {"ρ_3": self.orders[_CUBIC_ORDER], "ρ_rest": self.rms(self.beyond)}
             turn_words = "; a line of sight turns by more than a radian, so that it includes cubic and rest"
         yield step(
             "Residual range error: its rms ρ_rms and its slope ρ_1 at the aperture edge (P₁), for the hidden phase",
@@ -465,8 +475,8 @@ class Residual:
         symbol = f"hidden_{mark}"
         hidden = WorkedEquation(symbol, f"2*π/λ*sqrt(45/4*({formula}))", values, self.hidden, "rad")
         yield step(f"Hidden phase: a quadratic phase with the same peak loss{turn_words}", hidden)
-        values = {f"QPE_{mark}": self.phase(_QUADRATIC), symbol: self.hidden}
-        equal_loss = math.hypot(self.phase(_QUADRATIC), self.hidden)
+        values = {f"QPE_{mark}": self.phase(_QUADRATIC_ORDER), symbol: self.hidden}
+        equal_loss = math.hypot(self.phase(_QUADRATIC_ORDER), self.hidden)
         yield step(
             "Quadratic phase of equal peak loss" + ("" if self.gain > 1 else ", which is judged"),
             WorkedEquation(f"equal_{mark}", f"sqrt(QPE_{mark}^2 + {symbol}^2)", values, equal_loss, "rad"),
@@ -508,7 +518,7 @@ class Residual:
 
 def _without_rounding(values: Sequence[float], full_size: float) -> list[float]:
     """Values, with 0 for those that are rounding errors of differences of numbers of `full_size`."""
-    return [value if abs(value) > ROUNDING * full_size else 0.0 for value in values]
+    return [value if abs(value) > VECTOR_ROUNDING_FRACTION * full_size else 0.0 for value in values]
 
 
 def _judged(residual: Residual) -> float:
@@ -547,6 +557,7 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
     if not residual.ranges:
         yield step(f"Full model{each}: no ground point has the range history of this error")
         return
+    yield from _orbit_motion(analysis, source, residual.size)
     sign = "" if residual.is_small or residual.size == size else ", with the other sign, whose residual is larger"
     yield step(
         f"Full model{each}{sign}: ground point with the smallest V = Var(ρ) + b²·⟨ρ²⟩; ρ: residual range error, ⟨ ⟩: "
@@ -559,18 +570,40 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
     )
     yield step(
         "Quadratic phase at the aperture edge, 3/2 of P₂: weights of the fit times residual",
-        residual.sum("QPE_full", _QUADRATIC),
+        residual.sum("QPE_full", _QUADRATIC_ORDER),
     )
     yield from residual.steps()
-    by_quadratic = worse_sign(analysis, source, size, _of_order(_QUADRATIC))
+    by_quadratic = worse_sign(analysis, source, size, _of_order(_QUADRATIC_ORDER))
     if by_quadratic.size != residual.size:
-        yield step("Quadratic phase by the other sign, which is larger", by_quadratic.sum("QPE_full", _QUADRATIC))
+        yield step(
+            "Quadratic phase by the other sign, which is larger", by_quadratic.sum("QPE_full", _QUADRATIC_ORDER)
+        )
     if source.is_motion and analysis.mission.requirements.cubic_phase_error is not None:
-        by_cubic = worse_sign(analysis, source, size, _of_order(_CUBIC))
-        yield step("Cubic phase there, 5/2 of P₃", by_cubic.sum("cubic_full", _CUBIC))
+        by_cubic = worse_sign(analysis, source, size, _of_order(_CUBIC_ORDER))
+        yield step("Cubic phase there, 5/2 of P₃", by_cubic.sum("cubic_full", _CUBIC_ORDER))
     by_rest = worse_sign(analysis, source, size, _beyond_phase)
     if by_rest.beyond_phase > max(_MIN_SHOWN_BEYOND_RAD, float(by_rest.exact.rounding[0])):
         yield from by_rest.rest_steps()
+
+
+def _orbit_motion(analysis: Analysis, source: ErrorSource, size: float) -> Iterator[Step]:
+    """Steps with the motion of each platform in free fall by an error, at the first and the last node of the fit."""
+    if source.shifts is None:
+        return
+    times = analysis.exact.times[:, 0].tolist()
+    against = " against the stars" if source.subject.frame == "ric" else " in Earth-fixed axes"
+    for platform in source.platforms:
+        if analysis.geometry.both[platform].fall is None:
+            continue
+        lines = []
+        for node in (0, -1):
+            x, y, z = (number(size * float(component[node, 0])) for component in source.shifts[platform])
+            lines.append(f"{times[node]:+.6g} s: {x} m east, {y} m north, {z} m up")
+        yield step(
+            f"The {PLATFORMS[platform]} is in free fall: its error at mid-aperture (velocity{against}) follows "
+            "d²δr/dt² = μ/r³*(3(r̂·δr)r̂ − δr), written in Earth-fixed axes",
+            *lines,
+        )
 
 
 def _residual_formula(exact: ExactRanges) -> str:
@@ -581,13 +614,13 @@ def _residual_formula(exact: ExactRanges) -> str:
 
 def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """Step with the result of the full model for an error that the published model judges."""
-    residual = worse_sign(analysis, source, size, _of_order(_QUADRATIC))
+    residual = worse_sign(analysis, source, size, _of_order(_QUADRATIC_ORDER))
     if not residual.ranges:
         yield step(f"Full model{each}, for comparison: no ground point has the range history")
         return
     yield step(
         f"Full model{each}, for comparison: weights of the fit times residual (--model full lists it)",
-        residual.sum("QPE_full", _QUADRATIC),
+        residual.sum("QPE_full", _QUADRATIC_ORDER),
     )
 
 
@@ -598,7 +631,7 @@ def at_the_allowable(
     sizes = [Residual(analysis, source, signed) for signed in (allowable, -allowable)]
     if not all(residual.ranges for residual in sizes):
         return
-    measure = {LOCATION: _displacement_of, CUBIC: _of_order(_CUBIC), QUADRATIC: _judged}[requirement]
+    measure = {LOCATION: _displacement_of, CUBIC: _of_order(_CUBIC_ORDER), QUADRATIC: _judged}[requirement]
     residual = max(sizes, key=measure)
     size = f"{number(residual.size)} {source.unit.replace('^2', '²')}"
     title = f"At {size}, the smallest size of either sign that reaches the limit, exact ranges give"
@@ -606,9 +639,9 @@ def at_the_allowable(
         x, y = residual.image_point or (0.0, 0.0)
         yield step(title, Sum(f"moved = sqrt({number(x)}^2 + {number(y)}^2) = {with_unit(math.hypot(x, y), 'm')}"))
     elif requirement == CUBIC:
-        yield step(title, residual.sum("cubic_there", _CUBIC))
+        yield step(title, residual.sum("cubic_there", _CUBIC_ORDER))
     else:
-        yield step(title, residual.sum("QPE_there", _QUADRATIC))
+        yield step(title, residual.sum("QPE_there", _QUADRATIC_ORDER))
         yield from residual.steps("there")
 
 
@@ -655,7 +688,7 @@ def _image_point_lines(residual: Residual) -> Sequence[str]:
     return (f"x̂ = {with_unit(east, 'm')} east", f"ŷ = {with_unit(north, 'm')} north")
 
 
-RULES = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-square"}
+RULE_WORDS = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-square"}
 
 
 def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
@@ -695,10 +728,12 @@ def combined(
     unit: str = "rad",
 ) -> Iterator[Step]:
     """Step of the total of errors by a rule: names and sizes of the errors, and their sum. `total` may be None."""
-    title = f"{title}, {RULES[rule]}"
+    title = f"{title}, {RULE_WORDS[rule]}"
     # The remainder of terms that cancel exactly is rounding.
     largest = max((abs(size) for _, size in sizes_by_name), default=0.0)
-    members = [(name, abs(size) if abs(size) > ROUNDING * largest else 0.0) for name, size in sizes_by_name]
+    members = [
+        (name, abs(size) if abs(size) > VECTOR_ROUNDING_FRACTION * largest else 0.0) for name, size in sizes_by_name
+    ]
     width = max((len(name) for name, _ in members), default=0)
     lines = [f"{printable(name):<{width}}  {size:.6g} {unit}" for name, size in members if size] or ["none"]
     if total is None or not members:

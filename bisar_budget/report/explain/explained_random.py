@@ -10,7 +10,7 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import mainlobe_energy, spread_phase
 from bisar_budget.budget.random_rows import held_effect, no_effect
-from bisar_budget.constants import EARTH_RADIUS, SPEED_OF_LIGHT, STANDARD_GRAVITY
+from bisar_budget.constants import EARTH_RADIUS_M, SPEED_OF_LIGHT_MPS, STANDARD_GRAVITY_MPS2
 from bisar_budget.effects.air_delays import (
     CONTENT,
     DELAY,
@@ -24,7 +24,7 @@ from bisar_budget.effects.air_delays import (
     metres_per_unit,
 )
 from bisar_budget.effects.declared import CUBIC, LOCATION
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.effect import PLATFORMS, plain
 from bisar_budget.effects.navigation_errors import (
     CORRELATED,
     TILTS,
@@ -59,10 +59,10 @@ from bisar_budget.effects.vibration import (
     power_of,
 )
 from bisar_budget.findings.row import Row
-from bisar_budget.geometry import PlatformState
+from bisar_budget.geometry import PlatformState, plain_vector
 from bisar_budget.mission.instruments import Synchronization
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.propagation import ABOVE_THE_AIR, height_of
+from bisar_budget.mission.propagation import AIR_TOP_M, height_of
 from bisar_budget.mission.vibrations import FeltVibration, Spectrum, Vibration
 from bisar_budget.report.explain.explained_error import limit_steps, smallest_size, stated
 from bisar_budget.report.explain.explained_spreading import allowed_variance, effect_from_elsewhere
@@ -130,7 +130,7 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
     if error.declared is None:
         return
     if error.unit == "s^2/m":
-        yield step(f"Per g is per {STANDARD_GRAVITY:g} m/s²: 1 /g = {1 / STANDARD_GRAVITY:.6g} s²/m")
+        yield step(f"Per g is per {STANDARD_GRAVITY_MPS2:g} m/s²: 1 /g = {1 / STANDARD_GRAVITY_MPS2:.6g} s²/m")
     k = mission.allocation.coverage_factor
     if error.unit != "dB" and error.is_covered:
         worked = WorkedEquation(
@@ -157,7 +157,7 @@ def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
         name = "the line of sight, u"
     else:
         state: PlatformState = getattr(mission.platforms, error.owner).state
-        east, north, up = (with_unit(force + 0.0, "m/s^2") for force in specific_force(mission, state))
+        east, north, up = (with_unit(float(force) + 0.0, "m/s^2") for force in specific_force(mission, state))
         yield step("Specific force f = a − g, which accelerometers measure", f"f = [{east}, {north}, {up}]")
         name = (
             "specific force that a tilt turns into the line of sight, f_u = |u × f|"
@@ -168,7 +168,7 @@ def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     for index, formula in enumerate(formulas):
         if formula:
             k = mission.allocation.coverage_factor if index == 2 else 1.0  # a mean power has no coverage factor
-            result = unit[index] * k
+            result = float((unit.quadratic, unit.cubic, unit.spread)[index]) * k
             yield step(
                 f"Derived: {_PHASE_WORDS[index]}, of one unit",
                 WorkedEquation(_PHASE_SYMBOLS[index], formula, values, result, "rad"),
@@ -268,10 +268,10 @@ def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
     if full[:3] == unit[:3]:
         return
     count = 3 if full.spread != unit.spread else 2
-    factors = (1.0, 1.0, _covered(mission, error))
+    factors, phases = (1.0, 1.0, _covered(mission, error)), (full.quadratic, full.cubic, full.spread)
     lines = [
         f"{symbol}/unit = {with_unit(value * factor, _per_unit('rad', error))}"
-        for symbol, value, factor in zip(_PHASE_SYMBOLS[:count], full[:count], factors, strict=False)
+        for symbol, value, factor in zip(_PHASE_SYMBOLS[:count], phases, factors, strict=False)
         if value
     ]
     yield step(
@@ -291,7 +291,9 @@ def _displacement(error: RandomError, model: str) -> Iterator[Step]:
     yield step(
         title if error.is_covered else "In any direction: half of its square east, half of it north",
         *(f"{symbol} = {with_unit(value, unit)}" for symbol, value in values.items()),
-        WorkedEquation("moved/unit", "sqrt((east/unit)^2 + (north/unit)^2)", values, effect.displacement, unit),
+        WorkedEquation(
+            "moved/unit", "sqrt((east/unit)^2 + (north/unit)^2)", values, float(effect.displacement), unit
+        ),
     )
 
 
@@ -324,7 +326,7 @@ def _changing_delay(analysis: Analysis, error: RandomError) -> Iterator[Step]:
         yield from _gauss_markov(
             analysis.mission,
             error,
-            correlation_time,
+            float(correlation_time),
             "m",
             "Along the path through the air at mid-aperture, m per zenith unit; for one air summed over both legs",
         )
@@ -346,7 +348,7 @@ def _gauss_markov(
     words = ("quadratic", "cubic", "residual after the cubic", "constant", "linear")
     yield step(
         "Mean squares of a process of variance 1 with the spectrum 4·τ_c/(1 + (2πf·τ_c)²)",
-        *(f"{word} = {number(value)}" for word, value in zip(words, mean_squares, strict=False)),
+        *(f"{word} = {number(float(value))}" for word, value in zip(words, mean_squares, strict=False)),
     )
     k = 2 * math.pi / mission.radar.wavelength
     values = {"λ": mission.radar.wavelength, along: quadratic / (k * math.sqrt(mean_squares.quadratic)),
@@ -370,7 +372,7 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
     yield from _integrals(pieces, mission, sync)
     for spur in spurs_of(mission):
         if spur.name == error.owner and spur.left.is_folded:
-            yield from _slow("Spur", spur.frequency, spur.left, spur.free, mission, "rad")
+            yield from _slow("Spur", spur.frequency, spur.left, float(spur.free), mission, "rad")
     if sync is not None and sync.is_holdover:
         yield from _setting(pieces, mission, sync)
     k = mission.allocation.coverage_factor
@@ -384,7 +386,8 @@ def _slow(
     """Step of a tone, or of its folded frequencies, below one cycle per aperture. Its squares add to the noise."""
     T = mission.collection.aperture_time
     slow = [
-        f"{slow_frequency:.6g} Hz, {slow_frequency * T:.3g} cycles per aperture: {number(share)} of the amplitude"
+        f"{slow_frequency:.6g} Hz, {slow_frequency * T:.3g} cycles per aperture: "
+        f"{number(float(share))} of the amplitude"
         for slow_frequency, share in zip(remaining.frequencies, remaining.shares, strict=True)
         if slow_frequency * T < SLOWEST_ECHO_CYCLES and share > 0
     ]
@@ -419,8 +422,13 @@ def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchroniz
     )
     orders = set_parts(pieces, T, age, averaging)
     per_phase = mission.radar.wavelength / (2 * math.pi)
-    c_0, c_1 = per_phase * math.sqrt(orders.constant[0]), per_phase * math.sqrt(orders.linear[0]) * 2 / float(T[0])
-    correlation = float(orders.constant_linear[0] / math.sqrt(orders.constant[0] * orders.linear[0])) if c_0 else 0.0
+    c_0, c_1 = (
+        per_phase * math.sqrt(plain(orders.constant)),
+        per_phase * math.sqrt(plain(orders.linear)) * 2 / float(T[0]),
+    )
+    correlation = (
+        plain(orders.constant_linear) / math.sqrt(plain(orders.constant) * plain(orders.linear)) if c_0 else 0.0
+    )
     yield step(
         "Orders 0 and 1 of a tone that are left of a clock set by a line: ∫ S·(λ/2π)²·A_m·A_n* df of each pair",
         "A₀ = j₀(πfT) − e^(−2πifH)·[j₀(πft_c) + H·(6i/t_c)·j₁(πft_c)]",
@@ -442,10 +450,10 @@ def _integrals(
         geometry, delay = mission.geometry, mission.geometry.echo_delay
         ways = [float(path.slant_range) for path in (*geometry.both, geometry.apart)]
         piece_parts, density = [heard_parts((piece,), T, delay) for piece in pieces], "S_left"
-        values = dict(zip(("R_t", "R_r", "b"), ways, strict=True)) | {"c": SPEED_OF_LIGHT}
+        values = dict(zip(("R_t", "R_r", "b"), ways, strict=True)) | {"c": SPEED_OF_LIGHT_MPS}
         yield step(
             "Heard over the baseline b, and a delay Δt later by the echo: S_left = S·4·sin²(πf·Δt)",
-            WorkedEquation("delay", "(R_t + R_r - b)/c", values, delay, "s"),
+            WorkedEquation("delay", "(R_t + R_r - b)/c", values, float(delay), "s"),
         )
     elif interval is None:
         piece_parts, density = [parts((piece,), T) for piece in pieces], "S"
@@ -466,7 +474,7 @@ def _integrals(
         terms = [mean_squares[index] for mean_squares in piece_parts]
         factor = k if index < 2 else 1.0
         total = factor * math.sqrt(math.fsum(terms))
-        text = " + ".join(number(term) for term in terms)
+        text = " + ".join(number(float(term)) for term in terms)
         text = f"sqrt({text})" if factor == 1 else f"{number(factor)}*sqrt({text})"
         yield step(f"∫ {density}·{transfer} df of each piece", Sum(f"{symbol} = {text} = {with_unit(total, unit)}"))
 
@@ -488,7 +496,7 @@ def _link(mission: Mission, error: RandomError) -> Iterator[Step]:
 def _spectrum_steps(vibration: Vibration | FeltVibration, spectrum: Spectrum) -> Iterator[Step]:
     """Steps with the points of a spectrum of acceleration or displacement, and with its level."""
     quantity, unit = ("acceleration", "g²/Hz") if spectrum.is_accelerated else ("displacement", "m²/Hz")
-    scale = STANDARD_GRAVITY**2 if spectrum.is_accelerated else 1.0
+    scale = STANDARD_GRAVITY_MPS2**2 if spectrum.is_accelerated else 1.0
     points = [f"{f:.6g} Hz: {density / scale:.6g} {unit}" for f, density in spectrum.points]
     yield step(f"One-sided spectrum of {quantity}, straight over logarithms, zero outside its points", *points)
     if vibration.spectrum_level:
@@ -549,15 +557,17 @@ def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
         yield from _integrals(pieces, mission, sync, _PER_SENSITIVITY)
     for line in accelerated_tones(mission):
         if line.name == name:
-            yield from _slow("Vibration", line.frequency, line.left, line.free, mission, _PER_SENSITIVITY)
+            yield from _slow(
+                "Vibration", float(line.frequency), line.left, float(line.free), mission, _PER_SENSITIVITY
+            )
     if flies_a_turn(mission, name):
         state: PlatformState = getattr(mission.platforms, name).state
-        acceleration = float(np.linalg.norm(state.acceleration))
-        values = {"c": SPEED_OF_LIGHT, "a": acceleration}
+        acceleration = float(np.linalg.norm(plain_vector(state.acceleration)))
+        values = {"c": SPEED_OF_LIGHT_MPS, "a": acceleration}
         yield step(
             "Turn: the range error is c·Γ·(v(τ) − v(0)); the acceleration at mid-aperture is a frequency, which "
             "displaces, and its change bends. Of three axes the root-sum-square is the most that a Γ does",
-            WorkedEquation("drift/unit", "c*a", values, SPEED_OF_LIGHT * acceleration, "m/s per s²/m"),
+            WorkedEquation("drift/unit", "c*a", values, SPEED_OF_LIGHT_MPS * acceleration, "m/s per s²/m"),
         )
     spread_per_unit = error.published.spread * mission.allocation.coverage_factor
     yield step(
@@ -570,16 +580,16 @@ def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterat
     """Steps from a unit of the zenith delay to the delay of the leg over the aperture."""
     mission, delay = analysis.mission, error.subject.axis
     path: PlatformState = getattr(analysis.geometry, name)
-    (x, y, z), height = path.position, float(height_of(path.position))
-    if delay == CONTENT and height < ABOVE_THE_AIR:
+    (x, y, z), height = plain_vector(path.position), float(height_of(path.position))
+    if delay == CONTENT and height < AIR_TOP_M:
         yield step(f"The {name} flies at {height:.6g} m, below the ionosphere: no electrons on its leg")
         return
-    values = {"R": path.slant_range, "z": z}
-    if height < ABOVE_THE_AIR:
+    values = {"R": float(path.slant_range), "z": z}
+    if height < AIR_TOP_M:
         title, formula = "Within the air, over a flat Earth: 1 over the sine of the elevation", "R/z"
     else:
         shell = TROPOSPHERE_HEIGHT_M if delay == DELAY else min(IONOSPHERE_HEIGHT_M, height)
-        values = {"p": (x * x + y * y) ** 0.5, "R": path.slant_range, "h": shell, "R_E": EARTH_RADIUS}
+        values = {"p": (x * x + y * y) ** 0.5, "R": float(path.slant_range), "h": shell, "R_E": EARTH_RADIUS_M}
         title = "Above the air, through a spherical shell at height h; p is the distance along the ground's plane"
         formula = "1/sqrt(1 - (p/R)^2/(1 + h/R_E)^2)"
     factor = float(leg_factor(delay, path.position, path.position))
@@ -698,7 +708,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield step("Allowable by requirements.islr", worked)
     if effect.displacement > 0 and required.location_error is not None:
         title = f"Allowable by requirements.{LOCATION}, without share and gain"
-        yield by("by_location", "moved/unit", required.location_error, effect.displacement, title)
+        yield by("by_location", "moved/unit", required.location_error, float(effect.displacement), title)
     yield from smallest_size(row, sizes)
 
 

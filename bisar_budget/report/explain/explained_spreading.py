@@ -18,7 +18,7 @@ from bisar_budget.analysis.spread import (
 )
 from bisar_budget.analysis.tone_displacement import TonePart
 from bisar_budget.analysis.vibration_limits import (
-    LARGEST_ECHO,
+    MAX_ECHO_PHASE_RAD,
     Echo,
     VibrationLimits,
     bessel,
@@ -26,7 +26,7 @@ from bisar_budget.analysis.vibration_limits import (
     quadratures,
     tone_limits,
 )
-from bisar_budget.constants import ROUNDING
+from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import subject
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt
@@ -156,11 +156,11 @@ def _with_its_pair(tone: Tone, pair_tone: Tone | None) -> str:
 
 
 def _echo_level(echo: Echo) -> Iterator[Step]:
-    if echo.phase > LARGEST_ECHO:
+    if echo.phase > MAX_ECHO_PHASE_RAD:
         worked = WorkedEquation("l", "φ/2", {"φ": echo.phase}, echo.level, "")
-        yield step(f"Amplitude over that of the response; above {LARGEST_ECHO:g} rad half the phase", worked)
+        yield step(f"Amplitude over that of the response; above {MAX_ECHO_PHASE_RAD:g} rad half the phase", worked)
         return
-    j0, j1 = bessel(echo.phase)
+    j0, j1 = map(float, bessel(echo.phase))
     yield step(
         "Amplitude over that of the response, J₁(φ)/J₀(φ)",
         WorkedEquation("J_0", "", {}, j0, ""),
@@ -189,7 +189,9 @@ def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) ->
         for name, metre_effects, size in zip(
             ("east", "north"), tone_part.per_metre[..., 0].T, tone_part.displacement[:, 0], strict=True
         ):
-            p = np.where(np.abs(metre_effects) > ROUNDING * np.abs(metre_effects).max(), metre_effects, 0.0).tolist()
+            p = np.where(
+                np.abs(metre_effects) > VECTOR_ROUNDING_FRACTION * np.abs(metre_effects).max(), metre_effects, 0.0
+            ).tolist()
             values = {f"{symbol}{n}": order[n] for symbol, order in (("c_", c), ("p_", p)) for n in range(4)}
             formula = (
                 "sqrt((c_0*p_0 - c_2*p_2)^2 + (c_1*p_1 - c_3*p_3)^2)"
@@ -231,7 +233,7 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     if row.allowable is None:
         yield no_limit(row)
         return
-    yield from _worst_phases(spur.left, spur.free, mission)
+    yield from _worst_phases(spur.left, float(spur.free), mission)
     yield from near_phases(mission, allocation, row, row.qpe_full_rad or 0.0, sizes)
     if limits is not None:
         phase, at_limit = _phase_at_limit(mission, row, limits, "φ")
@@ -261,26 +263,27 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     path = ("platforms", name, *section, "vibration", "sinusoidal", entry, "amplitude")
     a = float(tone.acceleration)
     gamma = ("platforms", name, "oscillator", "acceleration_sensitivity")
-    yield step(f"Γ, declared in {location(mission, gamma)}", f"Γ = {with_unit(tone.sensitivity, 's^2/m')}")
+    yield step(f"Γ, declared in {location(mission, gamma)}", f"Γ = {with_unit(float(tone.sensitivity), 's^2/m')}")
     if row.evidence:
         yield step("Evidence", printable(row.evidence))
     yield step(
         f"Acceleration of the vibration, declared in {location(mission, path)}", f"a = {with_unit(a, 'm/s^2')}"
     )
-    values, formula = {"f_0": f_0, "Γ": tone.sensitivity, "a": a, "f": tone.frequency}, "f_0*Γ*a/f"
+    values: dict[str, float] = {"f_0": f_0, "Γ": float(tone.sensitivity), "a": float(a), "f": float(tone.frequency)}
+    formula = "f_0*Γ*a/f"
     title = "Derived: peak phase of the tone, a quarter of a turn from the motion itself"
     if tone.echo != 1:
-        values, formula = {**values, "left": tone.echo}, f"{formula}*left"
+        values, formula = {**values, "left": float(tone.echo)}, f"{formula}*left"
         title += ", times what the synchronization leaves of it"
-    yield step(title, WorkedEquation("φ", formula, values, tone.phase, "rad"))
+    yield step(title, WorkedEquation("φ", formula, values, float(tone.phase), "rad"))
     if tone.phase:
         level = 20 * math.log10(tone.phase / 2)
-        yield step("Its echoes", WorkedEquation("l", "20*log(φ/2)/log(10)", {"φ": tone.phase}, level, "dB"))
+        yield step("Its echoes", WorkedEquation("l", "20*log(φ/2)/log(10)", {"φ": float(tone.phase)}, level, "dB"))
     limits, sizes = tone_limits(mission, allocation)[1].get(name), dict[str, float]()
     if row.allowable is None:
         yield no_limit(row)
         return
-    yield from _worst_phases(tone.left, tone.free * tone.sensitivity, mission)
+    yield from _worst_phases(tone.left, float(tone.free * tone.sensitivity), mission)
     yield from near_phases(mission, allocation, row, row.qpe_full_rad or 0.0, sizes)
     if limits is not None:
         phase, at_limit = _phase_at_limit(mission, row, limits, "φ_max")
@@ -288,8 +291,8 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
         if not tone.phase:
             yield step("Allowable", Sum(f"allowable = {with_unit(row.allowable, row.unit)}"))
             return
-        values = {"Γ": tone.sensitivity, "φ_max": phase, "φ": tone.phase}
-        sizes["by_echoes"] = tone.sensitivity * phase / tone.phase
+        values = {"Γ": float(tone.sensitivity), "φ_max": phase, "φ": float(tone.phase)}
+        sizes["by_echoes"] = values["Γ"] * phase / values["φ"]
         yield step("Its echoes", WorkedEquation("by_echoes", "Γ*φ_max/φ", values, sizes["by_echoes"], row.unit))
     yield smallest_of(row, sizes)
 

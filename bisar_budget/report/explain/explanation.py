@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from bisar_budget.analysis.scene import at, differences_at
 from bisar_budget.analysis.spread import mainlobe_energy
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits, tone_limits
+from bisar_budget.arrays import Floats
 from bisar_budget.budget.aggregates import effect_parts, untaken_effects
 from bisar_budget.budget.declarations import missing_declarations
 from bisar_budget.budget.doubts import (
@@ -28,11 +28,11 @@ from bisar_budget.budget.judged_requirements import (
     SMALL_RAD,
     UntakenEffect,
 )
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.air_delays import CONTENT, ELECTRON_DELAY_M3_PER_S2, dispersed_legs, leg_factor
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
+from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource, plain
 from bisar_budget.effects.slow_tones import SlowTone
 from bisar_budget.effects.vibration import lines_of, near_lines, seen_of_axes, worst_phases
 from bisar_budget.faults import KeyPath, changes_words, printable
@@ -40,15 +40,16 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row
 from bisar_budget.findings.status import STATUS
+from bisar_budget.geometry import plain_vector
 from bisar_budget.mission.changes import name_of_error
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
+from bisar_budget.mission.readers import SectionValue
 from bisar_budget.mission.vibrations import AcceleratedSinusoid
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explained_error import (
-    RULES,
+    RULE_WORDS,
     as_written,
     at_the_allowable,
     combined,
@@ -183,16 +184,17 @@ def collection_chain(findings: MissionFindings) -> Iterator[Step]:
     """Steps to look direction, smear direction and determinant of Q, which do not depend on errors."""
     values: dict[str, float] = {}
     for name, state in (("t", findings.geometry.transmitter), ("r", findings.geometry.receiver)):
-        (x, y, _), (v_x, v_y, _) = state.position, state.velocity
-        values |= {f"φ̄_{name}": state.azimuth, f"θ̄_{name}": state.elevation, f"R_{name}": state.slant_range}
+        (x, y, _), (v_x, v_y, _) = plain_vector(state.position), plain_vector(state.velocity)
+        values |= {f"φ̄_{name}": float(state.azimuth), f"θ̄_{name}": float(state.elevation)}
+        values[f"R_{name}"] = float(state.slant_range)
         values |= {f"x_{name}": x, f"y_{name}": y, f"v_x{name}": v_x, f"v_y{name}": v_y}
-    look, s = findings.geometry.look_azimuth, findings.geometry.range_gradient
+    look, s = float(findings.geometry.look_azimuth), findings.geometry.range_gradient
     yield step("(11), bistatic look direction", WorkedEquation("φ_b", notation.LOOK_AZIMUTH, values, look, "rad"))
     east, north = notation.SMEAR
     yield step(
         "(31), smear direction",
-        WorkedEquation("east", east, values, s[1], ""),
-        WorkedEquation("north", north, values, -s[0], ""),
+        WorkedEquation("east", east, values, float(s[1]), ""),
+        WorkedEquation("north", north, values, float(-s[0]), ""),
     )
     determinant = findings.analysed().published.plane.determinant
     yield step("(30), range held constant", WorkedEquation("det Q", notation.DETERMINANT, values, determinant, "1/s"))
@@ -323,7 +325,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
         *_limit("published", published, values, by_models[0], is_power=is_power),
     )
     if by_echoes:
-        amplitude_part = amplitude_share(split, platform)
+        amplitude_part = float(amplitude_share(split, platform))
         shares = {"s_t": split.transmitter, "s_r": split.receiver}
         yield step(
             "Both platforms at one frequency: echoes add in amplitude, its part a",
@@ -333,7 +335,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
         values = {
             "a": amplitude_part,
             "λ": wavelength,
-            "φ": echo_phase(level),
+            "φ": float(echo_phase(level)),
         }
         title = "First principles; φ is the phase whose echoes have this level, J₁(φ)/J₀(φ) = l"
         powers = {"PSLR": ratio, "s_t": split.transmitter, "s_r": split.receiver}
@@ -433,10 +435,10 @@ def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: in
     seen = seen_of_axes(mission, platform, is_vector=is_vector)
     if not is_vector:
         if mission.has_direct_path:
-            text = f"{number(value)}*{number(seen[0])}"
+            text = f"{number(value)}*{number(float(seen[0]))}"
             yield step(title, Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
         return
-    products = [f"{number(size)}*{number(along)}" for size, along in zip(value, seen, strict=True)]
+    products = [f"{number(size)}*{number(float(along))}" for size, along in zip(value, seen, strict=True)]
     if is_sinusoid:
         text, rule = (
             " + ".join(f"|{product}|" for product in products),
@@ -457,12 +459,12 @@ def _near_lines(mission: Mission, platform: str, index: int, total: float) -> It
     near = [lines[member] for member in members]
     worst = worst_phases([line.amplitude for line in near], [line.frequency * T for line in near])
     sizes = " + ".join(
-        f"{number(line.amplitude)}*{number(abs(np.sinc(worst.cycles - line.frequency * T)))}" for line in near
+        f"{number(float(line.amplitude))}*{number(abs(np.sinc(worst.cycles - line.frequency * T)))}" for line in near
     )
     entries = ", ".join(map(str, members))
     title = (
-        f"Entries {entries} lie near each other: at x = {number(worst.cycles)} cells each adds A·|sinc(x − f·T)|, "
-        "sinc(x) = sin(πx)/(πx), in the worst phases"
+        f"Entries {entries} lie near each other: at x = {number(float(worst.cycles))} cells each adds "
+        "A·|sinc(x − f·T)|, sinc(x) = sin(πx)/(πx), in the worst phases"
     )
     yield step(title, f"declared = {sizes} = {total:.6g} m")
 
@@ -518,10 +520,10 @@ def _dispersion(analysis: Analysis, findings: MissionFindings, row: Row) -> Iter
         path, propagation = getattr(mission.geometry, name), mission.propagation
         if propagation is None:
             continue
-        content = propagation.content(name) * findings.coverage_factor
+        content = (propagation.content(name) or 0.0) * findings.coverage_factor
         values = {
             "K": ELECTRON_DELAY_M3_PER_S2 * content * float(leg_factor(CONTENT, path.position, path.position)),
-            "c": SPEED_OF_LIGHT,
+            "c": SPEED_OF_LIGHT_MPS,
             "f_0": mission.radar.center_frequency,
             "B": mission.radar.bandwidth,
         }
@@ -544,7 +546,8 @@ def _spatial_variance(analysis: Analysis, findings: MissionFindings, row: Row) -
         return
     east, north = at(scene.radius, scene.azimuth)
     differences = differences_at(analysis.errors, scene.radius, scene.azimuth, analysis.random)
-    sizes_by_name = phase_parts(differences, findings.combine, analysis.groups)
+    named_phases = phase_parts(differences, findings.combine, analysis.groups)
+    sizes_by_name = [(row_id, plain(phase)) for row_id, phase in named_phases]
     yield step(
         f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less at the centre"
     )
@@ -553,7 +556,9 @@ def _spatial_variance(analysis: Analysis, findings: MissionFindings, row: Row) -
 
 
 def _location_aggregate(mission: Mission, together: Together, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    rule = "the longest sum over all signs of the vectors" if findings.combine == "sum" else RULES[findings.combine]
+    rule = (
+        "the longest sum over all signs of the vectors" if findings.combine == "sum" else RULE_WORDS[findings.combine]
+    )
     moves = together.displacement_parts()
     title = "(25), (30)" if row.model == "published" else "Full model, each by the sign that moves farther"
     if findings.combine == "sum":
@@ -584,7 +589,7 @@ def _verdict(row: Row, findings: MissionFindings) -> Iterator[str]:
     yield from (f"    {printable(text)}" for text in texts)
 
 
-_EFFECTS = {"cubic": "Cubic phase", "spread": "Rms phase that spreads", "tone": "Peak phase of the tones"}
+_EFFECT_TITLES = {"cubic": "Cubic phase", "spread": "Rms phase that spreads", "tone": "Peak phase of the tones"}
 
 
 def finding_of(mission: Mission, findings: MissionFindings, requirement: JudgedRequirement) -> Iterator[Step]:
@@ -641,7 +646,7 @@ def not_judged(findings: MissionFindings, row: Row) -> Iterator[Step]:
 
 def _air_that_changes(reason: Note) -> Step:
     """Step of constant delays in the air: their effect as if they changed, and its share of the allowable."""
-    values: Sequence[Any] = reason.values
+    values: Sequence[SectionValue] = reason.values
     _, correlation_time, key, size, use, _ = values
     unit = {"islr": "dB", LOCATION: "m"}.get(key, "rad")
     title = f"The declared delays of the air, if their correlation time were {with_unit(correlation_time, 's')}"
@@ -672,7 +677,9 @@ def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[S
             (float(together.combined(sizes_by_name, rule)[0]), rule, together.phase_parts(sizes_by_name, rule))
         )
     total, rule, sizes_by_name = max(totals, key=lambda candidate: candidate[0])
-    yield from combined(f"{_EFFECTS[kind]}: no requirement judges it", rule, sizes_by_name, total, symbol="total")
+    yield from combined(
+        f"{_EFFECT_TITLES[kind]}: no requirement judges it", rule, sizes_by_name, total, symbol="total"
+    )
     required = analysis.mission.requirements.quadratic_phase_error
     values = {"required": required}
     level = min(NEGLIGIBLE_FRACTION * required, SMALL_RAD)
@@ -742,8 +749,6 @@ def _displacing(analysis: Analysis, row: Row) -> Iterator[Step]:
     names = {error.id for error in analysis.random if error.displaces_unknown}
     for contribution in analysis.together(model).own:
         if contribution.row_id in names:
-            qpe, cubic = (
-                with_unit(float(phase[0]), "rad") for phase in (contribution.qpe_rad, contribution.cubic_rad)
-            )
+            qpe, cubic = (with_unit(plain(phase), "rad") for phase in (contribution.qpe_rad, contribution.cubic_rad))
             lines.append(f"{printable(contribution.row_id)}: QPE {qpe}, cubic {cubic}")
     yield step("Not included in the displacement, which is not computed for them", *lines)

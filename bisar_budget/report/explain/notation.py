@@ -14,10 +14,10 @@ from unicodedata import combining, normalize
 from bisar_budget.catalogue import FORMULAS, SYMBOLS, TEXTS
 from bisar_budget.report.words.sentences import xml_text
 
-_TOKEN = re.compile(r"\s*(\d+(?:\.\d+)?|det Q|[^\W\d_][\w\u0300-\u036f\u20d0-\u20ff]*|[-+*/^()|])")
+_FORMULA_TOKEN = re.compile(r"\s*(\d+(?:\.\d+)?|det Q|[^\W\d_][\w\u0300-\u036f\u20d0-\u20ff]*|[-+*/^()|])")
 _LETTER = re.compile(r"(?:adj|[^\W\d_][\u0300-\u036f\u20d0-\u20ff]*)(?:_\w+)?")
 _FUNCTIONS = ("sqrt", "log")
-_ACCENTS = {
+_ACCENT_COMMANDS = {
     "\u0303": ("tilde", "~"),
     "\u0304": ("bar", "¯"),
     "\u0302": ("hat", "^"),
@@ -26,7 +26,15 @@ _ACCENTS = {
     "\u20db": ("dddot", "..."),
     "\u20dc": ("ddddot", "...."),
 }
-_GREEK = {"β": r"\beta", "λ": r"\lambda", "π": r"\pi", "φ": r"\phi", "θ": r"\theta", "σ": r"\sigma", "τ": r"\tau"}
+_GREEK_COMMANDS = {
+    "β": r"\beta",
+    "λ": r"\lambda",
+    "π": r"\pi",
+    "φ": r"\phi",
+    "θ": r"\theta",
+    "σ": r"\sigma",
+    "τ": r"\tau",
+}
 
 
 class Node(NamedTuple):
@@ -103,7 +111,7 @@ def is_mathematical(formula: str) -> bool:
         parsed(formula)
     except ValueError:
         return False
-    names = [token for token in _TOKEN.findall(formula) if token[0].isalpha() and token not in _FUNCTIONS]
+    names = [token for token in _FORMULA_TOKEN.findall(formula) if token[0].isalpha() and token not in _FUNCTIONS]
     return all(name in SYMBOLS or _LETTER.fullmatch(name) for name in names)
 
 
@@ -116,7 +124,7 @@ def parsed(formula: str) -> Node:
     ValueError
         The text is no formula in this notation.
     """
-    tokens = [match[1] for match in _TOKEN.finditer(formula)]
+    tokens = [match[1] for match in _FORMULA_TOKEN.finditer(formula)]
     if "".join(tokens).replace(" ", "") != formula.replace(" ", ""):
         raise ValueError(f"not a formula: {formula}")
     node, remaining = _sum(tuple(tokens))
@@ -164,14 +172,14 @@ def symbol(name: str, language: Language) -> str:
     spelled = normalize("NFD", head)
     letter, *accents = tuple(spelled) if len(normalize("NFC", head)) == 1 or combining(spelled[1]) else (head,)
     if language is LATEX:
-        text = _GREEK.get(letter, letter) if len(letter) == 1 else rf"\mathrm{{{letter}}}"
+        text = _GREEK_COMMANDS.get(letter, letter) if len(letter) == 1 else rf"\mathrm{{{letter}}}"
         for accent in accents:
-            text = rf"\{_ACCENTS[accent][0]}{{{text}}}"
+            text = rf"\{_ACCENT_COMMANDS[accent][0]}{{{text}}}"
         word = below if len(below) < 3 else rf"\mathrm{{{below}}}"
         return f"{text}_{{{word}}}" if below else text
     text = f"<mi>{letter}</mi>"
     for accent in accents:
-        text = f'<mover accent="true">{text}<mo>{_ACCENTS[accent][1]}</mo></mover>'
+        text = f'<mover accent="true">{text}<mo>{_ACCENT_COMMANDS[accent][1]}</mo></mover>'
     tag = "mn" if below.isdigit() else "mi"
     return f"<msub>{text}<{tag}>{below}</{tag}></msub>" if below else text
 
@@ -243,8 +251,8 @@ def _closed(tokens: tuple[str, ...], end: str) -> _ParsedPart:
     return inner, tokens[1:]
 
 
-AXES = "xyz"
-_LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
+AXIS_LETTERS = "xyz"
+_KIND_LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
 EDGE_PHASE = TEXTS["edge phase"]
 CLOCK_PHASE = TEXTS["Table II t̃_2 0"]
 VIBRATION = {"pslr": TEXTS["Vibration A 1"], "islr": TEXTS["Vibration σ 1"]}
@@ -258,7 +266,7 @@ DETERMINANT = TEXTS["determinant"]
 
 def motion_symbol(kind: str, axis: str, platform: str) -> str:
     """Symbol of one motion error, such as `ã_xt`."""
-    return f"{_LETTERS[kind]}_{axis}{platform[0]}"
+    return f"{_KIND_LETTERS[kind]}_{axis}{platform[0]}"
 
 
 def motion_coefficients(kind: str, axis: str, platform: str) -> dict[int, str]:

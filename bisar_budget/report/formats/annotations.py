@@ -37,7 +37,7 @@ from bisar_budget.report.words.sentences import (
 
 _Object = dict[str, object]  # an object of SARIF, which is JSON
 
-_WORST_FIRST = ("error", "warning", "notice")
+_COMMANDS_WORST_FIRST = ("error", "warning", "notice")
 _MAX_SUMMARY_LINES = 20
 
 
@@ -54,7 +54,9 @@ def as_github(report: Report, style: Style) -> str:
 
     The runner shows ten errors and ten warnings of a step.
     """
-    annotations = sorted(_annotations(report, style), key=lambda annotation: _WORST_FIRST.index(annotation.command))
+    annotations = sorted(
+        _annotations(report, style), key=lambda annotation: _COMMANDS_WORST_FIRST.index(annotation.command)
+    )
     lines = [_command(annotation) for annotation in annotations]
     return "\n".join(lines or [f"bisar-budget: {counted(len(report.missions), 'mission')}, no findings"]) + "\n"
 
@@ -149,7 +151,7 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 SRCROOT = "%SRCROOT%"
 
 # Rule id: title of the rule, and its explanation with remedies.
-RULES = {
+ANNOTATION_RULES = {
     "quadratic_phase_error": (
         "Quadratic phase error within its share of the budget",
         "An error of motion or clock may add at most its owner's share of requirements.quadratic_phase_error at the "
@@ -202,7 +204,7 @@ RULES = {
         "a file that declares no error, an n_pull beyond range walk. Correct the entry or remove it.",
     ),
 }
-_RULE_INDEX = {rule: index for index, rule in enumerate(RULES)}
+_RULE_INDEX = {rule: index for index, rule in enumerate(ANNOTATION_RULES)}
 
 
 def as_sarif(report: Report, style: Style) -> str:
@@ -246,7 +248,7 @@ def _driver(version: str) -> _Object:
     return {
         "name": "bisar-budget",
         "version": version,
-        "rules": [_rule(rule, short, help_text) for rule, (short, help_text) in RULES.items()],
+        "rules": [_rule(rule, short, help_text) for rule, (short, help_text) in ANNOTATION_RULES.items()],
         "notifications": [
             {
                 "id": "unusable_mission",
@@ -282,7 +284,7 @@ def _artifact_location(file: str, style: Style) -> dict[str, str]:
 
 def _result(row: Row, mission: MissionFindings, artifact: _Object, identity: Identity) -> _Object:
     rule = "autofocus_pull_in" if row.subject.kind == "autofocus_pull_in" else row.metric
-    rule = rule if rule in RULES else "other"
+    rule = rule if rule in ANNOTATION_RULES else "other"
     name = identity.of(row.id, row.requirement_id)
     result = _located(rule, STATUS[row.status].sarif, finding(row, mission), row.line, artifact, name)
     result["properties"] = _properties(

@@ -5,10 +5,10 @@ import re
 from collections.abc import Iterator, Sequence
 
 from bisar_budget.design.compare import Comparison, PartState
-from bisar_budget.design.sensitivity import LITTLE, Relaxed, Sensitivity, Slope
+from bisar_budget.design.sensitivity import MIN_SHOWN_CHANGE_FRACTION, Relaxed, Sensitivity, Slope
 from bisar_budget.design.solve import Crossing, Imaged, Solution, State
 from bisar_budget.faults import printable
-from bisar_budget.findings.requirement import NAMES
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import document_text, outside_item, verdict_item
@@ -119,28 +119,28 @@ def _compared(comparison: Comparison) -> dict[str, object]:
         "given": None,
         "crossings": [],
         "nearest": None,
-        "places_without_mission": sum(part.standing.status == "error" for part in comparison.parts),
-        "places_waived": sum(part.standing.status == "waived" for part in comparison.parts),
-        "waived_by": list(dict.fromkeys(waiver for part in comparison.parts for waiver in part.standing.waived_by)),
-        "parts": [_part(part) for part in comparison.parts],
+        "places_without_mission": sum(state.standing.status == "error" for state in comparison.parts),
+        "places_waived": sum(state.standing.status == "waived" for state in comparison.parts),
+        "waived_by": list(dict.fromkeys(waiver for state in comparison.parts for waiver in state.standing.waived_by)),
+        "parts": [_part_state(state) for state in comparison.parts],
         "verified": _imaged(comparison.imaged),
     }
 
 
-def _part(part: PartState) -> dict[str, object]:
+def _part_state(state: PartState) -> dict[str, object]:
     return {
-        "id": part.id,
-        "name": part.name,
-        "kind": part.kind,
-        "file": part.file,
-        "is_given": part.is_given,
-        **part.standing._asdict(),
-        "waived_by": list(part.standing.waived_by),
-        "figures": list(part.figures),
-        "silent_on": list(part.silent_on),
-        "own_row": part.own_row,
-        "own_utilization": part.own_utilization,
-        "reason": part.reason or None,
+        "id": state.id,
+        "name": state.name,
+        "kind": state.kind,
+        "file": state.file,
+        "is_given": state.is_given,
+        **state.standing._asdict(),
+        "waived_by": list(state.standing.waived_by),
+        "figures": list(state.figures),
+        "silent_on": list(state.silent_on),
+        "own_row": state.own_row,
+        "own_utilization": state.own_utilization,
+        "reason": state.reason or None,
     }
 
 
@@ -163,28 +163,28 @@ def _lines_of_parts(comparison: Comparison, style: Style) -> Iterator[str]:
     count, total = len(comparison.complying), len(comparison.parts)
     subject = f"row {printable(comparison.row)} complies" if comparison.row else "the mission complies"
     verdict = f"{subject} with {count} of {total} parts" if count else f"{subject} with none of {total} parts"
-    if standings := [part.standing for part in comparison.parts if part.standing.status == "waived"]:
+    if standings := [state.standing for state in comparison.parts if state.standing.status == "waived"]:
         waivers = tuple(dict.fromkeys(waiver for standing in standings for waiver in standing.waived_by))
         verdict += f", {waived_count(len(standings), waivers)}"
     remark = f"; {comparison.model} model{', neither fails nor warns' if comparison.target == 'warn' else ''}"
     yield from title_lines(
         comparison, f"{printable(comparison.key)}: {verdict}", _SGR[comparison.status], style, remark=remark
     )
-    is_mixed = len({part.kind for part in comparison.parts}) > 1
+    is_mixed = len({state.kind for state in comparison.parts}) > 1
     rows = [["part", *(["kind"] if is_mixed else []), "status", "use", ""]]
-    for part in comparison.parts:
-        standing = part.standing
-        row = printable(part.reason) if part.reason else standing.row or _undecided(standing.requirement)
+    for state in comparison.parts:
+        standing = state.standing
+        row = printable(state.reason) if state.reason else standing.row or _undecided(standing.requirement)
         row += f" ({waiver_names(standing.waived_by)})" if standing.waived_by else ""
-        marks = f"{' *' if part.is_given else ''}{' -' if part.silent_on else ''}"
-        kind = [part.kind] if is_mixed else []
-        rows.append([f"{part.id}{marks}", *kind, STATUS[standing.status].text, use_words(standing.utilization), row])
+        marks = f"{' *' if state.is_given else ''}{' -' if state.silent_on else ''}"
+        kind = [state.kind] if is_mixed else []
+        rows.append([f"{state.id}{marks}", *kind, STATUS[standing.status].text, use_words(standing.utilization), row])
     yield from table(rows, style.table_width)
     yield ""
-    if any(part.is_given for part in comparison.parts):
+    if any(state.is_given for state in comparison.parts):
         stays = "; the part of the other kind is kept" if comparison.kept else ""
         yield from wrapped(f"*  named by the file{stays}", "   ")
-    if any(part.silent_on for part in comparison.parts):
+    if any(state.silent_on for state in comparison.parts):
         yield from wrapped("-  lacks figures that other parts have: these errors are not declared", "   ")
     yield from wrapped(
         "Parts that comply come first, smallest margin first; then those that do not, nearest miss first.", "  "
@@ -302,7 +302,7 @@ def _shown(imaged: Imaged) -> str:
 
 def _undecided(requirement: str | None) -> str:
     """Words for a state without a deciding row; they name the requirement that cannot be judged."""
-    return "no row decides" if requirement is None else f"{NAMES[requirement]} cannot be judged"
+    return "no row decides" if requirement is None else f"{REQUIREMENT_NAMES[requirement]} cannot be judged"
 
 
 def _state_words(state: State) -> str:
@@ -491,4 +491,8 @@ def _change_words(change: tuple[str, float, float] | None) -> str:
     if change is None:
         return "-"
     _, before, after = change
-    return percent(before) if abs(after - before) <= LITTLE * before else f"{percent(before)} -> {percent(after)}"
+    return (
+        percent(before)
+        if abs(after - before) <= MIN_SHOWN_CHANGE_FRACTION * before
+        else f"{percent(before)} -> {percent(after)}"
+    )

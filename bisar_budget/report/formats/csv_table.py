@@ -20,7 +20,7 @@ from bisar_budget.report.words.heading import overrides_words
 from bisar_budget.report.words.requirements import requirement_id, share_columns, use_remarks
 from bisar_budget.report.words.sentences import spreadsheet_text
 
-COLUMNS = (
+CSV_COLUMNS = (
     "file",
     "mission",
     "id",
@@ -66,7 +66,7 @@ COLUMNS = (
 
 # Columns that are fields of a row. Columns with text of the user are written apart.
 _ROW_COLUMNS = tuple(
-    column for column in COLUMNS if column in Row._fields and column not in ("requirement_id", "evidence")
+    column for column in CSV_COLUMNS if column in Row._fields and column not in ("requirement_id", "evidence")
 )
 _values_of = attrgetter(*_ROW_COLUMNS)
 
@@ -78,7 +78,7 @@ def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
 
 def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
     """Write the lines of all missions below a header."""
-    return csv_text([COLUMNS]) + "".join(piece.text for piece in pieces)
+    return csv_text([CSV_COLUMNS]) + "".join(piece.text for piece in pieces)
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
@@ -103,7 +103,7 @@ def _faults(mission: UnusableMission) -> Iterator[list[object]]:
             "kind": "fault",
             "reason": str(fault),
         }
-        yield [cells.get(column) for column in COLUMNS]
+        yield [cells.get(column) for column in CSV_COLUMNS]
 
 
 def _rows(mission: MissionFindings) -> Iterator[list[object]]:
@@ -119,7 +119,7 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
     }
     for requirement in mission.requirements:
         cells = mission_cells | _requirement(requirement)
-        yield [cells.get(column) for column in COLUMNS]
+        yield [cells.get(column) for column in CSV_COLUMNS]
     verdicts = {verdict.id: verdict.verdict for verdict in mission.verdicts or ()}
     for row in mission.rows:
         x, y = row.displacement_m or (None, None)
@@ -138,7 +138,7 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
             "overrides": outside,
             "waived_by": _waived_by(row),
         }
-        yield [cells.get(column) for column in COLUMNS]
+        yield [cells.get(column) for column in CSV_COLUMNS]
 
 
 def _requirement(requirement: JudgedRequirement) -> dict[str, object]:

@@ -24,7 +24,7 @@ from bisar_budget.report import Piece, Style
 if TYPE_CHECKING:
     from bisar_budget.report.words.heading import AboutMission
 
-FORMAT = "bisar-budget/check/1"
+CHECK_FORMAT = "bisar-budget/check/1"
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
@@ -35,7 +35,7 @@ def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
 
 def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
     """Write the one JSON document."""
-    document = {"format": FORMAT, "version": version, "status": worst(piece.status for piece in pieces)}
+    document = {"format": CHECK_FORMAT, "version": version, "status": worst(piece.status for piece in pieces)}
     head = _indented(document, 1).removesuffix("\n}")
     missions = f",\n{_MARGIN}".join(piece.text for piece in pieces)
     return f'{head},\n  "missions": [\n{_MARGIN}{missions}\n  ]\n}}\n'

@@ -9,9 +9,9 @@ from datetime import UTC, date, datetime
 from bisar_budget import __version__
 from bisar_budget.design.passes import Passes, SatellitePass
 from bisar_budget.faults import printable
-from bisar_budget.findings.requirement import NAMES
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.status import STATUS
-from bisar_budget.paths.instant import DAY, Instant
+from bisar_budget.paths.instant import DAY_S, Instant
 from bisar_budget.report import Style
 from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.json_document import document_text, outside_item
@@ -225,7 +225,7 @@ def _cells(overpass: SatellitePass) -> tuple[str, ...]:
         str(overpass.number),
         _seconds(overpass.center) if overpass.center is not None else f"{_seconds(overpass.culmination)}*",
         f"{minutes:.1f}" if minutes < 1000 else f"{minutes:.0f}",
-        f"{_degrees(None if state is None else state.elevation)}/{_degrees(overpass.max_elevation)}",
+        f"{_degrees(None if state is None else float(state.elevation))}/{_degrees(overpass.max_elevation)}",
         _degrees(overpass.bearing),
         overpass.side or "-",
         "-" if state is None else "asc" if overpass.is_ascending else "desc",
@@ -289,7 +289,7 @@ def _notes(passes: Passes) -> Iterator[str]:
 def _decided(overpass: SatellitePass) -> str:
     if overpass.requirement is None:
         return ""
-    name = NAMES.get(overpass.requirement, overpass.requirement.replace("_", " "))
+    name = REQUIREMENT_NAMES.get(overpass.requirement, overpass.requirement.replace("_", " "))
     waived = f", not met but waived ({waiver_names(overpass.waived_by)})" if overpass.waived_by else ""
     return f"{name} decides" + (f", by {printable(overpass.row)}" if overpass.row else "") + waived
 
@@ -340,7 +340,7 @@ def as_ics(passes: Passes, stamp: date) -> str:
     seen: Counter[str] = Counter()
     timestamp = _stamp(datetime(stamp.year, stamp.month, stamp.day, tzinfo=UTC))
     for overpass in passes.found:
-        half_hours = math.floor((overpass.culmination.day * DAY + overpass.culmination.seconds) / _UID_PERIOD_S)
+        half_hours = math.floor((overpass.culmination.day * DAY_S + overpass.culmination.seconds) / _UID_PERIOD_S)
         start, stop = overpass.start, overpass.stop
         uid = digest(passes.name, passes.platform, str(half_hours))[:32]
         seen[uid] += 1
@@ -375,8 +375,8 @@ def _description(overpass: SatellitePass, passes: Passes) -> Iterator[str]:
     if overpass.center is not None and state is not None:
         yield f"Mid-time {overpass.center.as_text()}"
         yield (
-            f"Elevation {_degrees(state.elevation, 1)} deg from {_degrees(overpass.bearing)} deg "
-            f"(north, clockwise), {format_quantity(state.slant_range, 'm')} away"
+            f"Elevation {_degrees(float(state.elevation), 1)} deg from {_degrees(overpass.bearing)} deg "
+            f"(north, clockwise), {format_quantity(float(state.slant_range), 'm')} away"
         )
         yield f"{sentence(direction(overpass))}, looks {overpass.side}"
     yield f"Highest {_degrees(overpass.max_elevation, 1)} deg at {overpass.culmination.as_text()}"

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from bisar_budget import __version__
 from bisar_budget.design.offers import Offer, OfferedFigure
 from bisar_budget.faults import printable
-from bisar_budget.findings.requirement import NAMES
-from bisar_budget.findings.specification import LEAST_ROOM, Broken, Specification, SpecificationSheet
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES
+from bisar_budget.findings.specification import MIN_ROOM_FRACTION, Broken, Specification, SpecificationSheet
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.report import Style
@@ -26,7 +26,7 @@ from bisar_budget.report.words.requirements import RequirementLine, requirement_
 from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, share_percent, table, wrapped
 
 _LISTED_COUNT = 3  # parts of the catalogue that a table names
-_COLUMNS = ("file", "key", "value", "ordered", "unit", "text", "declared", "weight", "parts")
+_SHEET_COLUMNS = ("file", "key", "value", "ordered", "unit", "text", "declared", "weight", "parts")
 
 
 Answer = tuple[SpecificationSheet, Offer | None]  # a sheet, and the offer that is compared with it
@@ -95,9 +95,11 @@ def _offer(offer: Offer) -> dict[str, object]:
 def as_csv(answers: Sequence[Answer], style: Style) -> str:
     """Write a line for each specification, in SI. The last columns are its shares of the requirements."""
     shares = [
-        key for key in NAMES if any(key in spec.shares for sheet, _ in answers for spec in sheet.specifications)
+        key
+        for key in REQUIREMENT_NAMES
+        if any(key in spec.shares for sheet, _ in answers for spec in sheet.specifications)
     ]
-    lines: list[list[object]] = [[*_COLUMNS, *(f"share of {key}" for key in shares)]]
+    lines: list[list[object]] = [[*_SHEET_COLUMNS, *(f"share of {key}" for key in shares)]]
     for sheet, _ in answers:
         for spec in sheet.specifications:
             sizes = (spec.value, spec.ordered, spec.unit, spec.text, spec.declared, spec.weight)
@@ -164,7 +166,7 @@ def _terms(sheet: SpecificationSheet) -> str:
 
 def _line(spec: Specification) -> list[str]:
     most = max(spec.shares, key=lambda key: spec.shares[key], default="")
-    share = f"{share_percent(spec.shares[most])} of {NAMES[most]}" if most else "no limit"
+    share = f"{share_percent(spec.shares[most])} of {REQUIREMENT_NAMES[most]}" if most else "no limit"
     return [spec.key, spec.text or "free", spec.declared_text or "-", share]
 
 
@@ -186,9 +188,9 @@ def _broken_words(row: Broken) -> list[str]:
     """Cells of a row in which other errors leave no room."""
     if row.used is None:
         return [row.id, "-", percent(row.allowed), "over its limit: they leave no image"]
-    if row.used > 1 + LEAST_ROOM:
+    if row.used > 1 + MIN_ROOM_FRACTION:
         return [row.id, percent(row.used), percent(row.allowed), "over its limit"]
-    is_full = row.used >= 1 - LEAST_ROOM
+    is_full = row.used >= 1 - MIN_ROOM_FRACTION
     remark = "at its limit" if is_full else "within its limit, but not with the reserve"
     return [row.id, "100 %" if is_full else share_percent(row.used), percent(row.allowed), remark]
 
@@ -196,7 +198,7 @@ def _broken_words(row: Broken) -> list[str]:
 def _way_out(sheet: SpecificationSheet) -> str:
     """Remedies where other errors leave no room."""
     used = [math.inf if row.used is None else row.used for row in sheet.broken]
-    room_fraction = 1 - max(used) / (1 - LEAST_ROOM)
+    room_fraction = 1 - max(used) / (1 - MIN_ROOM_FRACTION)
     permille = math.ceil(1e3 * room_fraction) - 1 if room_fraction > 0 else -1  # strictly less than the room
     if permille >= 0:
         return f"The other errors alone use this much. --reserve {permille / 10:g}% or less leaves room."
@@ -305,8 +307,8 @@ def specified(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:
 
 
 def _table(sheet: SpecificationSheet) -> Iterator[doc.Block]:
-    keys = [key for key in NAMES if any(key in spec.shares for spec in sheet.specifications)]
-    size_heads = doc.numbers("Ordered", "Found", "Declared", *(f"Share of {NAMES[key]}" for key in keys))
+    keys = [key for key in REQUIREMENT_NAMES if any(key in spec.shares for spec in sheet.specifications)]
+    size_heads = doc.numbers("Ordered", "Found", "Declared", *(f"Share of {REQUIREMENT_NAMES[key]}" for key in keys))
     heads = doc.heads(*doc.numbers("No."), "Specification", *size_heads, "Parts")
     rows: list[doc.Line] = []
     for number, spec in enumerate(sheet.specifications, 1):
@@ -399,7 +401,9 @@ def _statement(spec: Specification) -> str:
 def _rationale(sheet: SpecificationSheet, spec: Specification) -> str:
     shares = sorted(spec.shares.items(), key=lambda item: -item[1])
     share_words = [
-        f"{share_percent(share)} of the {NAMES[key]}" for key, share in shares if share >= _PARENT_SHARE_FRACTION
+        f"{share_percent(share)} of the {REQUIREMENT_NAMES[key]}"
+        for key, share in shares
+        if share >= _PARENT_SHARE_FRACTION
     ]
     takes = f"It takes {' and '.join(share_words)} that may be used. " if share_words else ""
     reserve = f"{percent(sheet.reserve)} of each limit is in reserve."

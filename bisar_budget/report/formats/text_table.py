@@ -23,7 +23,7 @@ from bisar_budget.report.words.heading import (
     rule_words,
 )
 from bisar_budget.report.words.requirements import (
-    COLUMNS,
+    REQUIREMENT_COLUMNS,
     RequirementLine,
     declared_words,
     is_explained_in_table,
@@ -121,9 +121,12 @@ def _verdict(mission: MissionFindings, style: Style) -> list[str]:
 def requirement_table(mission: MissionFindings, style: Style) -> Iterator[str]:
     """The table of requirements."""
     requirement_rows = list(requirement_lines(mission))
-    cells = [COLUMNS[:4], *((line.name, line.allowed, line.reached, line.use) for line in requirement_rows)]
+    cells = [
+        REQUIREMENT_COLUMNS[:4],
+        *((line.name, line.allowed, line.reached, line.use) for line in requirement_rows),
+    ]
     widths = [max(len(row_line[column]) for row_line in cells) for column in range(4)]
-    yield spaced(COLUMNS, [*widths, _STATUS_WIDTH, 0], "<>>><<")
+    yield spaced(REQUIREMENT_COLUMNS, [*widths, _STATUS_WIDTH, 0], "<>>><<")
     for line in requirement_rows:
         yield from _requirement(line, widths, style)
 
@@ -170,7 +173,7 @@ def _after(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 
 _STATUS_WIDTH = 8  # columns of a status, the same in every table, for eyes and scripts
-_HEADER = (f"{'status':<{_STATUS_WIDTH}} row", "declared", "allowable", "use", "by")
+_TABLE_HEADER = (f"{'status':<{_STATUS_WIDTH}} row", "declared", "allowable", "use", "by")
 
 
 def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
@@ -203,7 +206,7 @@ def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
 
 
 def _lines(rows: Sequence[Row], cells: Sequence[Sequence[str]], style: Style) -> Iterator[str]:
-    head, *row_lines = aligned([_HEADER, *cells], style.table_width)
+    head, *row_lines = aligned([_TABLE_HEADER, *cells], style.table_width)
     yield from head
     for row, (first, *continuation) in zip(rows, row_lines, strict=True):
         yield _word(row.status, style, _STATUS_WIDTH) + first[_STATUS_WIDTH:]

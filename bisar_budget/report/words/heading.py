@@ -16,8 +16,8 @@ from bisar_budget.report import Style
 from bisar_budget.report.words.sentences import TEXT_WIDTH, phase_limit, sentence, wrapped
 from bisar_budget.units import format_quantity
 
-_MODELS = {"published": "published model", "full": "full model", "strictest": "stricter of both models"}
-_RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
+_MODEL_WORDS = {"published": "published model", "full": "full model", "strictest": "stricter of both models"}
+_COMBINATION_WORDS = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
 _MODELS_AT_LENGTH = {
     "published": "published (Rigling & Moses, Tables I and II)",
     "full": "full (exact ranges, displacement included)",
@@ -49,7 +49,7 @@ class AboutMission(Protocol):
 
 def rule_words(mission: MissionFindings) -> str:
     """Model and rule of combination that judge a mission."""
-    return f"{_MODELS[mission.model]}, {_RULES[mission.combine]}"
+    return f"{_MODEL_WORDS[mission.model]}, {_COMBINATION_WORDS[mission.combine]}"
 
 
 def overrides_words(mission: AboutMission, *, with_changes: bool = True) -> str:
@@ -104,7 +104,7 @@ def document_words(document: Document) -> str:
 
 def narrow_gradients(geometry: BistaticGeometry) -> str:
     """Warning that displacements grow with a narrow angle between the gradients; empty from 30 degrees on."""
-    angle = geometry.gradient_angle
+    angle = float(geometry.gradient_angle)
     if math.degrees(angle) >= _NARROW_ANGLE_DEG:
         return ""
     return (
@@ -132,16 +132,17 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
         yield "Path", f"{name}: {path_words(path)}"
     yield (
         "Geometry",
-        f"bistatic angle {_degrees(geometry.bistatic_angle)}, look azimuth {_degrees(geometry.look_azimuth)}, "
-        f"range and Doppler gradients {_degrees(geometry.gradient_angle)} apart, "
+        f"bistatic angle {_degrees(float(geometry.bistatic_angle))}, "
+        f"look azimuth {_degrees(float(geometry.look_azimuth))}, "
+        f"range and Doppler gradients {_degrees(float(geometry.gradient_angle))} apart, "
         f"wavelength {format_quantity(mission.wavelength, 'm', 4)}",
     )
     yield (
         "Resolution",
-        f"{format_quantity(mission.resolution.range, 'm')} range, "
-        f"{format_quantity(mission.resolution.cross_range, 'm')} cross range (peak to null, on ground); "
-        f"{format_quantity(mission.resolution.range_half_power, 'm')} and "
-        f"{format_quantity(mission.resolution.cross_range_half_power, 'm')} wide at half power",
+        f"{format_quantity(float(mission.resolution.range), 'm')} range, "
+        f"{format_quantity(float(mission.resolution.cross_range), 'm')} cross range (peak to null, on ground); "
+        f"{format_quantity(float(mission.resolution.range_half_power), 'm')} and "
+        f"{format_quantity(float(mission.resolution.cross_range_half_power), 'm')} wide at half power",
     )
     if mission.peak_loss_db is not None:
         before = "" if allocation.n_pull is None else ", before autofocus"
@@ -157,7 +158,7 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
             f"{allocation.autofocus_gain:.3g}"
         )
     yield "Budget", f"quadratic phase error (QPE) {phase_limit(allocation.qpe_total, mission)}: {shares}{gain}"
-    yield "Model", f"{_MODELS_AT_LENGTH[mission.model]}, {_RULES[mission.combine]}"
+    yield "Model", f"{_MODELS_AT_LENGTH[mission.model]}, {_COMBINATION_WORDS[mission.combine]}"
     if mission.scene is not None and not mission.scene.degeneracy:
         radius = format_quantity(mission.scene.radius, "m")
         yield (
@@ -203,8 +204,8 @@ def _platform(state: PlatformState, explains_squint: bool) -> str:
     if state.squint is not None:
         squint = f"squint {_degrees(state.squint)}" + (" off broadside" if explains_squint else "")
     return (
-        f"{format_quantity(state.slant_range, 'm', 4)} away, azimuth {_degrees(state.azimuth)}, "
-        f"elevation {_degrees(state.elevation)}, {squint}"
+        f"{format_quantity(float(state.slant_range), 'm', 4)} away, azimuth {_degrees(float(state.azimuth))}, "
+        f"elevation {_degrees(float(state.elevation))}, {squint}"
     )
 
 

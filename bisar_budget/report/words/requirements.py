@@ -20,7 +20,7 @@ from bisar_budget.report.words.sentences import (
 )
 from bisar_budget.units import format_quantity
 
-COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
+REQUIREMENT_COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
 
 
 class RequirementLine(NamedTuple):

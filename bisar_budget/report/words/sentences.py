@@ -352,13 +352,17 @@ def uri(path: str) -> str:
 
 # Signs that begin a formula, and their full-width forms, which some programs take for them.
 _FORMULA_SIGNS = "=+-@\uff1d\uff0b\uff0d\uff20"
-_SIZE = re.compile(r"-|[+-]?\d+(\.\d+)?(e[+-]?\d+)?( [A-Za-z\u00b5\u00b0%/\u00b2\u00b3\u221a]+)?")  # never a formula
+_SIZE_PATTERN = re.compile(
+    r"-|[+-]?\d+(\.\d+)?(e[+-]?\d+)?( [A-Za-z\u00b5\u00b0%/\u00b2\u00b3\u221a]+)?"
+)  # never a formula
 
 
 def spreadsheet_text(value: str | None) -> str | None:
     """Put an apostrophe before text that a spreadsheet would run as a formula, also after blanks."""
     value = printable(value) if value else value
     is_formula = (
-        bool(value) and (value or "").lstrip()[:1] in tuple(_FORMULA_SIGNS) and not _SIZE.fullmatch(value or "")
+        bool(value)
+        and (value or "").lstrip()[:1] in tuple(_FORMULA_SIGNS)
+        and not _SIZE_PATTERN.fullmatch(value or "")
     )
     return f"'{value}" if is_formula else value

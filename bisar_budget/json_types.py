@@ -1,0 +1,10 @@
+"""Types of what JSON and YAML documents hold."""
+
+from typing import Any
+
+JsonObject = dict[str, object]
+"""An object of a document that is written, or whose values are tested before use."""
+JsonDocument = dict[str, Any]
+"""A document as `json.loads` returns it, for a caller who knows its schema."""
+Definitions = dict[str, JsonObject]
+"""Definitions of a JSON Schema by name, to which readers add their own."""

@@ -1,0 +1,183 @@
+"""Errors of platforms in free fall, which follow the linearised dynamics of the orbit.
+
+A satellite whose measured state is wrong at mid-aperture flies another orbit. The difference of both orbits is no
+straight line: an error of the height changes the period, and gravity pulls the wrong place otherwise.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from bisar_budget.arrays import Floats, PerCase
+from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2, EARTH_RADIUS_M, LEAST_FALLING_HEIGHT_M
+from bisar_budget.geometry import PlatformState, Vectors, cross, norm
+from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S, SceneAxes, free_fall
+
+FREE_FALL_FRACTION = 0.05  # of gravity, by which the acceleration of a path in free fall may differ from free fall
+_NODE_COUNT = 12  # of the collocation; over half a radian of an orbit its error is 1e-12 of the motion
+
+
+@dataclass(frozen=True)
+class FreeFall:
+    """The dynamics of the errors of a platform in free fall, in the axes of a scene.
+
+    Attributes
+    ----------
+    centre : Vectors
+        The Earth's centre. [m]
+    rotation : Vectors
+        Rate at which the axes turn against the stars; zero for a scene without a place on the Earth. [rad/s]
+    share : float or (cases,)
+        1 in cases in which the platform is in free fall, 0 in cases in which it is not: there errors are those of a
+        body that nothing turns, p + vτ + aτ²/2.
+    """
+
+    centre: Vectors
+    rotation: Vectors
+    share: PerCase = 1.0
+
+    def motions(self, path: PlatformState, half: Floats, places: Floats) -> Floats:
+        """Motion over the aperture by a unit error of the state at mid-aperture.
+
+        Parameters
+        ----------
+        path : PlatformState
+            The path of the platform.
+        half : (cases,)
+            Half the aperture time. [s]
+        places : (nodes,)
+            Slow times from -1 to 1, in half apertures.
+
+        Returns
+        -------
+        (3, 3, 3, nodes, cases)
+            By error (1 m of position, 1 m/s of velocity, 1 m/s² of acceleration), axis of the error, and component:
+            east, north, up. [m] The velocity is the rate of the vector in the axes of the scene. The acceleration
+            has a constant direction in these axes.
+
+        Notes
+        -----
+        Derived here. In axes that turn at ω, δr̈ = Gδr − ω×(ω×δr) − 2ω×δṙ + a with the gradient of gravity
+        G = μ/r³·(3r̂r̂ᵀ − 1). The accelerations at the nodes of Gauss and Legendre, where their polynomial solves the
+        equation, are the solution of one linear system per case.
+        """
+        collocation = _collocation()
+        cases, count = half.size, collocation.times.size
+        gravity, spin = self._matrices(path, collocation.times[:, None] * half, cases)
+        times = (collocation.times[:, None] * half).T  # (cases, N)
+        h = half[:, None, None, None, None]
+        system = 2 * h * np.einsum("cab,ij->ciajb", spin, collocation.once)
+        system -= h**2 * np.einsum("ciab,ij->ciajb", gravity, collocation.twice)
+        system = system.reshape(cases, 3 * count, 3 * count) + np.eye(3 * count)
+        forces = np.empty((cases, count, 3, 3, 3))  # by node, component, error, axis
+        forces[..., 0, :] = gravity
+        forces[..., 1, :] = times[..., None, None] * gravity - 2 * spin[:, None]
+        forces[..., 2, :] = np.eye(3)
+        accelerations = np.linalg.solve(system, forces.reshape(cases, 3 * count, 9)).reshape(forces.shape)
+        bent = np.einsum("qj,cjaek->ekaqc", collocation.twice_at(places), accelerations) * half**2
+        tau = places[:, None] * half
+        for axis in range(3):
+            bent[0, axis, axis] += 1.0
+            bent[1, axis, axis] += tau
+        return np.asarray(bent)
+
+    def _matrices(self, path: PlatformState, times: Floats, cases: int) -> tuple[Floats, Floats]:
+        """G − ω×(ω×·) at slow times (nodes, cases), (cases, nodes, 3, 3) [1/s²], and ω×·, (cases, 3, 3). [1/s]"""
+        share = np.broadcast_to(self.share, (cases,))
+        offset = np.stack(
+            [np.broadcast_to(x - c, times.shape) for x, c in zip(path.place(times), self.centre, strict=True)],
+            axis=-1,
+        )
+        distance = np.linalg.norm(offset, axis=-1)[..., None, None]
+        outer = offset[..., :, None] * offset[..., None, :]
+        gradient = EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**3 * (3 * outer / distance**2 - np.eye(3))
+        x, y, z = (np.broadcast_to(component, (cases,)) * share for component in self.rotation)
+        zero = np.zeros(cases)
+        spin = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+        gravity = share[:, None, None, None] * gradient.swapaxes(0, 1) - (spin @ spin)[:, None]
+        return gravity, spin
+
+    def rate_against_stars(self, position: Vectors) -> Vectors:
+        """Rate, in the axes of the scene, of a position error that is at rest against the stars: −ω×p. [1/s · m]"""
+        x, y, z = cross(self.rotation, position)
+        return (-x * self.share, -y * self.share, -z * self.share)
+
+    def orbit_rate(self, path: PlatformState) -> Vectors:
+        """Angular rate of the orbit about the Earth's centre at mid-aperture, against the stars. [rad/s]"""
+        x, y, z = (p - c for p, c in zip(path.position, self.centre, strict=True))
+        turned = cross(self.rotation, (x, y, z))
+        u, v, w = (rate + more for rate, more in zip(path.velocity, turned, strict=True))
+        a, b, c = cross((x, y, z), (u, v, w))
+        square = x * x + y * y + z * z
+        return (a / square, b / square, c / square)
+
+    def of(self, cases: Any) -> "FreeFall":
+        """The dynamics in some of the cases, by their indices."""
+
+        def chosen(number: PerCase) -> PerCase:
+            return number[cases] if isinstance(number, np.ndarray) and number.ndim else number
+
+        centre, rotation = (tuple(map(chosen, vector)) for vector in (self.centre, self.rotation))
+        return FreeFall(
+            (centre[0], centre[1], centre[2]), (rotation[0], rotation[1], rotation[2]), chosen(self.share)
+        )
+
+
+def of_scene(axes: SceneAxes | None) -> FreeFall:
+    """Free fall in the axes of a scene; without a place on the Earth it is above the centre and does not turn."""
+    if axes is None:
+        return FreeFall((0.0, 0.0, -EARTH_RADIUS_M), (0.0, 0.0, 0.0))
+    return FreeFall(axes.place((0.0, 0.0, 0.0)), axes.turned((0.0, 0.0, ROTATION_RATE_RAD_PER_S)))
+
+
+def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
+    """The dynamics of a path above 100 km whose acceleration is that of free fall within 5 %; None for other paths.
+
+    Numbers of the path may be arrays (cases,). The 5 % are those of gravity μ/r².
+    """
+    fall = of_scene(axes)
+    x, y, z = (component - centre for component, centre in zip(path.position, fall.centre, strict=True))
+    distance = norm((x, y, z))
+    is_high = distance - EARTH_RADIUS_M > LEAST_FALLING_HEIGHT_M
+    if not np.any(is_high):
+        return None
+    falling = free_fall(path.position, path.velocity, axes)
+    u, v, w = (stated - fallen for stated, fallen in zip(path.acceleration, falling, strict=True))
+    apart = norm((u, v, w))
+    falls = is_high & (apart <= FREE_FALL_FRACTION * EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**2)
+    if not np.any(falls):
+        return None
+    return fall if np.all(falls) else FreeFall(fall.centre, fall.rotation, np.asarray(falls, dtype=float))
+
+
+@dataclass(frozen=True, eq=False)
+class _Collocation:
+    """Gauss-Legendre nodes (N,) over -1 … 1, and integrals from 0 to the nodes, once and twice, of values at them.
+
+    `to_coefficients` (N, N) gives the Legendre coefficients of the polynomial through values at the nodes.
+    """
+
+    times: Floats
+    once: Floats
+    twice: Floats
+    to_coefficients: Floats
+
+    def twice_at(self, places: Floats) -> Floats:
+        """Weights (places, N) of the double integral from 0 to other places."""
+        return _integral(places, 2) @ self.to_coefficients
+
+
+def _integral(places: Floats, times: int) -> Floats:
+    """Values at places of the polynomials whose derivatives of an order are the Legendre polynomials, (places, N)."""
+    of_each = np.polynomial.legendre.legint(np.eye(_NODE_COUNT), m=times, lbnd=0.0)
+    return np.asarray(np.polynomial.legendre.legvander(places, _NODE_COUNT - 1 + times) @ of_each)
+
+
+@cache
+def _collocation() -> _Collocation:
+    times, _ = np.polynomial.legendre.leggauss(_NODE_COUNT)
+    to_coefficients = np.asarray(np.linalg.inv(np.polynomial.legendre.legvander(times, _NODE_COUNT - 1)), dtype=float)
+    once, twice = (_integral(times, order) @ to_coefficients for order in (1, 2))
+    return _Collocation(times, once, twice, to_coefficients)

@@ -1,0 +1,88 @@
+"""The error of a platform in free fall as flown: the orbit of its measured state less the orbit of its true state.
+
+Both orbits are propagated, each by the whole law of gravity. The effects of an error use the linearised dynamics of
+`paths.free_fall`; the simulator judges them, so it must not share them.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from bisar_budget.arrays import Floats
+from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2
+from bisar_budget.geometry import PlatformState
+
+_STEP_COUNT = 64  # of the method of Runge and Kutta, on each side of mid-aperture
+_ORDER = 14  # of the polynomial through the differences of both orbits
+
+
+def orbit_error(
+    state: PlatformState,
+    position: Sequence[float],
+    velocity: Sequence[float],
+    acceleration: Sequence[float],
+    slow_time: Floats,
+) -> Floats:
+    """Error of the measured path of a platform in free fall.
+
+    Parameters
+    ----------
+    state : PlatformState
+        The true path; it has the dynamics `fall`.
+    position, velocity, acceleration : (3,)
+        Error at mid-aperture, east, north, up. [m, m/s, m/s²] The velocity is the rate of the Earth-fixed vector; the
+        acceleration is constant in Earth-fixed axes.
+    slow_time : (times,)
+        [s]
+
+    Returns
+    -------
+    (times, 3)
+        East, north, up. [m]
+    """
+    fall = state.fall
+    assert fall is not None
+    rotation = np.array(fall.rotation, dtype=float)
+    r = np.array(state.position, dtype=float) - np.array(fall.centre, dtype=float)
+    v = np.array(state.velocity, dtype=float) + np.cross(rotation, r)
+    wrong_r = r + np.array(position)
+    wrong_v = np.array(state.velocity) + np.array(velocity) + np.cross(rotation, wrong_r)
+    half = max(float(np.abs(slow_time).max()), 1e-9)
+    times = np.linspace(-half, half, 2 * _STEP_COUNT + 1)
+    start = np.array(((r, v), (wrong_r, wrong_v)))  # by orbit, then place and velocity
+    push = np.array(acceleration, dtype=float)
+
+    def rates(time: float, states: Floats) -> Floats:
+        """Velocity and acceleration of both orbits against the stars, in the axes of mid-aperture, (2, 2, 3)."""
+        places = states[:, 0]
+        fallen = (
+            -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 * places / np.linalg.norm(places, axis=1, keepdims=True) ** 3
+        )
+        fallen[1] += _turned_by(rotation, time) @ push
+        return np.stack((states[:, 1], fallen), axis=1)
+
+    differences = np.empty((times.size, 3))
+    for sign in (1, -1):
+        states, step = start, sign * half / _STEP_COUNT
+        for index in range(_STEP_COUNT + 1):
+            time = index * step
+            back = _turned_by(rotation, time).T
+            differences[_STEP_COUNT + sign * index] = back @ (states[1, 0] - states[0, 0])
+            first = rates(time, states)
+            second = rates(time + step / 2, states + step / 2 * first)
+            third = rates(time + step / 2, states + step / 2 * second)
+            fourth = rates(time + step, states + step * third)
+            states = states + step / 6 * (first + 2 * second + 2 * third + fourth)
+    fitted = np.polynomial.legendre.legfit(times / half, differences, _ORDER)
+    return np.asarray(np.polynomial.legendre.legval(slow_time / half, fitted).T)
+
+
+def _turned_by(rotation: Floats, time: float) -> Floats:
+    """Matrix that turns a vector by a rotation rate for a time, (3, 3)."""
+    rate = float(np.linalg.norm(rotation))
+    if rate == 0:
+        return np.eye(3)
+    x, y, z = rotation / rate
+    spin = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    return np.asarray(np.eye(3) + math.sin(rate * time) * spin + (1 - math.cos(rate * time)) * spin @ spin)
