@@ -14,7 +14,7 @@ from pathlib import Path
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.sensitivity import sensitivity
-from bisar_budget.design.solve import RANGE_SAMPLES, solve
+from bisar_budget.design.solve import SOLVE_SETTINGS, solve
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
@@ -34,7 +34,7 @@ def timed(task: Callable[[], object]) -> float:
 def compare(name: str, mission: Mission, runs: int) -> None:
     """Print medians of all three, in turn."""
     tasks = (
-        lambda: [check_mission(mission, DAY) for _ in range(RANGE_SAMPLES)],
+        lambda: [check_mission(mission, DAY) for _ in range(SOLVE_SETTINGS.range_samples)],
         lambda: solve(mission, "collection.aperture_time", today=DAY),
         lambda: sensitivity(mission, today=DAY),
     )
@@ -48,7 +48,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=3)
     runs = parser.parse_args().runs
-    print(f"{RANGE_SAMPLES} checks, solve for the aperture time, sensitivity: CPU")
+    print(f"{SOLVE_SETTINGS.range_samples} checks, solve for the aperture time, sensitivity: CPU")
     for path in sorted(MISSIONS.glob("*.yaml")):
         compare(path.stem, load_mission(str(path)), runs)
     for name in WITH_A_SCENE:

@@ -69,7 +69,11 @@ class Together:
         """Phases of errors without a displacement of their own: slow vibrations, declared sensor and clock errors."""
         array = self.errors.array
         phases = [
-            vibration._replace(qpe_rad=array(vibration.qpe_rad), cubic_rad=array(vibration.cubic_rad))
+            vibration._replace(
+                qpe_rad=array(vibration.qpe_rad),
+                cubic_rad=array(vibration.cubic_rad),
+                hidden_rad=array(vibration.hidden_rad),
+            )
             for vibration in self.slow
         ]
         for error in self.random:
@@ -104,12 +108,15 @@ class Together:
         Under root-sum-square the six phases of a covariance are one phase, by their correlations.
         """
         gain, groups = self.errors.gain if gain is None else gain, self.groups
-        judged = {member.row_id: member.judged(gain) for member in members}
+        row_ids = [member.row_id for member in members]
+        phases = np.array([(member.qpe_rad, member.hidden_rad) for member in members])
+        quadratic, hidden = phases.reshape(-1, 2, self.errors.cases).swapaxes(0, 1)
+        judged = dict(zip(row_ids, np.hypot(quadratic, gain * hidden), strict=True))
         if (rule or self.rule) == "rss":
-            quadratic = dict(quadratics(members))
+            signed = dict(zip(row_ids, quadratic, strict=True))
             for group in groups:
                 if judged.keys() >= set(group.ids):
-                    size = group.phase([quadratic[row_id] for row_id in group.ids])
+                    size = group.phase([signed[row_id] for row_id in group.ids])
                     for row_id in group.ids:
                         del judged[row_id]
                     judged[group.id] = np.hypot(size, gain * self._hidden_of_groups[group.id])

@@ -71,9 +71,11 @@ class _Gate(click.Command):
         if not names and not first_context.params["is_of_change"]:
             raise click.UsageError("Missing argument 'MISSION...'.", first_context)
         files = _touched(names) if first_context.params["is_of_change"] else expand(names)
-        projects = []
+        projects: list[Project] = []
         for settings, files_of_project in by_settings(files):
-            context = self._context(self._defaults(settings), info_name, list(args), *more, **extra)
+            defaults, context = self._defaults(settings), first_context
+            if defaults or projects:
+                context = self._context(defaults, info_name, list(args), *more, **extra)
             context.obj = settings
             projects.append(Project(settings, files_of_project, context))
         context = projects[0].context
