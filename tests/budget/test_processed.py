@@ -144,7 +144,7 @@ class TestTheGrid:
         if is_doubted:
             reason = row(found, "receiver.position.z").reason or ""
             assert "steps of 100 mm (z)" in reason
-            assert "more than a tenth of the 990 mm" in reason
+            assert "more than a tenth of the declared 990 mm" in reason
             assert "platforms.receiver.trajectory.processed" in reason
 
     @pytest.mark.parametrize("processed", BOTH)

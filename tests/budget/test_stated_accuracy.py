@@ -216,7 +216,7 @@ class TestALog:
         assert (statuses(found, "receiver") == {"not_evaluated"}) == (status == "not_evaluated")
         if status != "pass":
             reason = row(found, "receiver.position.x").reason
-            assert "2.4 m, 3.1 m, 6.2 m (east, north, up) is stated, 10 mm is declared" in str(reason)
+            assert "2.4 m, 3.1 m, 6.2 m (east, north, up) is stated, but 10 mm is declared" in str(reason)
 
     @pytest.mark.parametrize(("position", "status"), [("1 cm", "not_evaluated"), ("31 m", "pass")])
     def test_eph_of_px4(self, position: str, status: str, tmp_path: Path) -> None:

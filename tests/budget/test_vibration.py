@@ -70,7 +70,7 @@ class TestFirstPrinciples:
         want = 20 * math.log10(2 / (math.sqrt(share) + math.sqrt(1 - share)))
         assert line.published_margin_db == pytest.approx(want, abs=1e-3)
         assert 3.01 <= want < 6.03
-        assert any(f"{want:.2f} dB inside" in note for note in line.notes)
+        assert any(f"{want:.2f} dB stricter than first principles" in note for note in line.notes)
 
     @pytest.mark.parametrize("islr", [-30.0, -20.0, -10.0, -3.0])
     def test_noise_of_both_platforms_within_their_shares_spreads_what_is_required(self, islr: float) -> None:
