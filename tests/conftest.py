@@ -160,6 +160,9 @@ def approx(expected: Any, rel: float | None = None, abs: float | None = None, na
 pytest.approx = approx
 
 # Standard error apart from standard output: Click before 8.2 has to be asked.
+# Tables for a terminal have the width of COLUMNS.
+os.environ.pop("COLUMNS", None)
+
 APART: Any = {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).parameters else {}
 
 ROOT = Path(__file__).resolve().parent.parent

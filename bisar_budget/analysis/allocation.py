@@ -58,7 +58,7 @@ class Allocation(NamedTuple):
         """
         room = 1 - (hidden / self.qpe_limit(owner)) ** 2
         if room <= 0:
-            return phrases.no_autofocus_helps(hidden, self.qpe_limit(owner))
+            return phrases.note("no-autofocus-helps", hidden=hidden, limit=self.qpe_limit(owner))
         return needed_sentence(qpe / math.sqrt(room) / (self.qpe.of(owner) * math.pi), caps(mission))
 
 
@@ -196,8 +196,8 @@ def needed_sentence(n_pull: float, caps: Caps) -> Note:
     elif n_pull > caps.walk:
         allowed = f"range walk allows {rounded_down(caps.walk)}"
     else:
-        return phrases.passes_from(math.ceil(n_pull * 100 * (1 - 1e-12)) / 100)
-    return phrases.beyond_autofocus(_up(n_pull), allowed)
+        return phrases.note("passes-from", n_pull=math.ceil(n_pull * 100 * (1 - 1e-12)) / 100)
+    return phrases.note("beyond-autofocus", n_pull=_up(n_pull), allowed=allowed)
 
 
 def _up(number: float) -> str:

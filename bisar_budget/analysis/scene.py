@@ -807,26 +807,28 @@ class SceneEdge(NamedTuple):
         (size, rim), (difference, azimuth) = (map(float, heights.of(case)) for heights in (edges.rim, edges.largest))
         radius, nowhere = float(edges.radius[case]), (math.nan, 0.0, None)
         if math.isinf(size):
-            reason = phrases.no_image_at_the_edge(math.degrees(rim), _degeneracy(mission, at(radius, rim)))
+            reason = phrases.note(
+                "no-image-at-the-edge", azimuth_deg=math.degrees(rim), why=_degeneracy(mission, at(radius, rim))
+            )
             return cls(
                 radius, *nowhere, _SCENE.max_radius_fraction * float(edges.phases.nearest[case]), reason, NOTHING
             )
         searched = float(corrections.farthest[case])
         if math.isinf(difference):
-            return cls(radius, *nowhere, searched, phrases.no_image(), NOTHING)
+            return cls(radius, *nowhere, searched, phrases.note("no-image"), NOTHING)
         served, doubt, worst = float(corrections.served[case]), NOTHING, int(edges.over[:, case].argmax())
         if edges.over[worst, case]:
             over, limit = float(edges.over[worst, case]), float(edges.limit[worst, case])
-            doubt = phrases.over_at_the_edge(edges.names[worst], over, limit)
+            doubt = phrases.note("over-at-the-edge", row_id=edges.names[worst], phase=over, limit=limit)
         within = None if math.isinf(served) else served
         return cls(radius, difference, azimuth, within, searched, NOTHING, doubt)
 
     def notes(self, total: float) -> tuple[Note, ...]:
         """Where the difference is largest, and how far one autofocus correction serves."""
         if not self.difference:
-            return (phrases.same_at_the_edge(),)
-        largest = phrases.largest_at_the_edge(math.degrees(self.azimuth), self.radius)
-        return (largest, phrases.one_correction_serves(self.served, total))
+            return (phrases.note("same-at-the-edge"),)
+        largest = phrases.note("largest-at-the-edge", azimuth_deg=math.degrees(self.azimuth), radius=self.radius)
+        return (largest, phrases.note("one-correction-serves", how_far=self.served, total=total))
 
     @property
     def served(self) -> str:
@@ -845,6 +847,6 @@ def _degeneracy(mission: Mission, ground_point: GroundVector) -> str:
     )
     there = BistaticGeometry(transmitter=transmitter, receiver=receiver)
     if min(there.transmitter.slant_range, there.receiver.slant_range) < _SCENE.nearest_m:
-        return phrases.platform_at_the_edge(_SCENE.nearest_m)
+        return phrases.note("platform-at-the-edge", distance=_SCENE.nearest_m)
     reason = degeneracy(there, mission.radar, mission.collection.aperture_time)
-    return reason or phrases.gradients_become_parallel()
+    return reason or phrases.note("gradients-become-parallel")

@@ -257,14 +257,14 @@ class Aggregate(FamilyRow):
         if combine != "each" and row_subject.kind != PULL_IN:
             notes = correlation_notes(combine, [group for group in groups if owner in (group.platform, "mission")])
         if size is None:
-            over = phrases.no_ground_point()
+            over = phrases.note("no-ground-point")
         elif limit is not None and size > limit * LIMIT_RATIO:
             over = phrases.aggregate_over(wording.what, size, limit, wording.unit, *_largest(case, model, self))
         if row_subject.kind == QUADRATIC:
             if over and size is not None and combine != "each":
                 over = over.then(self._passes_with(case, model))
         elif over and size is not None and row_subject.kind != LOCATION:
-            over = over.then(phrases.no_gain() if row_subject.kind == CUBIC else phrases.one_total())
+            over = over.then(phrases.note("no-gain") if row_subject.kind == CUBIC else phrases.note("one-total"))
         doubt = over if row_subject.kind == PULL_IN else NOTHING
         doubted = NOTHING
         if case.number(self.is_in_doubt):
@@ -278,9 +278,9 @@ class Aggregate(FamilyRow):
             equation=wording.equation[model != "published"],
             over=over,
             doubt=doubt or _doubt(case, OTHER_MODEL[model], self, wording, limit),
-            no_limit=phrases.no_requirement(),
-            not_evaluated=doubted or case.degeneracy(model) or phrases.no_image_to_place(),
-            info=phrases.no_requirement(),
+            no_limit=phrases.note("no-requirement"),
+            not_evaluated=doubted or case.degeneracy(model) or phrases.note("no-image-to-place"),
+            info=phrases.note("no-requirement"),
             without_autofocus=case.number(self.without_autofocus),
             remarks=notes,
         )
@@ -406,7 +406,7 @@ def _folded_spur(case: Case, row_id: str, size: float, kind: str) -> Note:
     for spur in spurs_of(case.mission):
         slow = spur.slow_parts(T) if f"{spur.name}.oscillator" == row_id else None
         if slow is not None and 2 * factor**2 * float(slow.cubic if kind == CUBIC else slow.quadratic) > size**2:
-            return phrases.spur_is_folded(spur.frequency)
+            return phrases.note("spur-is-folded", frequency=spur.frequency)
     return NOTHING
 
 
@@ -416,15 +416,19 @@ def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit:
         return NOTHING
     if case.number(aggregate.is_over_of_all):
         effect_name = "displacement" if aggregate.judged.subject.kind == LOCATION else wording.what
-        return phrases.all_together_over(effect_name, case.number(aggregate.of_all), limit, wording.unit)
+        return phrases.note(
+            "all-together-over", what=effect_name, size=case.number(aggregate.of_all), limit=limit, unit=wording.unit
+        )
     if not case.number(aggregate.is_over_by_other):
         if not case.number(aggregate.rests_on):
             return NOTHING
         effect_kind, errors = aggregate.continued
         of_case = [error for error in case.random if error.id in {each.id for each in errors}]
         return continuation_note(case, of_case, effect_kind, case.number(aggregate.judged.declared))
-    phrase = phrases.other_model_is_beyond if aggregate.judged.subject.kind == PULL_IN else phrases.other_model_fails
-    return phrase(other, case.number(aggregate.by_other), limit, wording.unit)
+    by_other = case.number(aggregate.by_other)
+    if aggregate.judged.subject.kind == PULL_IN:
+        return phrases.note("other-model-is-beyond", model=other, phase=by_other, limit=limit, unit=wording.unit)
+    return phrases.other_model_fails(other, by_other, limit, wording.unit)
 
 
 # ---------------------------------------------------------------------- the scene's edge
@@ -476,7 +480,7 @@ class SceneRow(FamilyRow):
             doubt, degeneracy = edge.doubt, edge.degeneracy
             drifting = [error.subject.id for error in case.analysis.random if case.number(error.displaces_unknown)]
             if not degeneracy:
-                open_drift = (phrases.drift_is_open_at_the_edge(drifting),) if drifting else ()
+                open_drift = (phrases.note("drift-is-open-at-the-edge", row_ids=drifting),) if drifting else ()
                 notes = (*edge.notes(total), *open_drift)
             if model == "published" and edge.difference > total * LIMIT_RATIO:
                 doubt = phrases.other_model_fails("full", edge.difference, total, "rad")
@@ -486,9 +490,9 @@ class SceneRow(FamilyRow):
             unit="rad",
             path=("scene", "radius"),
             equation="full model",
-            over=phrases.edge_over(),
+            over=phrases.note("edge-over"),
             doubt=doubt,
-            no_limit=phrases.same_all_over_the_scene(),
+            no_limit=phrases.note("same-all-over-the-scene"),
             not_evaluated=degeneracy,
             remarks=notes,
         )

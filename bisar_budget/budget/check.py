@@ -165,7 +165,7 @@ def _unused_keys(mission: Mission) -> Iterator[Note]:
     }
     unused = [key for key, is_stated in keys.items() if is_stated]
     if unused:
-        yield phrases.keys_not_used(unused)
+        yield phrases.note("keys-not-used", keys=unused)
 
 
 # ---------------------------------------------------------------------- many files

@@ -50,4 +50,6 @@ def continuation_note(case: Case, errors: Sequence[RandomError], effect_kind: Pa
         return NOTHING
     percent = 100 * min(1.0, float(np.max(continued_power(makers, effect_kind))) / size**2)
     least = COVERED_CYCLES / case.mission.collection.aperture_time
-    return phrases.rests_on_the_continuation([error.owner for error in makers], percent, least)
+    return phrases.note(
+        "rests-on-the-continuation", platforms=[error.owner for error in makers], percent=percent, least=least
+    )

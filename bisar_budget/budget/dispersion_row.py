@@ -48,9 +48,9 @@ class DispersionRow(FamilyRow):
         phase, limit = case.number(self.judged.declared), case.number(self.judged.allowable)
         over = remark = NOTHING
         if phase:
-            over = phrases.dispersion_over(phase, limit)
+            over = phrases.note("dispersion-over", phase=phase, limit=limit)
         if phase and propagation.is_one_air:
-            remark = phrases.content_allowed(float(np.asarray(contents[stated])) * limit / phase)
+            remark = phrases.note("content-allowed", content=float(np.asarray(contents[stated])) * limit / phase)
         path = propagation.path(stated, CONTENT)
         return worded(
             case,

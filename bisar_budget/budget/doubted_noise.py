@@ -52,7 +52,9 @@ def noise_doubts(mission: Mission, platform: str) -> Iterator[tuple[str, Note]]:
         return
     replaced = oscillator.mask_at_frequency_of_part
     if replaced is not None:
-        sentence = phrases.mask_at_the_frequency_of_a_part(platform, replaced.frequency, replaced.part)
+        sentence = phrases.note(
+            "mask-at-the-frequency-of-a-part", platform=platform, frequency=replaced.frequency, part=replaced.part
+        )
         yield replaced.figure, sentence
     if oscillator.allan_deviation is not None:
         misfit = noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time).misfit
@@ -60,5 +62,5 @@ def noise_doubts(mission: Mission, platform: str) -> Iterator[tuple[str, Note]]:
             key = f"platforms.{platform}.oscillator"
             yield (
                 ("allan_deviation" if oscillator.sensor is None else "sensor"),
-                phrases.no_power_law_fits(key, misfit),
+                phrases.note("no-power-law-fits", key=key, misfit=misfit),
             )

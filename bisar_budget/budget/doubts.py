@@ -83,7 +83,7 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
             doubts.append(_coarse_grid(platform, name))
         if np.any(leaves_unsaid(mission, name)):
             phase, key = float(residual_phase(mission, name)), f"platforms.{name}.trajectory.processed"
-            note = phrases.log_leaves_too_much(phase, MOST_RESIDUAL_RAD, key)
+            note = phrases.note("log-leaves-too-much", phase=phase, most=MOST_RESIDUAL_RAD, key=key)
             doubts.append(InputDoubt(name, phase, MOST_RESIDUAL_RAD, note, RESIDUAL, is_of_log=True))
     return doubts
 
@@ -462,13 +462,15 @@ def collection_notes(case: Case) -> Iterator[Note]:
     mission = case.mission
     for name, state in zip(PLATFORMS, case.geometry.both, strict=True):
         if not state.is_straight:
-            yield phrases.path_curves(name)
+            yield phrases.note("path-curves", platform=name)
         turn = float(norm(state.look_rate)) * mission.collection.aperture_time / 2
         if turn > _TURNING_RAD:
-            yield phrases.sight_turns(name, turn)
+            yield phrases.note("sight-turns", platform=name, half_turn=turn)
     if case.peak_loss_db is not None and case.peak_loss_db > ONE_PEAK_DB:
-        yield phrases.image_may_have_several_peaks(case.peak_loss_db)
+        yield phrases.note("image-may-have-several-peaks", loss_db=case.peak_loss_db)
     if mission.has_direct_path:
-        yield phrases.direct_path_is_the_clock()
+        yield phrases.note("direct-path-is-the-clock")
     if mission.requirements.location_error is None and (missing := missing_settings(mission)):
-        yield phrases.setting_is_perfect(missing)  # a required location depends on it, and has a warning
+        yield phrases.note(
+            "setting-is-perfect", missing=missing
+        )  # a required location depends on it, and has a warning

@@ -150,7 +150,7 @@ class ErrorRow(FamilyRow):
             elif not source.is_independent:
                 info = _stated_elsewhere(case, source)
             else:
-                info = phrases.aggregate_decides(mission.allocation.combine)
+                info = phrases.note("aggregate-decides", combine=mission.allocation.combine)
         return worded(
             case,
             row,
@@ -175,7 +175,7 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
     """Reason with the requirement that the declared error breaks."""
     requirements, binding = case.mission.requirements, row.requirement(case)
     if binding == END_OF_IMAGE:
-        return phrases.beyond_the_image(case.number(row.allowable), source.unit)
+        return phrases.note("beyond-the-image", end=case.number(row.allowable), unit=source.unit)
     if binding == CUBIC and requirements.cubic_phase_error is not None:
         return phrases.cubic_phase_over(mine.cubic, requirements.cubic_phase_error, model.equation(source))
     if binding == LOCATION and requirements.location_error is not None:
@@ -184,7 +184,7 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
         return phrases.location_over(moved, requirements.location_error, by)
     gain, hidden = case.allocation.autofocus_gain, float(mine.hidden)
     if not math.isfinite(mine.qpe):
-        return phrases.no_image_of(case.number(row.allowable), source.unit, limit)
+        return phrases.note("no-image-of", allowable=case.number(row.allowable), unit=source.unit, limit=limit)
     over = phrases.quadratic_phase_over(float(mine.judged(gain)), limit, model.equation(source), abs(mine.qpe))
     return over.then(case.allocation.passes_with(abs(mine.qpe), hidden, source.owner, case.mission))
 
@@ -210,17 +210,17 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
 def _cause(source: ErrorSource) -> Note:
     """Name the effect that only the full model counts."""
     if source.subject.kind == "terrain":
-        return phrases.wrong_height_defocuses()
+        return phrases.note("wrong-height-defocuses")
     if source.unit == "m":
-        return phrases.position_defocuses()
+        return phrases.note("position-defocuses")
     if not source.is_position:
-        return phrases.displacement_defocuses()
-    return phrases.turning_defocuses()
+        return phrases.note("displacement-defocuses")
+    return phrases.note("turning-defocuses")
 
 
 def _stated_elsewhere(case: Case, source: ErrorSource) -> Note:
     frame = getattr(case.mission.platforms, source.owner).motion_error.frame
-    return phrases.stated_along_other_axes([axis.replace("_", " ") for axis in FRAME_AXES[frame]])
+    return phrases.note("stated-along-other-axes", axes=[axis.replace("_", " ") for axis in FRAME_AXES[frame]])
 
 
 # ---------------------------------------------------------------------- specifications
@@ -256,8 +256,8 @@ class SpecificationRow(FamilyRow):
             unit=self.number.dimension.si,
             path=("specifications", self.number.key),
             equation="declared against specified",
-            over=phrases.more_than_specified(),
-            not_evaluated=phrases.specified_and_not_declared(self.number.key),
+            over=phrases.note("more-than-specified"),
+            not_evaluated=phrases.note("specified-and-not-declared", key=self.number.key),
             is_independent=False,
         )
 

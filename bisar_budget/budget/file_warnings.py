@@ -1,8 +1,7 @@
-"""Warnings about a mission file: their sentences, and the finders that decide when to give each.
+"""Warnings about a mission file: the finders that decide when to give each; `phrases` has the sentences.
 
-The name of a sentence's function is its code, as in `phrases`. Most warnings change no verdict. A warning that doubts
-the checked mission sets the status to `warn` at least. A finder gives a sentence and the key that it is about; the
-line of the key is looked up here, once.
+Most warnings change no verdict. A warning that doubts the checked mission sets the status to `warn` at least. A
+finder gives a sentence and the key that it is about; the line of the key is looked up here, once.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,9 +23,8 @@ from bisar_budget.findings.row import Row
 from bisar_budget.geometry import norm, plain_vector
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
-from bisar_budget.phrases import Note, phrase
+from bisar_budget.phrases import Note
 from bisar_budget.ranges.resolution import Resolution
-from bisar_budget.units import format_quantity
 
 _SENSITIVITY = "acceleration_sensitivity"
 
@@ -77,50 +75,22 @@ def file_warnings(
 # ---------------------------------------------------------------------- what is checked
 def _of_the_whole(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
     if mission.changes:
-        yield _Warned(None, another_mission(changes_words(mission.changes)), is_of_options=True)
+        yield _Warned(
+            None, phrases.note("another-mission", changes=changes_words(mission.changes)), is_of_options=True
+        )
     row_ids = {row.id for row in rows} if mission.requirement_ids else set()
     for row_id in mission.requirement_ids:
         if row_id not in row_ids:
-            yield _Warned(("requirement_ids", row_id), id_of_no_row(row_id))
+            yield _Warned(("requirement_ids", row_id), phrases.note("id-of-no-row", row_id=row_id))
     if mission.earth_orientation is not None and all(platform.orbit is None for platform in mission.platforms):
-        yield _Warned(("earth_orientation",), no_orbit_to_turn())
+        yield _Warned(("earth_orientation",), phrases.note("no-orbit-to-turn"))
     if mission.gating_model != mission.allocation.model:
-        yield _Warned(("synchronization", "method"), full_model_gates(mission.allocation.model))
+        yield _Warned(("synchronization", "method"), phrases.note("full-model-gates", model=mission.allocation.model))
 
 
 def _nothing_declared(rows: Sequence[Row]) -> Iterator[_Warned]:
     if all(row.status == "not_declared" or row.is_of_declare for row in rows):
-        yield _Warned(None, nothing_declared())
-
-
-@phrase
-def another_mission(changes: str) -> str:
-    """Said of a mission that options changed."""
-    return f"the mission checked is not that of the file: {changes}"
-
-
-@phrase
-def id_of_no_row(row_id: str) -> str:
-    """Said of a key of `requirement_ids`."""
-    return f"requirement_ids: no row has the id {row_id}"
-
-
-@phrase
-def no_orbit_to_turn() -> str:
-    """Said of figures of the Earth's rotation that nothing uses."""
-    return "earth_orientation: not used, since no platform has an orbit"
-
-
-@phrase
-def full_model_gates(model: str) -> str:
-    """Said of a mission with a direct path, which asks for another model."""
-    return f"allocation.model {model}: the published model ignores the direct path; the full model decides"
-
-
-@phrase
-def nothing_declared() -> str:
-    """Said of a mission that states no error."""
-    return "no error is declared: nothing was judged"
+        yield _Warned(None, phrases.note("nothing-declared"))
 
 
 # ---------------------------------------------------------------------- how platforms fly
@@ -132,7 +102,11 @@ def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
         path = platform.path
         if path is not None and (name not in owners or path.samples):
             yield from (
-                _Warned(("platforms", name, platform.way), path_is_doubtful(name, doubt), is_doubt=True)
+                _Warned(
+                    ("platforms", name, platform.way),
+                    phrases.note("path-is-doubtful", platform=name, doubt=doubt),
+                    is_doubt=True,
+                )
                 for doubt in path.doubts
             )
 
@@ -142,26 +116,8 @@ def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
     for name in PLATFORMS:
         noise = allowable_noise(mission, name)
         if noise is not None and noise.change > MAX_UNSAID_CHANGE_FRACTION:
-            note = fit_changes_allowables(name, noise.acceleration, noise.change, noise.row_id)
+            note = phrases.fit_changes_allowables(name, noise.acceleration, noise.change, noise.row_id)
             yield _Warned(("platforms", name, "trajectory"), note)
-
-
-@phrase
-def fit_changes_allowables(platform: str, acceleration: float, change: float, row_id: str) -> str:
-    """Said of a log whose noise is an error of the path's acceleration. [m/s²]"""
-    size = format_quantity(acceleration, "m/s^2")
-    by = f"by up to {100 * change:.2g} %" if change < 1 else "by a factor of two and more"
-    return (
-        f"platforms.{platform}: the noise of the log leaves the acceleration of its path uncertain by {size} (1"
-        f" sigma, along the line of sight), which changes allowables {by} ({row_id}): a longer or a more accurate log"
-        " reduces it"
-    )
-
-
-@phrase
-def path_is_doubtful(platform: str, doubt: str) -> str:
-    """Said of a path by an orbit or a log."""
-    return f"platforms.{platform}: {doubt}"
 
 
 def straight_orbits(mission: Mission) -> Iterator[_Warned]:
@@ -179,24 +135,9 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
         from bisar_budget.paths.earth import free_fall  # takes 8 ms; most missions do not need it
 
         acceleration = free_fall(plain_vector(platform.state.position), plain_vector(platform.state.velocity), axes)
-        yield _Warned(key, satellite_flies_straight(name, speed, acceleration, axes is not None), is_doubt=True)
-
-
-@phrase
-def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence[float], has_axes: bool) -> str:
-    """Said of a satellite's path without the acceleration of its orbit. [m/s, m/s²]"""
-    components = ", ".join(f"{component + 0.0:.3f} m/s^2" for component in acceleration)
-    if has_axes:
-        how = "(gravity of a flattened Earth, less what its rotation adds)"
-    else:
-        how = (
-            "(towards the Earth's centre; the Earth's rotation changes it by up to 1.1 m/s^2, which needs the "
-            "latitude)"
+        yield _Warned(
+            key, phrases.satellite_flies_straight(name, speed, acceleration, axes is not None), is_doubt=True
         )
-    return (
-        f"platforms.{platform}: {speed / 1e3:.3g} km/s is the speed of a satellite, but the path is straight. "
-        f"A circular orbit has acceleration: [{components}] {how}"
-    )
 
 
 # ---------------------------------------------------------------------- how errors are stated
@@ -205,13 +146,13 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
     mission, sync = case.mission, case.mission.synchronization
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
-        yield _Warned(("synchronization", "interval"), exchanges_are_rare(T))
+        yield _Warned(("synchronization", "interval"), phrases.note("exchanges-are-rare", aperture_time=T))
     if mission.requirements.location_error is not None and (missing := missing_settings(mission)):
-        yield _Warned(("synchronization",), phrases.setting_is_perfect(missing))
+        yield _Warned(("synchronization",), phrases.note("setting-is-perfect", missing=missing))
     for error in case.random:
         declared = error.subject.axis == "accelerometer_bias" and error.declared is not None
         if declared and getattr(mission.platforms, error.owner).motion_error.acceleration is not None:
-            yield _Warned(error.path, stated_twice(error.owner))
+            yield _Warned(error.path, phrases.note("stated-twice", platform=error.owner))
 
 
 def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
@@ -219,16 +160,7 @@ def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
     for name in PLATFORMS:
         if swings_nothing(getattr(mission.platforms, name)):
             key = ("platforms", name, "motion_error", "lever_arm", "arm")
-            yield _Warned(key, nothing_swings_the_arm(name), is_doubt=True)
-
-
-@phrase
-def nothing_swings_the_arm(platform: str) -> str:
-    """Said of a lever arm without attitude errors."""
-    return (
-        f"platforms.{platform}.motion_error.lever_arm.arm: attitude errors swing it, but imu states none: "
-        "add imu.attitude, gyro_bias or angle_random_walk"
-    )
+            yield _Warned(key, phrases.note("nothing-swings-the-arm", platform=name), is_doubt=True)
 
 
 def calm_oscillators(mission: Mission) -> list[str]:
@@ -244,16 +176,7 @@ def _of_calm_oscillators(mission: Mission) -> Iterator[_Warned]:
     """Warn of stated sensitivities to acceleration of oscillators that neither vibrate nor turn."""
     for name in calm_oscillators(mission):
         key = ("platforms", name, "oscillator", _SENSITIVITY)
-        yield _Warned(key, nothing_shakes_the_oscillator(name), is_doubt=True)
-
-
-@phrase
-def nothing_shakes_the_oscillator(platform: str) -> str:
-    """Said of a sensitivity to acceleration without vibration."""
-    return (
-        f"platforms.{platform}.oscillator.acceleration_sensitivity has no effect: vibration and turns act on it, "
-        "but the file has none: add oscillator.vibration, or sinusoidal or spectrum to motion_error.vibration"
-    )
+        yield _Warned(key, phrases.note("nothing-shakes-the-oscillator", platform=name), is_doubt=True)
 
 
 def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
@@ -269,31 +192,10 @@ def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
     for name in PLATFORMS if mission.allocation.combine == "each" else ():
         covariance = getattr(mission.platforms, name).motion_error.covariance
         if covariance is not None and covariance.has_correlations():
-            yield _Warned(("platforms", name, "motion_error", "covariance"), correlations_not_used(name))
-
-
-@phrase
-def stated_twice(platform: str) -> str:
-    """Said of a platform with an acceleration error and an accelerometer bias."""
-    return f"platforms.{platform}.motion_error: acceleration and the accelerometer bias are both stated; they add"
-
-
-@phrase
-def correlations_not_used(platform: str) -> str:
-    """Said of a covariance where each error is judged alone."""
-    return (
-        f"platforms.{platform}.motion_error.covariance: correlations are not used where each error is judged alone; "
-        "combine: rss uses them"
-    )
-
-
-@phrase
-def exchanges_are_rare(aperture_time: float) -> str:
-    """Said of clocks that are synchronised less than once in an aperture. [s]"""
-    return (
-        f"synchronization.interval: pulses are exchanged less than once in an aperture of {aperture_time:g} s; "
-        "interpolation between them may make the phase worse than without synchronisation"
-    )
+            yield _Warned(
+                ("platforms", name, "motion_error", "covariance"),
+                phrases.note("correlations-not-used", platform=name),
+            )
 
 
 # ---------------------------------------------------------------------- autofocus
@@ -305,54 +207,20 @@ def _of_autofocus(mission: Mission, resolution: Resolution) -> Iterator[_Warned]
     key, limit = ("autofocus", "n_pull"), caps(mission)
     if n_pull > limit.walk:
         cells = n_pull / limit.walk / 2
-        yield _Warned(key, walks_over_range_cells(n_pull, cells, rounded_down(limit.walk)))
+        yield _Warned(
+            key, phrases.note("walks-over-range-cells", n_pull=n_pull, cells=cells, cap=rounded_down(limit.walk))
+        )
     if radius is not None and limit.scene is not None and n_pull > limit.scene:
         smear, largest_n_pull = 4 * n_pull * float(resolution.cross_range), rounded_down(limit.scene)
-        yield _Warned(key, smears_beyond_the_scene(n_pull, smear, algorithm, ROOM[algorithm], radius, largest_n_pull))
-
-
-@phrase
-def walks_over_range_cells(n_pull: float, cells: float, cap: str) -> str:
-    """Said of a pull-in range that range walk does not leave; `cap` is the `n_pull` of half a cell, rounded down."""
-    return (
-        f"autofocus.n_pull: {n_pull:g} is limited to {cap}, f0/B, where the range walk is half a cell; an error of "
-        f"{n_pull:g}π rad walks {cells:.3g} cells, which a one-dimensional correction does not remove"
-    )
-
-
-@phrase
-def smears_beyond_the_scene(
-    n_pull: float, smear: float, algorithm: str, room: float, radius: float, largest_n_pull: str
-) -> str:
-    """Said of a pull-in range that the scene's size does not leave. [m]"""
-    return (
-        f"autofocus.n_pull: an error of {n_pull:g}π rad smears a point over {format_quantity(smear, 'm')}; "
-        f"{algorithm} needs {room:g} times that. A scene of {format_quantity(2 * radius, 'm')} across holds "
-        f"n_pull {largest_n_pull}"
-    )
-
-
-# ---------------------------------------------------------------------- waivers
-@phrase
-def waiver_matches_nothing(row_id: str) -> str:
-    """Said of a waiver."""
-    return f"waiver {row_id}: matches no row"
-
-
-@phrase
-def waiver_matches_everything(row_id: str) -> str:
-    """Said of a waiver."""
-    return f"waiver {row_id}: names every row and would hide any new failure"
-
-
-@phrase
-def waiver_not_used(row_id: str) -> str:
-    """Said of a waiver."""
-    return f"waiver {row_id}: not used: no row that it names fails"
-
-
-# ---------------------------------------------------------------------- images
-@phrase
-def limit_is_optimistic(row_id: str, shown: str) -> str:
-    """Said of a limit of no row of the check that an image refutes."""
-    return f"{row_id}: optimistic limit: {shown}"
+        yield _Warned(
+            key,
+            phrases.note(
+                "smears-beyond-the-scene",
+                n_pull=n_pull,
+                smear=smear,
+                algorithm=algorithm,
+                room=ROOM[algorithm],
+                radius=radius,
+                largest_n_pull=largest_n_pull,
+            ),
+        )

@@ -60,7 +60,11 @@ def half_causes(mission: Mission) -> Iterator[HalfCause]:
         if airframe.sinusoidal and not felt.sinusoidal:
             held_by["sinusoidal"] = _HOLD_TONES
         for key, requirements in held_by.items():
-            yield HalfCause((name,), _required(mission, requirements), phrases.felt_vibration_lacks(name, key))
+            yield HalfCause(
+                (name,),
+                _required(mission, requirements),
+                phrases.note("felt-vibration-lacks", platform=name, key=key),
+            )
 
 
 def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
@@ -71,9 +75,15 @@ def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
     if sync is None or sync.is_direct_path or not unstated:
         return
     if sync.is_holdover:
-        yield HalfCause(stated, _required(mission, _HOLD_CLOCKS), phrases.drift_is_not_stated(unstated))
+        yield HalfCause(
+            stated, _required(mission, _HOLD_CLOCKS), phrases.note("drift-is-not-stated", platforms=unstated)
+        )
     elif stated:
-        yield HalfCause(stated, _required(mission, _HOLD_NOISE), phrases.noise_between_pulses_is_not_stated(unstated))
+        yield HalfCause(
+            stated,
+            _required(mission, _HOLD_NOISE),
+            phrases.note("noise-between-pulses-is-not-stated", platforms=unstated),
+        )
 
 
 def _required(mission: Mission, keys: tuple[str, ...]) -> tuple[str, ...]:

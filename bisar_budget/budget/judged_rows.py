@@ -278,11 +278,11 @@ def worded(
     elif status == "fail":
         reason = over
     elif status == "warn":
-        reason = doubt or phrases.above_warn_above(mission.allocation.warn_above)
+        reason = doubt or phrases.note("above-warn-above", warn_above=mission.allocation.warn_above)
     elif status == "pass_with_autofocus":
-        reason = phrases.over_the_limit_without_autofocus(without_autofocus)
+        reason = phrases.note("over-the-limit-without-autofocus", times=without_autofocus)
         if utilization is not None and utilization > mission.allocation.warn_above:
-            remarks = (*remarks, phrases.near_the_limit_with_autofocus(utilization))
+            remarks = (*remarks, phrases.note("near-the-limit-with-autofocus", utilization=utilization))
     margin = 1 / utilization - 1 if utilization else math.inf
     fields: dict[str, Any] = numbers | {
         "qpe_exact_rad": full if row.is_of_ranges else None,

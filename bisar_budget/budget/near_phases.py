@@ -111,9 +111,9 @@ def phase_over(case: Case, judged: Judged) -> Note:
         return NOTHING
     if binding == CUBIC:
         allowed = mission.requirements.cubic_phase_error or 0.0
-        return phrases.slow_cubic_phase_over(case.number(judged.cubic_rad), allowed)
+        return phrases.note("slow-cubic-phase-over", phase=case.number(judged.cubic_rad), limit=allowed)
     qpe, limit = case.number(judged.qpe_published_rad), allocation.qpe_allowed(owner)
-    over = phrases.slow_quadratic_phase_over(qpe, limit)
+    over = phrases.note("slow-quadratic-phase-over", phase=qpe, limit=limit)
     return over.then(allocation.passes_with(qpe, 0.0, owner, mission)) if qpe > limit else over
 
 

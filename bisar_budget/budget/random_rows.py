@@ -340,12 +340,12 @@ class RandomRow(FamilyRow):
             no_limit=_unlimited(mission, error, error.effect(gating)),
             not_evaluated=doubted_noise_note(mission, [error.owner])
             if error.is_in_doubt
-            else phrases.wideband_has_no_spectrum(error.owner),
-            info=phrases.counted_in_another_row(error.counted_in)
+            else phrases.note("wideband-has-no-spectrum", platform=error.owner),
+            info=phrases.note("counted-in-another-row", row_id=error.counted_in)
             if error.counted_in
             else NOTHING
             if combine == "each"
-            else phrases.aggregate_decides(combine),
+            else phrases.note("aggregate-decides", combine=combine),
             is_independent=not error.counted_in,
             without_autofocus=case.number(self.without_autofocus),
             evidence=evidence,
@@ -374,7 +374,7 @@ class IslrRow(FamilyRow):
         other_model, over, doubt = OTHER_MODEL[gating], NOTHING, NOTHING
         variance, limit, limit_by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
         if math.sqrt(variance) > limit_by_other * LIMIT_RATIO:
-            doubt = phrases.other_model_allows(other_model, level(limit_by_other), "dB")
+            doubt = phrases.note("other-model-allows", model=other_model, limit=level(limit_by_other), unit="dB")
         elif self.judged.status[case.place] == CODE["warn"]:
             makers = [member for member in case.random if member.id in {each.row_id for each in self.members}]
             if case.number(rests_on_masks(makers, "spread", math.sqrt(variance), limit)):
@@ -384,8 +384,12 @@ class IslrRow(FamilyRow):
             with_variance = [member for member in self.members if not math.isnan(case.number(member.variance))]
             largest = max(with_variance, key=lambda member: case.number(member.variance))
             rms = math.sqrt(case.number(largest.variance))
-            over = phrases.noise_spreads_too_much(
-                level(math.sqrt(variance)), level(limit), largest.row_id, level(rms)
+            over = phrases.note(
+                "noise-spreads-too-much",
+                level_db=level(math.sqrt(variance)),
+                limit_db=level(limit),
+                row_id=largest.row_id,
+                largest_db=level(rms),
             )
         return worded(
             case,
@@ -408,9 +412,11 @@ class StatedRow(FamilyRow):
         """Row of a case in words."""
         mission, row = case.mission, self.judged
         index, is_limited = row.subject.entry or 0, not math.isnan(row.allowable[case.place])
-        missing, over = phrases.no_requirement_of(ISLR), NOTHING
+        missing, over = phrases.note("no-requirement-of", metric=ISLR), NOTHING
         if is_limited:
-            over = phrases.spreads_too_much(case.number(row.declared), case.number(row.allowable))
+            over = phrases.note(
+                "spreads-too-much", level_db=case.number(row.declared), limit_db=case.number(row.allowable)
+            )
         return worded(
             case,
             row,
@@ -419,7 +425,7 @@ class StatedRow(FamilyRow):
             equation="as declared",
             over=over,
             no_limit=missing,
-            info=phrases.aggregate_decides(mission.allocation.combine) if is_limited else missing,
+            info=phrases.note("aggregate-decides", combine=mission.allocation.combine) if is_limited else missing,
             evidence=mission.other_errors[index].source,
             binding_requirement=ISLR if is_limited else None,
         )
@@ -444,7 +450,7 @@ def _wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tup
     """Equation, evidence and notes of an error's row."""
     kind, figure, sync = error.subject.kind, error.subject.axis, mission.synchronization
     if sync is not None and kind == "synchronization":
-        return "synchronisation", sync.source, () if sync.interval else (phrases.another_for_each_pulse(),)
+        return "synchronisation", sync.source, () if sync.interval else (phrases.note("another-for-each-pulse"),)
     if kind == "oscillator":
         return _acceleration_wording(mission, error) if figure else _oscillator_wording(mission, error)
     if kind == "propagation":
@@ -461,7 +467,7 @@ def _wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tup
         source, figure, equation = process_of(mission, error).source, "random", "Gauss-Markov"
         if error.owner not in PLATFORMS:
             common = mission.common_motion_error
-            note = phrases.held_to_the_total("both platforms")
+            note = phrases.note("held-to-the-total", owners="both platforms")
             return equation, source or (common and common.source), (note,)
     motion: MotionError = getattr(mission.platforms, error.owner).motion_error
     if kind == "lever_arm" and figure == "uncertainty":
@@ -473,7 +479,7 @@ def _wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tup
         equation = "lever arm" if kind == "lever_arm" else "inertial sensor"
     notes = override_notes(error.owner, motion.overridden, figure)
     if error.counted_in and error.declared is None:  # otherwise the note is the reason of the row
-        notes = (phrases.counted_in_another_row(error.counted_in), *notes)
+        notes = (phrases.note("counted-in-another-row", row_id=error.counted_in), *notes)
     return equation, source or motion.evidence(figure), notes
 
 
@@ -484,7 +490,7 @@ def _spectrum_notes(mission: Mission, name: str) -> tuple[Note, ...]:
         return ()
     rms = displacement_rms(spectrum, float(power_of(vibration)))
     seen = projected(mission, rms, getattr(mission.platforms, name).motion_error, rms * along)
-    order = (phrases.points_are_sorted(),) if isinstance(spectrum.points, SortedPoints) else ()
+    order = (phrases.note("points-are-sorted"),) if isinstance(spectrum.points, SortedPoints) else ()
     return (phrases.spectrum_shakes(rms, vibration.spectrum_level or 0.0), *order, *seen)
 
 
@@ -498,7 +504,7 @@ def _oscillator_wording(mission: Mission, error: RandomError) -> tuple[str, str 
     noise, sync = error.noise, mission.synchronization
     notes = [*override_notes(error.owner, oscillator.overridden, *OSCILLATOR_NOISE_FORMS, "frequency")]
     if oscillator.level:
-        notes.append(phrases.noise_is_shifted(oscillator.level))
+        notes.append(phrases.note("noise-is-shifted", level_db=oscillator.level))
     is_heard = not mission.has_direct_path or error.owner == "receiver"
     if noise is not None and is_heard:
         notes += [note for note in (noise.extrapolated, *noise.notes) if note]
@@ -509,9 +515,9 @@ def _oscillator_wording(mission: Mission, error: RandomError) -> tuple[str, str 
             if spur.name == error.owner
         ]
         if any(spur is not None and spur.quadratic > 0 for spur in slow):
-            notes.append(phrases.folded_spurs_count())
+            notes.append(phrases.note("folded-spurs-count"))
     if noise is not None and _GOOD_FIT_FRACTION < noise.misfit <= POOR_FIT_FRACTION:
-        notes.append(phrases.power_law_fits(noise.misfit))
+        notes.append(phrases.note("power-law-fits", misfit=noise.misfit))
     return "phase noise", oscillator.source, tuple(notes)
 
 
@@ -520,19 +526,19 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
     if sync is None:
         return
     if sync.interval is not None:
-        yield phrases.left_by_exchanges(sync.interval)
+        yield phrases.note("left-by-exchanges", interval=sync.interval)
     elif sync.age is not None and sync.averaging is not None:
-        yield phrases.left_since_setting(sync.age, sync.averaging)
+        yield phrases.note("left-since-setting", age=sync.age, averaging=sync.averaging)
     else:
-        yield phrases.heard_twice(float(mission.geometry.echo_delay))
+        yield phrases.note("heard-twice", delay=float(mission.geometry.echo_delay))
 
 
 def _air_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
     """Equation, evidence and notes of the row of a delay on a leg."""
     source = None if mission.propagation is None else mission.propagation.source_of(legs_of(error.owner)[0])
     if error.counted_in and error.declared is None:  # otherwise the note is the reason of the row
-        return "delay of the air", source, (phrases.counted_in_another_row(error.counted_in),)
-    notes = () if error.owner in PLATFORMS else (phrases.held_to_the_total("both legs, by one air"),)
+        return "delay of the air", source, (phrases.note("counted-in-another-row", row_id=error.counted_in),)
+    notes = () if error.owner in PLATFORMS else (phrases.note("held-to-the-total", owners="both legs, by one air"),)
     return "delay of the air", source, notes
 
 
@@ -540,21 +546,21 @@ def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> No
     """Reason why an error has no limit: it has no effect, or no requirement limits its effects."""
     effects = (("cubic phase", effect.cubic), ("ISLR", effect.spread), ("displacement", effect.displacement))
     does = [name for name, size in effects if size > 0]
-    return phrases.no_requirement_limits(does) if does else no_effect(mission, error)
+    return phrases.note("no-requirement-limits", effects=does) if does else no_effect(mission, error)
 
 
 def no_effect(mission: Mission, error: RandomError) -> Note:
     """Reason why an error has no effect."""
     if error.subject.kind in ("imu", *CORRELATED, "lever_arm", "vibration"):
-        return phrases.across_the_line_of_sight()
+        return phrases.note("across-the-line-of-sight")
     if error.subject.kind == "propagation":
         is_content = error.subject.axis == CONTENT
         return (phrases.below_the_ionosphere if is_content else phrases.runs_along_the_ground)(error.owner)
     if error.subject.kind == "synchronization":
-        return phrases.nothing_spreads()
+        return phrases.note("nothing-spreads")
     if mission.has_direct_path and error.owner == "transmitter":
-        return phrases.oscillators_drop_out()
-    return phrases.no_acceleration() if error.subject.axis else phrases.no_phase_noise()
+        return phrases.note("oscillators-drop-out")
+    return phrases.note("no-acceleration") if error.subject.axis else phrases.note("no-phase-noise")
 
 
 def _over(mission: Mission, error: RandomError, model: str, binding: str | None, allocation: Allocation) -> Note:
@@ -568,7 +574,7 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
         return phrases.location_over(effect.displacement * size, limits.displacement, by)
     if binding == ISLR:
         level = _levels(mission, model)
-        return phrases.spreads_too_much(level(effect.spread * size), level(limits.spread))
+        return phrases.note("spreads-too-much", level_db=level(effect.spread * size), limit_db=level(limits.spread))
     unit_effect = error.effect(model)
     qpe, hidden = unit_effect.quadratic * size, unit_effect.hidden * size
     over = phrases.quadratic_phase_over(effect.quadratic * size, limits.quadratic, quadratic=qpe)
@@ -595,7 +601,9 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
     other_model, size = OTHER_MODEL[gating], error.declared
     effect = held_effect(mission, error.effect(other_model), error.coverage(mission), autofocus_gain_of(mission))
     if binding == ISLR:
-        return phrases.other_model_spreads(other_model, _levels(mission, other_model)(effect.spread * size))
+        return phrases.note(
+            "other-model-spreads", model=other_model, level_db=_levels(mission, other_model)(effect.spread * size)
+        )
     per_unit = {QUADRATIC: effect.quadratic, CUBIC: effect.cubic, LOCATION: effect.displacement}[binding]
     allowed = limit if binding == QUADRATIC else getattr(mission.requirements, binding)
     return phrases.other_model_fails(other_model, per_unit * size, allowed, *EFFECT_WORDS[binding])

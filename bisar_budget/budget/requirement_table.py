@@ -76,7 +76,7 @@ def _declarations(case: Case, judged_row: Judged) -> Row:
         model=mission.gating_model,
         is_unjudged=bool(missing),
         remarks=tuple(
-            phrases.declared_off_its_source(judged_row.key, judged_row.level, judged_row.off)
+            phrases.note("declared-off-its-source", key=judged_row.key, level=judged_row.level, off=judged_row.off)
             for judged_row in shifted
         ),
     )
@@ -128,7 +128,7 @@ def unknown_place(judged: JudgedMission, case: Case) -> Note:
     """Name the cause of a displacement that no row limits: clocks that are not set, or a path in doubt."""
     clocks = [row_id for row_id, is_there in judged.unplaced.items() if is_there[case.place]]
     if clocks:
-        return phrases.clocks_are_not_set(clocks)
+        return phrases.note("clocks-are-not-set", row_ids=clocks)
     doubts = [doubt for doubt in input_doubts(case.mission) if doubt.kind != RESIDUAL]
     return doubts[0].note if doubts else NOTHING
 

@@ -108,8 +108,12 @@ class StayingAir:
         is_open = any(case.number(use.is_doubted) for use in self.uses.values())
         is_open = is_open or any(case.number(is_made) for is_made in self.untaken_rows().values())
         if case.number(self.is_long) and not is_open and any(use > 0 for use in uses):
-            yield phrases.air_that_stays_is_negligible(
-                case.mission.collection.aperture_time, AIR_CHANGES_IN_S, max(uses), _keys(case.mission)
+            yield phrases.note(
+                "air-that-stays-is-negligible",
+                aperture_time=case.mission.collection.aperture_time,
+                correlation_time=AIR_CHANGES_IN_S,
+                use=max(uses),
+                keys=_keys(case.mission),
             )
 
     def _says(self, case: Case, use: AirUse) -> Note:

@@ -129,15 +129,22 @@ class SpurRow(FamilyRow):
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         spur = spurs_of(mission)[self.spur_index]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
-        T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
+        T, missing = mission.collection.aperture_time, phrases.note("no-requirement-of", metric="pslr")
         near = float(spur.left.slowest_echo(T))
-        on_mainlobe = phrases.echoes_on_the_mainlobe(near * T, ECHO_CYCLES)
+        on_mainlobe = phrases.note("echoes-on-the-mainlobe", cycles=near * T, least=ECHO_CYCLES)
         doubted = doubted_noise_note(mission, [spur.name]) if has_doubted_frequency(mission, spur.name) else NOTHING
         if not math.isnan(row.allowable[case.place]):
-            over = over or phrases.echoes_over(case.number(row.declared), case.number(row.allowable))
+            over = over or phrases.note(
+                "echoes-over", level_db=case.number(row.declared), limit_db=case.number(row.allowable)
+            )
             if self.is_over_other[case.place]:
                 other_model = OTHER_MODEL[model]
-                doubt = phrases.other_model_allows(other_model, case.number(row.allowable_by(other_model)), "dB")
+                doubt = phrases.note(
+                    "other-model-allows",
+                    model=other_model,
+                    limit=case.number(row.allowable_by(other_model)),
+                    unit="dB",
+                )
         return worded(
             case,
             row,
@@ -148,11 +155,15 @@ class SpurRow(FamilyRow):
             doubt=doubt,
             no_limit=missing,
             not_evaluated=doubted
-            or (phrases.echo_is_folded(near, on_mainlobe) if spur.left.is_folded else on_mainlobe),
+            or (
+                phrases.note("echo-is-folded", frequency=near, reason=on_mainlobe)
+                if spur.left.is_folded
+                else on_mainlobe
+            ),
             info=missing,
             evidence=oscillator.source,
             remarks=(
-                phrases.tone_lies(spur.frequency, spur.frequency * T),
+                phrases.note("tone-lies", frequency=spur.frequency, cells=spur.frequency * T),
                 *_folds(spur.left, float(spur.free), T, f"{spur.name}.oscillator"),
                 *override_notes(spur.name, oscillator.overridden, "frequency"),
             ),
@@ -173,7 +184,16 @@ def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> 
     variances = folded.slow_parts(aperture_time)
     qpe, cubic = (free * math.sqrt(float(variance)) for variance in (variances.quadratic, variances.cubic))
     frequency = max(slow)[1]
-    return (phrases.tone_is_folded(frequency, frequency * aperture_time, qpe, cubic, row_id),)
+    return (
+        phrases.note(
+            "tone-is-folded",
+            frequency=frequency,
+            cycles=frequency * aperture_time,
+            qpe=qpe,
+            cubic=cubic,
+            row_id=row_id,
+        ),
+    )
 
 
 # ---------------------------------------------------------------------- oscillators that vibrate
@@ -227,15 +247,21 @@ class AcceleratedRow(FamilyRow):
         """Row of a case in words, by the model that judges it."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         tone = accelerated_tones(mission)[self.tone_index]
-        T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
+        T, missing = mission.collection.aperture_time, phrases.note("no-requirement-of", metric="pslr")
         if not math.isnan(row.allowable[case.place]):
-            echoes = (
-                20 * math.log10(tone.per_unit * case.number(size) / 2) for size in (row.declared, row.allowable)
-            )
-            over = over or (phrases.echoes_over(*echoes) if row.declared[case.place] else NOTHING)
+            if row.declared[case.place] and not over:
+                level_db, limit_db = (
+                    20 * math.log10(tone.per_unit * case.number(size) / 2) for size in (row.declared, row.allowable)
+                )
+                over = phrases.note("echoes-over", level_db=level_db, limit_db=limit_db)
             if self.is_over_other[case.place]:
                 other_model = OTHER_MODEL[model]
-                doubt = phrases.other_model_allows(other_model, case.number(row.allowable_by(other_model)), "s^2/m")
+                doubt = phrases.note(
+                    "other-model-allows",
+                    model=other_model,
+                    limit=case.number(row.allowable_by(other_model)),
+                    unit="s^2/m",
+                )
         oscillator: Oscillator = getattr(mission.platforms, tone.name).oscillator
         return worded(
             case,
@@ -249,8 +275,8 @@ class AcceleratedRow(FamilyRow):
             info=missing,
             evidence=evidence(oscillator),
             remarks=(
-                phrases.tone_lies(float(tone.frequency), float(tone.frequency * T)),
-                phrases.shakes_an_oscillator(float(tone.acceleration), float(tone.phase)),
+                phrases.note("tone-lies", frequency=float(tone.frequency), cells=float(tone.frequency * T)),
+                phrases.note("shakes-an-oscillator", acceleration=float(tone.acceleration), phase=float(tone.phase)),
                 *_folds(tone.left, float(tone.free * tone.sensitivity), T, f"{tone.name}.oscillator.acceleration"),
                 *_whose(mission, tone.name),
                 *override_notes(tone.name, oscillator.overridden, SENSITIVITY),
@@ -285,7 +311,9 @@ def evidence(oscillator: Oscillator) -> str | None:
 def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
     """Note that an oscillator feels the vibration of its platform; empty if the oscillator has its own vibration."""
     felt_vibration = felt(mission, name)
-    return () if felt_vibration is not None and felt_vibration.is_own else (phrases.vibration_of_the_platform(),)
+    return (
+        () if felt_vibration is not None and felt_vibration.is_own else (phrases.note("vibration-of-the-platform"),)
+    )
 
 
 def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
@@ -301,9 +329,9 @@ def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
     elif not lacks_a_spectrum(mission, name):
         notes.append(phrases.oscillator_does_not_vibrate(flies_a_turn(mission, name)))
     if any(line.frequency * mission.collection.aperture_time >= SLOWEST_ECHO_CYCLES for line in vibration.sinusoidal):
-        notes.append(phrases.tones_have_rows(f"{name}.oscillator.acceleration"))
+        notes.append(phrases.note("tones-have-rows", row_id=f"{name}.oscillator.acceleration"))
     if mission.synchronization is not None and mission.synchronization.interval is not None:
-        notes.append(phrases.left_by_exchanges(mission.synchronization.interval))
+        notes.append(phrases.note("left-by-exchanges", interval=mission.synchronization.interval))
     if mission.has_direct_path:
-        notes.append(phrases.heard_twice(float(mission.geometry.echo_delay)))
+        notes.append(phrases.note("heard-twice", delay=float(mission.geometry.echo_delay)))
     return (*notes, *override_notes(name, oscillator.overridden, SENSITIVITY))

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from datetime import date
 
 from bisar_budget import phrases
-from bisar_budget.budget import file_warnings
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.mission import FileWarning, MissionFindings
@@ -66,11 +65,11 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: d
     if verified.doubt:
         warnings.append(FileWarning(line=None, message=verified.doubt))
     warnings += [
-        FileWarning(line=None, message=file_warnings.limit_is_optimistic(verdict.id, _shown(verdict)))
+        FileWarning(line=None, message=phrases.note("limit-is-optimistic", row_id=verdict.id, shown=_shown(verdict)))
         for verdict in verdicts
         if verdict.id not in row_ids and verdict.verdict == "optimistic"
     ]
-    images = (phrases.images_formed(verified.conditions),) if verified.conditions else ()
+    images = (phrases.note("images-formed", conditions=verified.conditions),) if verified.conditions else ()
     return findings._replace(
         rows=tuple(rows),
         requirements=requirements,
@@ -86,14 +85,16 @@ def _with_verdict(row: Row, verdict: Verdict) -> Row:
     reason = NOTHING
     if verdict.verdict_autofocus == "optimistic":
         if row.status == "pass_with_autofocus":
-            reason = phrases.autofocus_refuted(str(verdict.reason_autofocus))
+            reason = phrases.note("autofocus-refuted", shown=str(verdict.reason_autofocus))
         else:
-            remarks.append(phrases.optimistic_limit_with_autofocus(str(verdict.reason_autofocus)))
+            remarks.append(phrases.note("optimistic-limit-with-autofocus", shown=str(verdict.reason_autofocus)))
     if verdict.verdict == "optimistic":
         if not reason and _is_gate(row):
-            reason = phrases.limit_refuted(format_limit(verdict.boundary_error, verdict.unit), _shown(verdict))
+            reason = phrases.note(
+                "limit-refuted", limit=format_limit(verdict.boundary_error, verdict.unit), shown=_shown(verdict)
+            )
         else:
-            remarks.insert(0, phrases.optimistic_limit(_shown(verdict)))
+            remarks.insert(0, phrases.note("optimistic-limit", shown=_shown(verdict)))
     refuted = (*row.refuted, *remarks)
     if not reason:
         return row._replace(refuted=refuted)

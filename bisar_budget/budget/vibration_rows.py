@@ -356,7 +356,7 @@ def _row(
     """A row of echoes or noise: `notes` come before the notes on its limit, `more` after them."""
     row_subject, metric = vibration_row.judged.subject, vibration_row.judged.metric
     equation = f"Section V, {key[0]}" if model == "published" else "first principles"
-    missing, margin = phrases.no_requirement_of(metric), None
+    missing, margin = phrases.note("no-requirement-of", metric=metric), None
     if vibration_row.limits is not None:
         limits = VibrationLimits(*map(case.number, vibration_row.limits))
         margin = float(limits.margin_db)
@@ -364,7 +364,9 @@ def _row(
         if vibration_row.is_over_other[case.place]:
             other_model = OTHER_MODEL[model]
             allowed = float(limits.by(other_model)) * case.number(vibration_row.per_metre)
-            doubt = phrases.other_model_allows(other_model, allowed, _unit(case, vibration_row))
+            doubt = phrases.note(
+                "other-model-allows", model=other_model, limit=allowed, unit=_unit(case, vibration_row)
+            )
     return worded(
         case,
         vibration_row.judged,
@@ -387,7 +389,11 @@ def _row(
 def _seen(case: Case, vibration_row: VibrationRow, error: MotionError, value: float | Vector) -> tuple[Note, ...]:
     metres = case.number(vibration_row.judged.declared) / case.number(vibration_row.per_metre)
     seen = projected(case.mission, value, error, metres, is_slow=vibration_row.is_slow)
-    stated = () if seen or _unit(case, vibration_row) == "m" else (phrases.amplitude_of_acceleration(metres),)
+    stated = (
+        ()
+        if seen or _unit(case, vibration_row) == "m"
+        else (phrases.note("amplitude-of-acceleration", amplitude=metres),)
+    )
     return (*stated, *seen)
 
 
@@ -404,7 +410,9 @@ def _lines_together(error: MotionError, members: Sequence[int], declared: float)
     shown = ", ".join(map(str, members[:5])) + (f" and {len(members) - 5} more" if len(members) > 5 else "")
     frequencies = [error.vibration.sinusoidal[member].frequency for member in members]
     ends = [format_quantity(end(frequencies), "Hz", 4) for end in (min, max)]
-    return phrases.lines_together(shown, " to ".join(dict.fromkeys(ends)), NEAR_CYCLES, declared)
+    return phrases.note(
+        "lines-together", entries=shown, band=" to ".join(dict.fromkeys(ends)), apart=NEAR_CYCLES, amplitude=declared
+    )
 
 
 def _slow_row(case: Case, vibration_row: VibrationRow, error: MotionError, model: str) -> Row:
@@ -419,12 +427,12 @@ def _slow_row(case: Case, vibration_row: VibrationRow, error: MotionError, model
         path=("platforms", row_subject.owner, "motion_error", "vibration", "sinusoidal", entry, "amplitude"),
         equation="first principles",
         over=phase_over(case, vibration_row.judged),
-        info=NOTHING if combine == "each" else phrases.aggregate_decides(combine),
+        info=NOTHING if combine == "each" else phrases.note("aggregate-decides", combine=combine),
         without_autofocus=case.number(vibration_row.without_autofocus),
         evidence=error.source,
         remarks=(
             *_seen(case, vibration_row, error, error.vibration.sinusoidal[entry].displacement),
-            phrases.slower_than_a_cycle(cycles, qpe, cubic),
+            phrases.note("slower-than-a-cycle", cycles=cycles, quadratic=qpe, cubic=cubic),
         ),
         binding_requirement=vibration_row.judged.requirement(case),
         displacement_m=case.moved_by_tone(row_subject, model),

@@ -11,7 +11,7 @@ from datetime import date
 from fnmatch import translate
 from typing import NamedTuple
 
-from bisar_budget.budget import file_warnings
+from bisar_budget import phrases
 from bisar_budget.budget.declarations import shifted_figures
 from bisar_budget.budget.judged_requirements import REQUIREMENT_KEYS
 from bisar_budget.effects.effect import PLATFORMS
@@ -47,11 +47,11 @@ class Waived(NamedTuple):
             key = ("waivers", index, "id")
             requirements = [ids[requirement_index] for requirement_index in named_by(waiver.id, ids)]
             if not named and not requirements:
-                yield key, file_warnings.waiver_matches_nothing(waiver.id)
+                yield key, phrases.note("waiver-matches-nothing", row_id=waiver.id)
             elif named == len(self.rows):
-                yield key, file_warnings.waiver_matches_everything(waiver.id)
+                yield key, phrases.note("waiver-matches-everything", row_id=waiver.id)
             elif not failing and broken.isdisjoint(requirements):
-                yield key, file_warnings.waiver_not_used(waiver.id)
+                yield key, phrases.note("waiver-not-used", row_id=waiver.id)
 
 
 def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:

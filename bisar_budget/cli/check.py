@@ -37,6 +37,7 @@ from bisar_budget.cli.streams import (
     root_of_names,
     say_faults,
     spare,
+    table_width,
     wants_color,
     write_file,
 )
@@ -340,6 +341,8 @@ def check(
     style = Style(
         color=use_color, verbosity=verbosity, root=root, is_checkout=is_checkout, all_rows=all_rows, detail=detail
     )
+    if output is None:
+        style = style._replace(table_width=table_width())
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
     if FORMATS[format_name].is_piecewise and not (named_reports or own_reports or verifying or is_drawn):
         from bisar_budget.front.checks import pieces
@@ -385,7 +388,7 @@ def check(
         report = report_of(projects, files)
         if says_faults:
             _say_faults(report.missions)
-        plain = style._replace(color=False, verbosity=max(style.verbosity, 0))
+        plain = style._replace(color=False, verbosity=max(style.verbosity, 0), table_width=Style().table_width)
         for path, its_format in named_reports:
             _write_report(path, its_format, report, plain)
         for project, path, its_format in own_reports:

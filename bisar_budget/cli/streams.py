@@ -3,6 +3,7 @@
 import io
 import os
 import re
+import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -148,6 +149,15 @@ def wants_color() -> bool:
     )
 
 
+_TABLE_WIDTHS = (80, 100)  # columns of the narrowest and of the widest table
+
+
+def table_width() -> int:
+    """Columns for a table on standard output, by COLUMNS or the terminal; 80 without either."""
+    least, most = _TABLE_WIDTHS
+    return min(max(shutil.get_terminal_size((least, 24)).columns, least), most)
+
+
 # Characters that change a terminal: controls except tabs and line ends, marks without width, and marks of the reading
 # direction.
 _ACTIVE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2066-\u2069\ufeff]")
@@ -236,7 +246,9 @@ def deliver_found(form: "ModuleType", results: object, format_name: str, output:
     from bisar_budget.report import Style
 
     root, is_checkout = root_of_names()
-    style = Style(color=output is None and wants_color(), root=root, is_checkout=is_checkout)
+    style = Style(root=root, is_checkout=is_checkout)
+    if output is None:
+        style = style._replace(color=wants_color(), table_width=table_width())
     deliver(getattr(form, f"as_{format_name}")(results, style), output, format_name)
 
 

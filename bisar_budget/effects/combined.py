@@ -164,8 +164,8 @@ def largest_signed_sum(vectors: Floats) -> PerCase:
 def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[Note, ...]:
     """Notes on how an aggregate treats covariances."""
     if rule == "rss":
-        return tuple(phrases.counted_as_one(group.id) for group in groups)
-    return tuple(phrases.correlations_unused(group.id) for group in groups)
+        return tuple(phrases.note("counted-as-one", group=group.id) for group in groups)
+    return tuple(phrases.note("correlations-unused", group=group.id) for group in groups)
 
 
 def likely_error(group: Correlated, members: Sequence[ErrorSource]) -> tuple[float, ...]:

@@ -679,8 +679,8 @@ class DeclaredErrors:
             return NOTHING
         degrees = plain(self.published_angle_deg, case)
         if degrees < MIN_GRADIENT_ANGLE_DEG:
-            return phrases.no_displacement(degrees)
-        return phrases.no_displacement_across(plain(np.hypot(*self.geometries.range_gradient), case))
+            return phrases.note("no-displacement", degrees=degrees)
+        return phrases.note("no-displacement-across", gradient=plain(np.hypot(*self.geometries.range_gradient), case))
 
 
 def _motions(errors: Sequence[ErrorSource]) -> tuple[Floats, Floats]:
@@ -729,7 +729,7 @@ class Model:
         """Reason why the quadratic phase of an error sets no limit."""
         if self.is_published or not source.is_heard:
             return source.no_limit
-        return phrases.no_size_reaches_the_limit() if source.is_motion else phrases.no_quadratic_phase()
+        return phrases.note("no-size-reaches-the-limit") if source.is_motion else phrases.note("no-quadratic-phase")
 
     def does(self, source: ErrorSource, size: float) -> Declared:
         """Effect of an error of a given size."""

@@ -77,7 +77,7 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of an error that is no motion
 def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: str) -> tuple[Note, ...]:
     """Notes on the figures of parts that the file replaces: the named `figures`, or all figures."""
     return tuple(
-        phrases.overrides_a_part(f"platforms.{platform}.{figure.key}", figure.text, figure.part)
+        phrases.note("overrides-a-part", key=f"platforms.{platform}.{figure.key}", text=figure.text, part=figure.part)
         for figure in overridden
         if not figures or figure.figure in figures
     )

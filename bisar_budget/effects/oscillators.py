@@ -55,13 +55,13 @@ def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     misfit, law = fitted(points, bandwidth, aperture_time)
     notes, beyond, last = [], NOTHING, points[-1][0]
     if len(points) == 1:
-        notes.append(phrases.one_point_of_allan_deviation())
+        notes.append(phrases.note("one-point-of-allan-deviation"))
     if points[0][0] > aperture_time:
-        beyond = phrases.allan_deviation_begins(points[0][0])
+        beyond = phrases.note("allan-deviation-begins", time=points[0][0])
     if last < aperture_time:
-        beyond = phrases.allan_deviation_ends(last)
+        beyond = phrases.note("allan-deviation-ends", time=last)
     if law.flicker_phase:
-        notes.append(phrases.flicker_is_assumed())
+        notes.append(phrases.note("flicker-is-assumed"))
     return Noise(_of_power_law(law, center_frequency, bandwidth), tuple(notes), beyond, misfit)
 
 
@@ -80,13 +80,13 @@ def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     # Tones of about a cycle per aperture make the quadratic phase.
     below = NOTHING
     if first * aperture_time > 0.5:
-        below = phrases.mask_begins(first, slope)
-    notes = [phrases.points_are_sorted()] if isinstance(points, SortedPoints) else []
+        below = phrases.note("mask-begins", frequency=first, slope=slope)
+    notes = [phrases.note("points-are-sorted")] if isinstance(points, SortedPoints) else []
     if bandwidth < last:
         beyond = (piece.integral(max(piece.low, bandwidth), piece.high) for piece in pieces if piece.high > bandwidth)
-        notes.append(phrases.mask_is_cut(bandwidth, last, math.sqrt(math.fsum(beyond))))
+        notes.append(phrases.note("mask-is-cut", bandwidth=bandwidth, last=last, beyond=math.sqrt(math.fsum(beyond))))
     elif bandwidth > last:
-        notes.append(phrases.mask_ends_within_the_band(last, bandwidth))
+        notes.append(phrases.note("mask-ends-within-the-band", last=last, bandwidth=bandwidth))
     counted = (piece._replace(high=min(piece.high, bandwidth)) for piece in pieces if piece.low < bandwidth)
     return Noise(tuple(counted), tuple(notes), below)
 

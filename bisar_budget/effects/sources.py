@@ -243,7 +243,11 @@ class ErrorListing:
             value, row_subject = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
             if self._is_listed(row_subject, value) and not (is_set and power < 2):  # setting states these
                 terms = tuple(float(power == order) for order in range(4))
-                no_limit = phrases.no_quadratic_term_of_clock(term) if is_heard else phrases.clock_is_heard()
+                no_limit = (
+                    phrases.note("no-quadratic-term-of-clock", term=term)
+                    if is_heard
+                    else phrases.note("clock-is-heard")
+                )
                 equation = "Table I row 1, step of Table II" if term == "quadratic" else "Table I row 1"
                 path = ("timing_error", term)
                 yield self._of_terms(row_subject, unit, value, path, terms, no_limit, equation, is_heard=is_heard)
@@ -303,7 +307,10 @@ class ErrorListing:
         ):
             row_subject = subject("clock", kind)
             if value is not None or (sync.is_holdover and self._is_listed(row_subject, value)):
-                path, no_limit = ("synchronization", f"{kind}_error"), phrases.no_quadratic_term_of_setting(kind)
+                path, no_limit = (
+                    ("synchronization", f"{kind}_error"),
+                    phrases.note("no-quadratic-term-of-setting", kind=kind),
+                )
                 yield self._of_terms(row_subject, unit, value, path, terms, no_limit, evidence=sync.source)
 
     @property
@@ -335,7 +342,9 @@ class ErrorListing:
         if is_set:
             terms = (age**2 / 2, age, 0.5, 0.0)
         no_limit = (
-            phrases.aging_is_followed() if sync is not None else phrases.no_quadratic_term_of_clock("quadratic")
+            phrases.note("aging-is-followed")
+            if sync is not None
+            else phrases.note("no-quadratic-term-of-clock", term="quadratic")
         )
         yield self._of_terms(
             row_subject,
@@ -377,10 +386,12 @@ class ErrorListing:
                     # A horizontal shift of both platforms is a shift of the scene: x̂ is the error itself, and β̃ₙ and
                     # ½s̈·x̂ cancel. The rest of a sum of rounded numbers would give a limit where none exists.
                     full = full._replace(qpe=0.0 * full.qpe, cubic=0.0 * full.cubic)
-                no_limit = phrases.no_quadratic_term_of_position()
+                no_limit = phrases.note("no-quadratic-term-of-position")
                 if kind != "position":
                     cause = "velocities" if kind == "velocity" else "lines of sight"
-                    no_limit = phrases.no_common_component(cause, name if in_scene else _axis_of(error.frame, name))
+                    no_limit = phrases.note(
+                        "no-common-component", cause=cause, axis=name if in_scene else _axis_of(error.frame, name)
+                    )
                 yield ErrorSource(
                     subject=row_subject,
                     unit=unit,
@@ -392,7 +403,7 @@ class ErrorListing:
                     equation=f"{_equation(kind, axis if in_scene else None)}, both platforms",
                     no_limit=no_limit,
                     evidence=error.source,
-                    notes=(phrases.held_to_the_total("both platforms"),),
+                    notes=(phrases.note("held-to-the-total", owners="both platforms"),),
                     of_receiver=None if in_scene else ways[1],
                     shifts=flown and flown[1],
                     rates=flown and flown[2],
@@ -418,7 +429,7 @@ class ErrorListing:
                 yield self._of_time_tag(name, (platform_index,), error.time_tag, key, error.source)
         common = self.mission.common_motion_error
         if common is not None and common.time_tag is not None:
-            note = phrases.held_to_the_total("both platforms")
+            note = phrases.note("held-to-the-total", owners="both platforms")
             key = ("common_motion_error", "time_tag")
             yield self._of_time_tag("mission", (0, 1), common.time_tag, key, common.source, note)
 
@@ -449,7 +460,7 @@ class ErrorListing:
             full=self.exact.effect(moved),
             direction=ways[platform_indices[0]],
             equation="Tables I and II along the velocity and its rates",
-            no_limit=phrases.no_quadratic_term_of_time_tag(),
+            no_limit=phrases.note("no-quadratic-term-of-time-tag"),
             evidence=source,
             notes=notes,
             of_receiver=ways[1] if len(platform_indices) > 1 else None,
@@ -477,8 +488,8 @@ class ErrorListing:
             full=full,
             direction=_UNIT_VECTORS[2],
             equation="full model",
-            no_limit=phrases.no_quadratic_term_of_height(),
-            notes=(phrases.held_to_the_total("no platform"),),
+            no_limit=phrases.note("no-quadratic-term-of-height"),
+            notes=(phrases.note("held-to-the-total", owners="no platform"),),
         )
 
     def _stated_elsewhere(self) -> Iterator[ErrorSource]:
@@ -496,7 +507,7 @@ class ErrorListing:
                 equation="as declared",
                 no_limit=NOTHING,
                 evidence=stated.source,
-                notes=(phrases.held_to_the_total("no platform"),),
+                notes=(phrases.note("held-to-the-total", owners="no platform"),),
             )
 
 
@@ -569,6 +580,6 @@ def _axis_of(frame: str, axis: str) -> str:
 def _no_limit(kind: str, axis: str) -> Note:
     """Reason for the case that an error has no QPE limit."""
     if kind == "position":
-        return phrases.no_quadratic_term_of_position()
+        return phrases.note("no-quadratic-term-of-position")
     cause = "velocity" if kind == "velocity" else "line of sight"
-    return phrases.no_component(cause, axis)
+    return phrases.note("no-component", cause=cause, axis=axis)

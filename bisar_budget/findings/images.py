@@ -113,7 +113,7 @@ class VerifiedMission(NamedTuple):
         """Note that no limit got a verdict; empty if any limit did."""
         if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
             return NOTHING
-        return phrases.nothing_verified(len(self.rows))
+        return phrases.note("nothing-verified", rows=len(self.rows))
 
 
 class PointImage(NamedTuple):

@@ -9,7 +9,7 @@ from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING, ParamSpec, TypeVar, cast
 
-from bisar_budget import __version__
+from bisar_budget import __version__, phrases
 from bisar_budget.budget.check import (
     FILES_FOR_TWO_PROCESSES,
     CheckedMission,
@@ -27,7 +27,6 @@ from bisar_budget.front.progress import foreseen, foretell, watched, workers_of
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError, tree_of
-from bisar_budget.phrases import no_specifications
 from bisar_budget.report import Piece, Style, piece
 from bisar_budget.resources import cores
 
@@ -399,5 +398,7 @@ def _with_sheet(findings: MissionFindings, model: str | None, today: dt.date) ->
     try:
         return findings._replace(sheet=allocate(mission, model=model, today=today))
     except QuestionError as error:
-        warning = FileWarning(mission.line(("allocation", "specify")), no_specifications(str(error)))
+        warning = FileWarning(
+            mission.line(("allocation", "specify")), phrases.note("no-specifications", why=str(error))
+        )
         return findings._replace(warnings=(*findings.warnings, warning))

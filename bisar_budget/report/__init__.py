@@ -64,7 +64,7 @@ def format_of(name: str) -> str | None:
 
 
 class Style(NamedTuple):
-    """Verbosity, colour and folders of a report. Formats for machines ignore verbosity and colour.
+    """Verbosity, colour, width of tables and folders of a report. Formats for machines ignore the first three.
 
     They name a file from the root of its repository (`report.words.identity`), else from `root`. Pictures are in the
     folder `assets` beside the report; without a folder the report has no pictures.
@@ -77,6 +77,7 @@ class Style(NamedTuple):
     assets: str = ""
     all_rows: bool = False  # whether the text shows rows that are neither declared nor limit anything
     detail: str = "summary"  # of a compliance report: summary, or full with formulas and undeclared rows
+    table_width: int = 80  # columns of a table for a terminal, which has a row on one line if it fits
 
     def coloured(self, text: str, sgr: str) -> str:
         """Text for a terminal, with parameters of SGR (ECMA-48) if the style has colour."""

@@ -301,26 +301,30 @@ def _hides_phase(error: RandomError) -> bool:
 def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: bool) -> Iterator[Note]:
     """Say what is drawn by a rule of ours, and what is not drawn."""
     if is_exact:
-        yield phrases.drawn_through_exact_ranges()
+        yield phrases.note("drawn-through-exact-ranges")
     if mission.gating_model != "full":
-        yield phrases.drawn_by_the_full_model(mission.gating_model)
+        yield phrases.note("drawn-by-the-full-model", model=mission.gating_model)
     if mission.allocation.combine == "each":
-        yield phrases.drawn_all_at_once()
+        yield phrases.note("drawn-all-at-once")
     bounds = [source.id for source in analysis.stated if source.owner == "mission" and not source.is_common]
     bounds += [error.id for error in analysis.random if not error.is_covered]
     if bounds:
-        yield phrases.drawn_as_bounds(bounds)
+        yield phrases.note("drawn-as-bounds", row_ids=bounds)
     hidden = [error.id for error in analysis.random if error.declared and _hides_phase(error)]
     if hidden:
-        yield phrases.hidden_phase_is_not_drawn(hidden)
+        yield phrases.note("hidden-phase-is-not-drawn", row_ids=hidden)
     vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
     if analysis.displacing_tones or any(vibration.wideband for vibration in vibrations):
-        yield phrases.vibration_is_not_drawn()
+        yield phrases.note("vibration-is-not-drawn")
     if mission.requirements.location_error is not None and not is_placed:
         undriven = clocks_without_oscillator(mission)
-        yield phrases.unknown_drift_is_not_drawn(undriven) if undriven else phrases.unset_clocks_are_not_drawn()
+        yield (
+            phrases.note("unknown-drift-is-not-drawn", platforms=undriven)
+            if undriven
+            else phrases.note("unset-clocks-are-not-drawn")
+        )
     stated = any(stated_error.islr is not None for stated_error in mission.other_errors)
     if mission.requirements.islr is not None and (stated or has_instruments(mission)):
-        yield phrases.mean_power_is_not_drawn()
+        yield phrases.note("mean-power-is-not-drawn")
     if mission.allocation.coverage_factor != 1:
-        yield phrases.drawn_without_coverage()
+        yield phrases.note("drawn-without-coverage")

@@ -2,6 +2,7 @@
 
 import math
 
+from bisar_budget import phrases
 from bisar_budget.analysis.allocation import ROOM, range_walk_cap
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import ErrorSource, Subject
@@ -15,7 +16,6 @@ from bisar_budget.simulator.collection import CUT_CELLS, MAX_CELLS, OVERSAMPLING
 from bisar_budget.simulator.impulse_response import highest, impulse_response, line_at, row_of_peak
 from bisar_budget.simulator.phase_history import Errors, NoGroundPointError, PathError, PathSinusoid
 from bisar_budget.simulator.point import sinusoids_of
-from bisar_budget.verifier import reasons
 from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading
 from bisar_budget.verifier.study import Responses, Sizes, Study, VerdictFields
 
@@ -73,7 +73,7 @@ def slow_vibration(study: Study, vibration: Subject) -> Verdict:
         measured_qpe_rad=math.fsum(abs(reading.quadratic) for reading in readings),
         measured_equal_loss_qpe_rad=math.fsum(measured),
         verdict=compare(math.fsum(measured) / budget - 1, TOLERANCE_FRACTION),
-        reason=reasons.in_its_worst_phase(len(lines)),
+        reason=phrases.in_its_worst_phase(len(lines)),
     )
 
 
@@ -101,7 +101,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
             budget_rad=requirements.cubic_phase_error,
             measured_cubic_rad=abs(reading.cubic),
             verdict=compare(abs(reading.cubic) / requirements.cubic_phase_error - 1, TOLERANCE_FRACTION),
-            reason=reasons.bound_by_the_cubic_phase(),
+            reason=phrases.note("bound-by-the-cubic-phase"),
         )
     shift = study.shift(images, reading)
     measured = images.effect.moved(shift.displacement)
@@ -110,7 +110,9 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
     return blank._replace(
         measured_displacement_m=measured,
         verdict=verdict,
-        reason=None if verdict == "confirmed" else reasons.image_moves(math.hypot(*measured), required),
+        reason=None
+        if verdict == "confirmed"
+        else phrases.note("image-moves", moved=math.hypot(*measured), allowed=required),
     )
 
 
@@ -119,36 +121,36 @@ def total(study: Study, row_id: str, owner: str) -> Verdict:
     budget = study.allocation.qpe_limit(owner)
     blank = study.blank(row_id, budget, "rad", budget_rad=budget)
     if study.mission.allocation.combine != "sum":
-        return blank._replace(reason=reasons.root_sum_square_is_of_many_flights())
+        return blank._replace(reason=phrases.note("root-sum-square-is-of-many-flights"))
     sizes = study.summed(study.members(owner), budget)
     if not sizes:
-        return blank._replace(reason=reasons.no_quadratic_phase_declared())
+        return blank._replace(reason=phrases.note("no-quadratic-phase-declared"))
     return _judged(study, blank, sizes)
 
 
 def other(study: Study, source: ErrorSource) -> Verdict:
     """Verdict on an error stated as a phase, which has no image."""
     budget = study.allocation.qpe_limit(source.owner)
-    return study.blank(source.id, budget, source.unit, budget_rad=budget, reason=reasons.phase_without_motion())
+    return study.blank(source.id, budget, source.unit, budget_rad=budget, reason=phrases.note("phase-without-motion"))
 
 
 def stated(study: Study, row_id: str, limit: float, unit: str) -> Verdict:
     """Verdict on an effect from elsewhere other than a quadratic phase, which has no image."""
-    return study.blank(row_id, limit, unit, reason=reasons.stated_by_its_effect())
+    return study.blank(row_id, limit, unit, reason=phrases.note("stated-by-its-effect"))
 
 
 def dispersion(study: Study) -> Verdict:
     """Verdict on the phase of free electrons over the band, which images over slow time do not show."""
     budget = study.allocation.qpe_total
     blank = study.blank("propagation.dispersion", budget, "rad", budget_rad=budget)
-    return blank._replace(reason=reasons.images_are_read_over_slow_time())
+    return blank._replace(reason=phrases.note("images-are-read-over-slow-time"))
 
 
 def edge(study: Study) -> Verdict:
     """Verdict on the difference between two points of the scene, which only the tests compare with images."""
     budget = study.allocation.qpe_total
     blank = study.blank("mission.spatial_variance", budget, "rad", budget_rad=budget)
-    return blank._replace(reason=reasons.images_are_of_the_centre())
+    return blank._replace(reason=phrases.note("images-are-of-the-centre"))
 
 
 def cubic(study: Study, requirement: float) -> Verdict:
@@ -156,10 +158,10 @@ def cubic(study: Study, requirement: float) -> Verdict:
     blank = study.blank("mission.cubic_phase_error", requirement, "rad", budget_rad=requirement)
     sizes = [(s, s.declared or 0.0) for s in study.declared]
     if not sizes:
-        return blank._replace(reason=reasons.no_motion_declared())
+        return blank._replace(reason=phrases.note("no-motion-declared"))
     by_model = abs(math.fsum((s.full if study.is_full else s.effect).cubic * size for s, size in sizes))
     if not by_model:
-        return blank._replace(reason=reasons.no_cubic_phase_declared(study.model))
+        return blank._replace(reason=phrases.note("no-cubic-phase-declared", model=study.model))
     try:
         scale = requirement / by_model
         if study.is_full:
@@ -180,7 +182,7 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
     blank = study.blank("mission.autofocus_pull_in", phase, "rad", budget_rad=budget)
     clock = next(s for s in study.sources if s.id == "timing.quadratic")
     fields = refocused(study, [(clock, phase / abs(float(clock.effect.qpe)))], budget, holds_hidden=False)
-    reason = reasons.range_walk(walk, range_walk_cap(study.mission))
+    reason = phrases.note("range-walk", cells=walk, n_pull=range_walk_cap(study.mission))
     return blank._replace(boundary_autofocus=phase, **fields, verdict=fields["verdict_autofocus"], reason=reason)
 
 
@@ -195,7 +197,7 @@ def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool =
         room = ROOM[study.mission.autofocus.algorithm]
         spread = study.spread(errors, study.collection.effect(errors))
         if room * spread.smear > MAX_CELLS:
-            reason = reasons.patch_too_large(room * spread.smear, MAX_CELLS)
+            reason = phrases.note("patch-too-large", cells=room * spread.smear, most=MAX_CELLS)
             return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
         across = math.ceil(2 * study.shared_lines(spread) / (OVERSAMPLING_FACTOR * spread.finer)) + _PEAK_CELLS
         focused = study.focused(study.images(errors, min(RANGE_CELLS, across), room))
@@ -205,13 +207,18 @@ def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool =
         peaks = [highest(chip.image) for chip in (focused.reference, focused.chip)]
         loss = 20 * math.log10(peaks[0] / peaks[1])
     except ValueError as error:
-        return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reasons.no_image_formed(str(error))}
+        return {
+            "verdict_autofocus": "not_evaluated",
+            "reason_autofocus": phrases.note("no-image-formed", why=str(error)),
+        }
     is_met = remaining_phase <= budget * (1 + TOLERANCE_FRACTION)
     return {
         "measured_residual_qpe_rad": residual,
         "refocused_loss_db": loss,
         "verdict_autofocus": "confirmed" if is_met else "optimistic",
-        "reason_autofocus": None if is_met else reasons.autofocus_leaves(remaining_phase, budget),
+        "reason_autofocus": None
+        if is_met
+        else phrases.note("autofocus-leaves", phase=remaining_phase, allowed=budget),
     }
 
 
@@ -243,8 +250,8 @@ def predicted(effect: ExactEffect) -> VerdictFields:
 def _without_image(study: Study, blank: Verdict, error: ValueError) -> Verdict:
     """Verdict without an image. A limit of the published model with no ground point is optimistic."""
     if isinstance(error, NoGroundPointError) and not study.is_full:
-        return blank._replace(verdict="optimistic", reason=reasons.no_image_at_the_limit())
-    return blank._replace(reason=reasons.no_image_formed(str(error)))
+        return blank._replace(verdict="optimistic", reason=phrases.note("no-image-at-the-limit"))
+    return blank._replace(reason=phrases.note("no-image-formed", why=str(error)))
 
 
 def compare(excess: float, tolerance: float) -> str:
@@ -280,7 +287,7 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
         _phase(study, sizes, factor * scale) if is_small else None for factor in (INSIDE_FRACTION, BEYOND_FACTOR)
     )
     verdict, remark = _through_the_limit(inside, measured, beyond, budget)
-    unusual = reasons.smear_leaves_the_patch(reading.coverage) if reading.coverage < 0.9 else NOTHING
+    unusual = phrases.note("smear-leaves-the-patch", part=reading.coverage) if reading.coverage < 0.9 else NOTHING
     return blank._replace(
         **predicted(images.effect),
         **_of_response(study, images, reading),
@@ -317,7 +324,7 @@ def _through_the_limit(
         (measured, " at it"),
         (beyond, f" at {BEYOND_FACTOR:g}"),
     )
-    return verdict, reasons.phase_does_not_grow([(phase, position) for phase, position in sizes if phase is not None])
+    return verdict, phrases.phase_does_not_grow([(phase, position) for phase, position in sizes if phase is not None])
 
 
 def _of_response(study: Study, images: Responses, reading: ApertureReading) -> VerdictFields:
@@ -384,13 +391,17 @@ def location(study: Study, requirement: float) -> Verdict:
     blank = study.blank("mission.location_error", requirement, "m")
     sizes = [(s, s.declared or 0.0) for s in study.declared]
     if not sizes:
-        return blank._replace(reason=reasons.nothing_moves_the_image())
+        return blank._replace(reason=phrases.note("nothing-moves-the-image"))
     rule = "the full model" if study.is_full else "(25)"
     try:
         scale = _scale_of_location(study, sizes, requirement)
         if scale is None:
             degeneracy = study.analysis.published.degeneracy
-            why = reasons.displacement_degenerates(degeneracy) if degeneracy else reasons.errors_move_nothing(rule)
+            why = (
+                phrases.note("displacement-degenerates", why=degeneracy)
+                if degeneracy
+                else phrases.note("errors-move-nothing", rule=rule)
+            )
             return blank._replace(reason=why)
         published = published_displacement(study, sizes, scale)
         expected = study.effect(sizes, scale).displacement if study.is_full else published
@@ -398,7 +409,7 @@ def location(study: Study, requirement: float) -> Verdict:
         effect = images.effect
         shift = study.shift(images, study.read(images))
     except ValueError as error:
-        return blank._replace(reason=reasons.no_image_formed(str(error)))
+        return blank._replace(reason=phrases.note("no-image-formed", why=str(error)))
     assert expected is not None
     measured = effect.moved(shift.displacement)
     comparisons = [("all of them together", expected, measured)]
@@ -415,10 +426,11 @@ def location(study: Study, requirement: float) -> Verdict:
         if math.dist(rule_position, exact_position) > tolerance:
             is_harmless = not study.is_full and verdict != "optimistic" and _is_shorter(rule_position, exact_position)
             verdict = "conservative" if is_harmless else "optimistic"
-    reason = reasons.places_differ(rule, *_along_and_across(study, expected, measured))
+    along, across = _along_and_across(study, expected, measured)
+    reason = phrases.note("places-differ", rule=rule, along=along, across=across)
     if verdict != "confirmed":
         who, rule_position, exact_position = max(comparisons, key=lambda comparison: math.dist(*comparison[1:]))
-        reason = reason.then(reasons.rule_misplaces(who, rule, rule_position, exact_position))
+        reason = reason.then(phrases.rule_misplaces(who, rule, rule_position, exact_position))
     return blank._replace(
         **predicted(effect),
         displacement_published_m=published,

@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 
+from bisar_budget import phrases
 from bisar_budget.analysis.spread import declared_powers, islr_db, islr_of, mainlobe_energy, spread_limit, tones
 from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo, tone_limits, vibration_limits
 from bisar_budget.budget.random_rows import ISLR, RANDOM_REQUIREMENTS, held_effect, limits_for, sizes_at
@@ -64,7 +65,6 @@ from bisar_budget.simulator.realisations import (
     slowest_shake,
     zenith_delays,
 )
-from bisar_budget.verifier import reasons
 from bisar_budget.verifier.phase_cases import TOLERANCE_FRACTION, compare
 from bisar_budget.verifier.study import Study
 
@@ -174,7 +174,7 @@ def _near(study: Study, blank: Verdict, name: str, limit: float, lines: Sequence
     cycles = [line.frequency * study.collection.aperture_time for line in lines]
     worst = worst_phases([line.amplitude for line in lines], cycles)
     if not worst.amplitude:
-        return blank._replace(reason=reasons.lines_without_amplitude())
+        return blank._replace(reason=phrases.note("lines-without-amplitude"))
     scale = limit / worst.amplitude
     sinusoids = tuple(
         PathSinusoid(
@@ -202,7 +202,7 @@ def echo(
     ]
     slowest, cycles = min(cycles_of_all), max(cycles_of_all)
     if slowest < 3:
-        return blank._replace(reason=reasons.echoes_on_the_peak(slowest))
+        return blank._replace(reason=phrases.note("echoes-on-the-peak", cycles=slowest))
     cells = 2 * math.ceil(min(cycles, 1e6)) + CUT_CELLS
     errors = Errors()
     for name, platform_sinusoids in sinusoids.items():
@@ -211,7 +211,7 @@ def echo(
         clean = collection.chip((0.0, 0.0), Errors(), cells=cells).cut
         echo = collection.chip((0.0, 0.0), errors, cells=cells).cut - clean
     except ValueError as error:
-        return blank._replace(reason=reasons.no_image_of_a_vibration(cycles, str(error)))
+        return blank._replace(reason=phrases.note("no-image-of-a-vibration", cycles=cycles, why=str(error)))
     # An echo keeps its range, while a scatterer at its position would walk by one wavelength per cycle.
     walk = cycles * collection.radar.bandwidth / collection.radar.center_frequency
     peaks = [float(np.abs(upsampled(cut, _ECHO_UPSAMPLING_FACTOR)).max()) for cut in (echo, clean)]
@@ -219,7 +219,7 @@ def echo(
     return blank._replace(
         measured_db=level,
         verdict=compare(level - (blank.requirement_db or 0.0), TOLERANCE_DB),
-        reason=reasons.echoes_measured(who, cycles, walk if walk > _MIN_WALK_CELLS else None, is_assumed),
+        reason=phrases.echoes_measured(who, cycles, walk if walk > _MIN_WALK_CELLS else None, is_assumed),
     )
 
 
@@ -249,11 +249,13 @@ def _wideband(study: Study, blank: Verdict, limits: Mapping[str, float]) -> Verd
             phase[:] = 2 * math.pi / collection.wavelength * (shifts[0] + shifts[1])
         return phase_draws
 
-    basis = reasons.power_of_one_platform()
+    basis = phrases.note("power-of-one-platform")
     if len(limits) == 2:
         mainlobe = Mainlobe(collection.window(_ISLR_SAMPLES))
         common = phases(np.random.default_rng([seed, 1]), _COMMON_DRAWS, is_common=True)
-        basis = reasons.power_of_both_platforms(mainlobe.added_db(float(mainlobe.lost(common).mean())))
+        basis = phrases.note(
+            "power-of-both-platforms", common_db=mainlobe.added_db(float(mainlobe.lost(common).mean()))
+        )
     draw = partial(phases, np.random.default_rng(seed), is_common=False)
     return measured_power(collection, blank, draw, basis)
 
@@ -264,14 +266,17 @@ def measured_power(
     """Verdict on the ISLR that phases (draws, _ISLR_SAMPLES) add, against the requirement of a blank verdict."""
     required = blank.requirement_db or 0.0
     added = added_islr(collection.window(_ISLR_SAMPLES), draw, required)
-    verdict, interval = added.verdict(required), (added.low, added.high)
-    drawn = reasons.draws_decide if verdict != "not_evaluated" else reasons.draws_do_not_decide
+    verdict, draws, low, high = added.verdict(required), added.draws, added.low, added.high
+    if verdict == "not_evaluated":
+        drawn = phrases.note("draws-do-not-decide", draws=draws, low=low, high=high)
+    else:
+        drawn = phrases.note("draws-decide", draws=draws, low=low, high=high)
     return blank._replace(
         measured_db=added.level,
         measured_db_error=added.error,
-        measured_db_interval=interval,
+        measured_db_interval=(low, high),
         verdict=verdict,
-        reason=basis.then(drawn(added.draws, *interval)),
+        reason=basis.then(drawn),
     )
 
 
@@ -333,7 +338,7 @@ def verify_pslr(study: Study) -> Verdict:
     declared_tones = tones(study.mission)
     highest = highest_echo(declared_tones)
     if highest is None or not highest.phase:
-        return blank._replace(reason=reasons.no_tone_declared())
+        return blank._replace(reason=phrases.note("no-tone-declared"))
     scale = echo_phase(10 ** (required / 20)) / highest.phase * study.collection.wavelength / (2 * math.pi)
     sinusoids: dict[str, tuple[PathSinusoid, ...]] = {}
     for member in [tone for tone, is_in in zip(declared_tones, highest.is_of, strict=True) if is_in]:
@@ -375,7 +380,7 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
             exact_phases.append(effect.cubic if is_cubic else effect.quadratic)
             image_phases.append(reading.cubic if is_cubic else reading.quadratic)
     except ValueError as fault:
-        return blank._replace(budget_rad=budget, reason=reasons.no_image_of_a_time_series(str(fault)))
+        return blank._replace(budget_rad=budget, reason=phrases.note("no-image-of-a-time-series", why=str(fault)))
     # Phases in images over phases by exact ranges; large ones have more weight.
     image_ratio = float(np.dot(exact_phases, image_phases) / np.dot(exact_phases, exact_phases))
     measured = predicted * image_ratio
@@ -383,7 +388,7 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
     verdict = blank._replace(
         budget_rad=budget,
         verdict=compare(measured / budget - 1, tolerance),
-        reason=reasons.sigma_of_time_series(draws, factor, _IMAGE_DRAWS, "cubic phase" if is_cubic else ""),
+        reason=phrases.sigma_of_time_series(draws, factor, _IMAGE_DRAWS, "cubic phase" if is_cubic else ""),
     )
     if is_cubic:
         return verdict._replace(measured_cubic_rad=measured, predicted_cubic_rad=predicted)
@@ -415,7 +420,7 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
             exact_displacements += images.effect.displacement
             image_displacements += images.effect.moved(shift.displacement)
     except ValueError as fault:
-        return blank._replace(reason=reasons.no_image_of_a_time_series(str(fault)))
+        return blank._replace(reason=phrases.note("no-image-of-a-time-series", why=str(fault)))
     image_ratio = float(
         np.dot(exact_displacements, image_displacements) / np.dot(exact_displacements, exact_displacements)
     )
@@ -424,7 +429,7 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
         displacement_m=(east, north),
         measured_displacement_m=(east * image_ratio, north * image_ratio),
         verdict=compare(math.hypot(east, north) * image_ratio / required - 1, tolerance),
-        reason=reasons.sigma_of_time_series(draws, factor, _IMAGE_DRAWS, "displacement"),
+        reason=phrases.sigma_of_time_series(draws, factor, _IMAGE_DRAWS, "displacement"),
     )
 
 
@@ -578,7 +583,7 @@ def verify_islr(study: Study, row_subject: Subject) -> Verdict:
     powers = declared_powers(study.analysis, row_subject.owner, model)
     total = math.fsum(power.variance for power in powers)
     if not total:
-        return blank._replace(reason=reasons.no_spread_declared())
+        return blank._replace(reason=phrases.note("no-spread-declared"))
     scale = limit / math.sqrt(total)
     # A direct path cancels part of the power.
     rms = {power.row_id: scale * math.sqrt(power.variance) for power in powers if power.variance}
@@ -640,7 +645,7 @@ def _power(
     allowed = spread_limit(mission, study.allocation, owner, "full") or 0.0  # ISLR that an image may show
     required = float(islr_of(mission, allowed**2)) if allowed else 0.0
     return measured_power(
-        collection, blank._replace(requirement_db=required), draw_phases, reasons.power_of_time_series()
+        collection, blank._replace(requirement_db=required), draw_phases, phrases.note("power-of-time-series")
     )
 
 

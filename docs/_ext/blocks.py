@@ -187,7 +187,7 @@ def _number_pattern(number: re.Match[str]) -> str:
 def _environment() -> dict[str, str]:
     """This environment without what would change an output, with this interpreter's commands first."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("BISAR_BUDGET_", "GIT_"))}
-    for name in ("NO_COLOR", "SOURCE_DATE_EPOCH", "CI", "GITHUB_ACTIONS"):
+    for name in ("COLUMNS", "NO_COLOR", "SOURCE_DATE_EPOCH", "CI", "GITHUB_ACTIONS"):
         kept.pop(name, None)
     who = {f"GIT_{role}_{what}": "engineer" for role in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")}
     path = f"{Path(sys.executable).parent}{os.pathsep}{kept.get('PATH', '')}"

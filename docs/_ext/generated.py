@@ -22,7 +22,6 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from bisar_budget.budget import file_warnings
 from bisar_budget.catalogue import SYMBOLS
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission import readers
@@ -31,10 +30,9 @@ from bisar_budget.mission.parts import PART_SECTIONS
 from bisar_budget.phrases import CODES
 from bisar_budget.report import FORMATS
 from bisar_budget.units import DIMENSIONS
-from bisar_budget.verifier import reasons
 
 MISSIONS = ROOT / "specs" / "missions"
-SPOKEN = (file_warnings, reasons)  # imported, they add to CODES
+_QUANTITY = re.compile(r"\{(\w+)(?:[^{}]|\{\w+\})*\}")  # a field of a sentence, with its format
 
 
 def table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -432,10 +430,13 @@ def symbols(directive: Generated) -> str:
 
 
 def note_codes(_: Generated) -> str:
-    """Codes of the sentences of findings, warnings and verdicts, with the subject of each sentence."""
+    """Codes of the sentences of findings, warnings and verdicts, with the sentence or its subject."""
     return table(
-        ("code", "a sentence about"),
-        [(f"`{code}`", about.removeprefix("Said of ")) for code, about in sorted(CODES.items())],
+        ("code", "sentence, or what it is about"),
+        [
+            (f"`{code}`", _QUANTITY.sub(r"{\1}", about.removeprefix("Said of ")))
+            for code, about in sorted(CODES.items())
+        ],
     )
 
 

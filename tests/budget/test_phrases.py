@@ -1,19 +1,22 @@
 """Reasons and notes are data: every finding has the code of its sentence, and all sentences stand in one place."""
 
+import ast
 import json
+import math
 import pickle
+from collections.abc import Iterator
 
 import pytest
 
 from bisar_budget import phrases
-from bisar_budget.budget import file_warnings
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import load_mission
-from bisar_budget.phrases import CODES, Note
+from bisar_budget.phrases import CODES, SUBJECTS, Note
+from bisar_budget.phrases.notes import COMPOSED
+from bisar_budget.phrases.templates import fields, fill
 from bisar_budget.report import Style, render
 from bisar_budget.report.formats import verification
-from bisar_budget.verifier import reasons
 from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import ROOT, by_turns, findings, found_in, name_of
 
@@ -53,14 +56,76 @@ def test_every_sentence_of_a_verdict_has_its_code(name: str) -> None:
 
 
 def test_no_two_sentences_have_one_code() -> None:
-    sentences = [
-        name
-        for module in (phrases, file_warnings, reasons)
-        for name, one in vars(module).items()
-        if getattr(one, "__wrapped__", None) is not None and one.__module__ == module.__name__
-    ]
-    assert len(sentences) > 130
-    assert sorted(CODES) == sorted(name.replace("_", "-") for name in sentences)
+    tables = [table.TEMPLATES for table in SUBJECTS]
+    codes = [code for table in tables for code in table] + [*COMPOSED]
+    assert len(codes) == len(set(codes)) == len(CODES) > 190
+
+
+class TestTemplates:
+    """A call of `note` names a code of the table, and its quantities are the fields of the template."""
+
+    @staticmethod
+    def calls() -> Iterator[tuple[str, ast.Call]]:
+        for path in sorted((ROOT / "bisar_budget").rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.Call) and ast.unparse(node.func) == "phrases.note":
+                    yield f"{path.name}:{node.lineno}", node
+
+    def test_every_call_has_the_fields_of_its_template(self) -> None:
+        for place, call in self.calls():
+            (code,) = (argument.value for argument in call.args if isinstance(argument, ast.Constant))
+            given = {keyword.arg for keyword in call.keywords}
+            assert given == fields(phrases.TEMPLATES[code]), (place, code)
+
+    def test_every_template_is_used(self) -> None:
+        used = {argument.value for _, call in self.calls() for argument in call.args}
+        assert phrases.TEMPLATES.keys() == used
+
+    def test_a_field_without_a_quantity_raises(self) -> None:
+        for code, template in phrases.TEMPLATES.items():
+            for name in fields(template):
+                quantities = dict.fromkeys(fields(template) - {name}, 1.0)
+                with pytest.raises((KeyError, TypeError)):
+                    phrases.note(code, **quantities)
+        with pytest.raises(KeyError):
+            phrases.note("no-such-sentence")
+
+    @pytest.mark.parametrize(
+        ("template", "quantities", "text"),
+        [
+            (
+                "{phase:rad}, {limit:limit rad} allowed",
+                {"phase": 0.12345, "limit": 0.78539},
+                "0.123 rad, 0.785 rad allowed",
+            ),
+            ("{length:m} and {length:m 2}", {"length": 12345.0}, "12.3 km and 12 km"),
+            ("{size:size {unit}}", {"size": -2.0, "unit": "rad"}, "2 rad"),
+            ("{size:size m}", {"size": math.inf}, "without a value (no ground point has this range history)"),
+            ("{limit:{unit} down}", {"limit": 1.2399, "unit": "m"}, "1.23 m"),
+            ("{level:dB}, {level:dB down}", {"level": -18.456}, "-18.5 dB, -18.5 dB"),
+            ("{share:percent}, {share:percent .0f}", {"share": 0.1234}, "12.3 %, 12 %"),
+            ("{a:m/s^2 as g}", {"a": 9.80665}, "1 g"),
+            ("{time:min}", {"time": 600.0}, "10 min"),
+            ("{cycles:cycles}", {"cycles": 2.9999}, "2.99"),
+            ("{rows:count row}", {"rows": 1}, "1 row"),
+            ("{rows:count row}", {"rows": 3}, "3 rows"),
+            ("{keys:list}; {keys:and}; {keys:or}", {"keys": ["a", "b"]}, "a, b; a and b; a or b"),
+            (
+                "{names:and platforms.*.oscillator}",
+                {"names": ("t", "r")},
+                "platforms.t.oscillator and platforms.r.oscillator",
+            ),
+            ("{factor:.3g} of {name}", {"factor": 1.23456, "name": "x"}, "1.23 of x"),
+        ],
+    )
+    def test_quantities(self, template: str, quantities: dict[str, object], text: str) -> None:
+        assert fill(template, quantities) == text
+        assert fields(template) == quantities.keys()
+
+    @pytest.mark.parametrize(("template", "value"), [("{x:m}", "a"), ("{x:limit m}", None), ("{x:list}", 1.0)])
+    def test_a_quantity_of_the_wrong_kind_raises(self, template: str, value: object) -> None:
+        with pytest.raises(TypeError):
+            fill(template, {"x": value})
 
 
 def test_warnings_that_take_a_particular_mission() -> None:
@@ -80,7 +145,7 @@ def test_a_note_is_its_words_with_what_they_are_made_of() -> None:
     note = phrases.quadratic_phase_over(1.2345, 0.7854, "Table I row 2")
     assert note == "QPE 1.23 rad, 0.785 rad allowed (Table I row 2)"
     assert (note.code, note.values) == ("quadratic-phase-over", (1.2345, 0.7854, "Table I row 2"))
-    more = note.then("", phrases.passes_from(2.0))
+    more = note.then("", phrases.note("passes-from", n_pull=2.0))
     assert more == f"{note}; passes with autofocus from n_pull 2"
     assert more.code == note.code
     assert more.values[-1].code == "passes-from"
@@ -89,16 +154,19 @@ def test_a_note_is_its_words_with_what_they_are_made_of() -> None:
 
 
 def test_a_note_comes_back_from_another_process() -> None:
-    note = pickle.loads(pickle.dumps(phrases.passes_from(2.0)))
+    note = pickle.loads(pickle.dumps(phrases.note("passes-from", n_pull=2.0)))
     assert isinstance(note, Note)
     assert (note, note.code, note.values) == ("passes with autofocus from n_pull 2", "passes-from", (2.0,))
 
 
 def test_a_note_includes_another_by_code_and_values_whatever_its_words() -> None:
-    first, second = phrases.no_power_law_fits("platforms.receiver.oscillator", 0.4), phrases.nothing_judges("islr")
-    both = second.then(first, phrases.no_gain())
-    assert all(both.includes(note) for note in (first, second, phrases.no_gain()))
-    assert not both.includes(phrases.no_power_law_fits("platforms.transmitter.oscillator", 0.4))
+    first, second = (
+        phrases.note("no-power-law-fits", key="platforms.receiver.oscillator", misfit=0.4),
+        phrases.nothing_judges("islr"),
+    )
+    both = second.then(first, phrases.note("no-gain"))
+    assert all(both.includes(note) for note in (first, second, phrases.note("no-gain")))
+    assert not both.includes(phrases.note("no-power-law-fits", key="platforms.transmitter.oscillator", misfit=0.4))
     assert not both.includes(phrases.nothing_judges("pslr"))
     assert not Note(str(first)).includes(first)
     assert phrases.NOTHING.then(first).includes(first) is False

@@ -150,8 +150,22 @@ def test_a_room_is_entered_by_its_door() -> None:
             there = room(imported)
             if len(parts) > 2 and (PACKAGE / there).is_dir() and there != room(module_name(path)):
                 used.setdefault(there, set()).add(parts[2])
-    rooms = {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - {"cli", "report"}
+    rooms = {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - {"cli", "report", "phrases"}
     assert {name: door(name) for name in rooms} == {name: used[name] for name in rooms}
+
+
+def test_the_sentences_that_others_use_are_the_door_of_phrases() -> None:
+    used: set[str] = set()
+    for path in MODULES:
+        if room(module_name(path)) == "phrases":
+            continue
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "phrases":
+                used.add(node.attr)
+            elif isinstance(node, ast.ImportFrom) and room(str(node.module)) == "phrases":
+                assert node.module == "bisar_budget.phrases", path
+                used |= {alias.name for alias in node.names}
+    assert door("phrases") == used
 
 
 @pytest.mark.parametrize("path", MODULES, ids=module_name)

@@ -108,3 +108,25 @@ def test_verdicts() -> None:
 def test_a_name_too_long_for_its_line_stands_above_its_numbers() -> None:
     lines = table([("row", "limit", "verdict"), ("short", "1 m", "yes"), ("long" * 20, "22 m", "no")])
     assert lines == ["row   limit verdict", "short   1 m yes", "long" * 20, "       22 m no"]
+
+
+@pytest.mark.parametrize("options", [(), ("--all",)], ids=str)
+def test_a_row_stays_on_its_line_where_100_columns_are_there(run, monkeypatch, options) -> None:
+    """Of every example: status and id of a row had a line of their own, its numbers the next."""
+    monkeypatch.setenv("COLUMNS", "100")
+    for path in MISSIONS:
+        lines = run("check", path, *options).stdout.splitlines()
+        assert max(map(len, lines)) <= 100
+        begin, end = (next(n for n, line in enumerate(lines) if line.startswith(s)) for s in ("status ", "use: "))
+        assert [line for line in lines[begin:end] if len(line.split()) <= 3] == [], path
+
+
+def test_columns_of_a_table_are_80_to_100(run, monkeypatch) -> None:
+    texts = {}
+    for columns in ("40", "80", "100", "200"):
+        monkeypatch.setenv("COLUMNS", columns)
+        texts[columns] = run("check", ROOT / "specs" / "missions" / "holdover_roof_receiver.yaml").stdout
+    assert texts["40"] == texts["80"]
+    assert texts["100"] == texts["200"]
+    assert "transmitter.quadratic_phase_error\n" in texts["80"]
+    assert "transmitter.quadratic_phase_error\n" not in texts["100"]

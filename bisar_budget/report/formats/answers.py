@@ -179,7 +179,7 @@ def _lines_of_parts(comparison: Comparison, style: Style) -> Iterator[str]:
         marks = f"{' *' if state.is_given else ''}{' -' if state.silent_on else ''}"
         kind = [state.kind] if is_mixed else []
         rows.append([f"{state.id}{marks}", *kind, STATUS[standing.status].text, use_words(standing.utilization), row])
-    yield from table(rows)
+    yield from table(rows, style.table_width)
     yield ""
     if any(state.is_given for state in comparison.parts):
         stays = "; the part of the other kind is kept" if comparison.kept else ""
@@ -384,14 +384,14 @@ def _lines_of_numbers(sensitivity: Sensitivity, style: Style) -> Iterator[str]:
         row_text = [f"row {printable(sensitivity.row)}: {percent(sensitivity.row_utilization)}"]
     remark = f": {status.text}, {sensitivity.model} model"
     yield from title_lines(sensitivity, text, status.sgr, style, more=row_text, remark=remark)
-    yield from _table(sensitivity)
+    yield from _table(sensitivity, style)
     yield from _notes(sensitivity)
     if sensitivity.is_balanced:
         yield ""
-        yield from _balance(sensitivity)
+        yield from _balance(sensitivity, style)
 
 
-def _table(sensitivity: Sensitivity) -> Iterator[str]:
+def _table(sensitivity: Sensitivity, style: Style) -> Iterator[str]:
     shown = sensitivity.shown
     if not shown:
         yield "No number of the file changes the utilization."
@@ -413,7 +413,7 @@ def _table(sensitivity: Sensitivity) -> Iterator[str]:
                 note,
             ]
         )
-    yield from table(rows)
+    yield from table(rows, style.table_width)
     yield ""
     yield from wrapped(
         "to limit: change of this number alone that brings the utilization to 100 %, extrapolated from its slope "
@@ -456,7 +456,7 @@ def _notes(sensitivity: Sensitivity) -> Iterator[str]:
         yield from wrapped(f"Left out: {len(sensitivity.skipped)} keys ({kinds}).", "  ")
 
 
-def _balance(sensitivity: Sensitivity) -> Iterator[str]:
+def _balance(sensitivity: Sensitivity, style: Style) -> Iterator[str]:
     moving_errors = [error for error in sensitivity.relaxed if error.moves_shares]
     if not moving_errors:
         yield "Shares are balanced; doubling an error does not change them."
@@ -478,7 +478,7 @@ def _balance(sensitivity: Sensitivity) -> Iterator[str]:
                 "",
             ]
         )
-    yield from table(rows)
+    yield from table(rows, style.table_width)
     yield ""
     yield from wrapped(
         "For each platform the worst utilization of its other errors, before and after; shares in percent.", "  "

@@ -119,14 +119,15 @@ def _lines(answer: Answer, style: Style) -> Iterator[str]:
     sgr = "32" if sheet.complies else "1;31"
     yield from title_lines(sheet, _verdict(sheet), sgr, style, remark=f"; {_terms(sheet)}")
     if sheet.broken:
-        yield from table([["row", "used", "may use", ""], *map(_broken_words, sheet.broken)])
+        yield from table([["row", "used", "may use", ""], *map(_broken_words, sheet.broken)], style.table_width)
         yield ""
         yield from wrapped(_way_out(sheet), "")
         if offer is not None:
             yield ""
             yield from wrapped(_offered(offer), "  ")
         return
-    yield from table([["specification", "ordered", "declared", "largest share"], *map(_line, sheet.specifications)])
+    heads = ["specification", "ordered", "declared", "largest share"]
+    yield from table([heads, *map(_line, sheet.specifications)], style.table_width)
     yield ""
     if sheet.findings is not None:
         yield from requirement_table(sheet.findings, style)
@@ -141,7 +142,7 @@ def _lines(answer: Answer, style: Style) -> Iterator[str]:
         lines = [
             [figure.key, figure.text or "-", figure.ordered or "free", _side(figure)] for figure in offer.figures
         ]
-        yield from table([head, *lines])
+        yield from table([head, *lines], style.table_width)
 
 
 def _verdict(sheet: SpecificationSheet) -> str:

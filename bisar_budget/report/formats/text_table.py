@@ -33,7 +33,6 @@ from bisar_budget.report.words.requirements import (
     verdict,
 )
 from bisar_budget.report.words.sentences import (
-    TEXT_WIDTH,
     aligned,
     allowable_words,
     binding_words,
@@ -145,7 +144,7 @@ def _requirement(line: RequirementLine, widths: Sequence[int], style: Style) -> 
     """One line of the table of requirements. A long deciding row goes on a line of its own below."""
     start = spaced((line.name, line.allowed, line.reached, line.use), widths, "<>>>")
     decided = ", ".join(filter(None, (line.decided_by, line.remark)))
-    if len(start) + 10 + len(decided) <= TEXT_WIDTH:
+    if len(start) + 10 + len(decided) <= style.table_width:
         yield f"{start} {_word(line.status, style, _STATUS_WIDTH)} {decided}"
     else:
         yield f"{start} {_word(line.status, style)}"
@@ -207,7 +206,7 @@ def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
 
 
 def _lines(rows: Sequence[Row], cells: Sequence[Sequence[str]], style: Style) -> Iterator[str]:
-    head, *row_lines = aligned([_TABLE_HEADER, *cells])
+    head, *row_lines = aligned([_TABLE_HEADER, *cells], style.table_width)
     yield from head
     for row, (first, *continuation) in zip(rows, row_lines, strict=True):
         yield _word(row.status, style, _STATUS_WIDTH) + first[_STATUS_WIDTH:]

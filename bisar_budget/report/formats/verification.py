@@ -70,11 +70,13 @@ def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
     For a phase, the gating model gives the budget. The next column gives the value of the other model.
     """
     other_head = next((_OTHER_MODEL_HEADS[row.model] for row in rows), "full")
-    lines = table([("row", "limit", "budget", other_head, "exact", "image", "verdict"), *map(_cells, rows)])
+    heads = ("row", "limit", "budget", other_head, "exact", "image", "verdict")
+    lines = table([heads, *map(_cells, rows)], style.table_width)
     refocused = [(printable(row.id), *refocused_cells(row)) for row in rows if row.verdict_autofocus]
     if refocused:
         lines += ["", "At the limit with autofocus, refocused:", ""]
-        lines += table([("row", "limit", "budget", "residual", "loss", "verdict"), *refocused])
+        heads_refocused = ("row", "limit", "budget", "residual", "loss", "verdict")
+        lines += table([heads_refocused, *refocused], style.table_width)
     lines = [_coloured(line, style) for line in lines]
     remarks = [line for text in (*geometry_remarks(rows), *reasons_of(rows)) for line in wrapped(f"  {text}", "    ")]
     return [*lines, "", *remarks] if remarks else lines

@@ -171,7 +171,7 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
 
 def _peak_loss(loss_db: float) -> str:
     if loss_db > ONE_PEAK_DB:
-        return str(phrases.image_may_have_several_peaks(loss_db))
+        return str(phrases.note("image-may-have-several-peaks", loss_db=loss_db))
     return (
         f"{f'{loss_db:.2g}' if loss_db >= _LEAST_LOSS_DB else f'below {_LEAST_LOSS_DB:g}'} dB by the declared errors"
     )

@@ -266,18 +266,18 @@ def spaced(cells: Sequence[str], widths: Sequence[int], sides: str) -> str:
     return " ".join(f"{cell:{side}{width}}" for cell, width, side in zip(cells, widths, sides, strict=True))
 
 
-def table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Align rows of cells, the header first."""
-    return [line for lines in aligned(rows) for line in lines]
+def table(rows: Sequence[Sequence[str]], width: int = TEXT_WIDTH) -> list[str]:
+    """Align rows of cells, the header first, in at most `width` columns."""
+    return [line for lines in aligned(rows, width) for line in lines]
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> Iterator[list[str]]:
+def aligned(rows: Sequence[Sequence[str]], width: int = TEXT_WIDTH) -> Iterator[list[str]]:
     """Lines of each row of a table. Names and the last column are aligned to the left, numbers to the right.
 
-    A name that would make its line longer than 80 columns gets a line of its own, above its numbers.
+    A name that would make its line longer than `width` columns gets a line of its own, above its numbers.
     """
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    room = TEXT_WIDTH - sum(widths[1:]) - len(widths) + 1
+    room = width - sum(widths[1:]) - len(widths) + 1
     first = max(len(row[0]) for row in rows if len(row[0]) <= max(room, len(rows[0][0])))  # the header is not broken
     for name, *cells in rows:
         numbers = f"{spaced(cells[:-1], widths[1:-1], '>' * (len(cells) - 1))} {cells[-1]}".rstrip()

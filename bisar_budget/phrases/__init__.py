@@ -1,0 +1,146 @@
+"""Every sentence of a row, a mission or a verdict: a table of templates, and functions for sentences with cases.
+
+`note(code, **quantities)` fills the template of a code. Quantities are in SI and radians, or ids and names.
+"""
+
+from bisar_budget.phrases import (
+    air_sentences,
+    draw_sentences,
+    image_sentences,
+    input_sentences,
+    limit_sentences,
+    no_limit_sentences,
+    oscillator_sentences,
+    requirement_sentences,
+    scene_sentences,
+    tone_sentences,
+    vibration_sentences,
+    warning_sentences,
+)
+from bisar_budget.phrases.air_sentences import (
+    air_stays,
+    air_stays_untaken,
+    below_the_ionosphere,
+    runs_along_the_ground,
+)
+from bisar_budget.phrases.image_sentences import (
+    echoes_measured,
+    in_its_worst_phase,
+    phase_does_not_grow,
+    rule_misplaces,
+    sigma_of_time_series,
+)
+from bisar_budget.phrases.input_sentences import (
+    StatedError,
+    input_in_doubt,
+    input_states_more,
+    input_usually_has_more,
+    log_is_coarse,
+    log_is_flown_as_it_is,
+    orbit_errors_are_independent,
+)
+from bisar_budget.phrases.limit_sentences import (
+    aggregate_over,
+    cubic_phase_over,
+    location_over,
+    other_model_fails,
+    published_model_does_not_hold,
+    quadratic_phase_over,
+)
+from bisar_budget.phrases.notes import COMPOSED, NOTHING, Note
+from bisar_budget.phrases.requirement_sentences import (
+    confidence,
+    declarations_are_missing,
+    effect_is_negligible,
+    effect_is_not_judged,
+    not_declared_as_required,
+    nothing_judges,
+    waived,
+)
+from bisar_budget.phrases.templates import fill
+from bisar_budget.phrases.tone_sentences import echoes_together_over
+from bisar_budget.phrases.vibration_sentences import (
+    both_platforms_vibrate,
+    does_as_much_as_along_the_sight,
+    oscillator_does_not_vibrate,
+    published_rule_is_off,
+    seen_of_vibration,
+    share_of_power_over,
+    slower_than_three_cycles,
+    spectrum_shakes,
+)
+from bisar_budget.phrases.warning_sentences import fit_changes_allowables, satellite_flies_straight
+
+__all__ = (
+    "NOTHING",
+    "Note",
+    "StatedError",
+    "aggregate_over",
+    "air_stays",
+    "air_stays_untaken",
+    "below_the_ionosphere",
+    "both_platforms_vibrate",
+    "confidence",
+    "cubic_phase_over",
+    "declarations_are_missing",
+    "does_as_much_as_along_the_sight",
+    "echoes_measured",
+    "echoes_together_over",
+    "effect_is_negligible",
+    "effect_is_not_judged",
+    "fit_changes_allowables",
+    "in_its_worst_phase",
+    "input_in_doubt",
+    "input_states_more",
+    "input_usually_has_more",
+    "location_over",
+    "log_is_coarse",
+    "log_is_flown_as_it_is",
+    "not_declared_as_required",
+    "note",
+    "nothing_judges",
+    "orbit_errors_are_independent",
+    "oscillator_does_not_vibrate",
+    "other_model_fails",
+    "phase_does_not_grow",
+    "published_model_does_not_hold",
+    "published_rule_is_off",
+    "quadratic_phase_over",
+    "rule_misplaces",
+    "runs_along_the_ground",
+    "satellite_flies_straight",
+    "seen_of_vibration",
+    "share_of_power_over",
+    "sigma_of_time_series",
+    "slower_than_three_cycles",
+    "spectrum_shakes",
+    "waived",
+)
+
+SUBJECTS = (
+    air_sentences,
+    draw_sentences,
+    warning_sentences,
+    image_sentences,
+    input_sentences,
+    limit_sentences,
+    no_limit_sentences,
+    oscillator_sentences,
+    requirement_sentences,
+    scene_sentences,
+    tone_sentences,
+    vibration_sentences,
+)
+TEMPLATES: dict[str, str] = {code: text for subject in SUBJECTS for code, text in subject.TEMPLATES.items()}
+CODES: dict[str, str] = TEMPLATES | COMPOSED  # template, or docstring of the function, of every sentence
+
+
+def note(code: str, /, **quantities: object) -> Note:
+    """Fill the template of a code with its quantities.
+
+    Raises
+    ------
+    KeyError
+        No template has this code, or a field of the template has no quantity.
+    """
+    return Note(fill(TEMPLATES[code], quantities), code, tuple(quantities.values()))

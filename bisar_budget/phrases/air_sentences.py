@@ -1,0 +1,79 @@
+"""Sentences about delays in the air."""
+
+from collections.abc import Sequence
+
+from bisar_budget.phrases.notes import composed
+from bisar_budget.phrases.requirement_sentences import effect_words
+from bisar_budget.phrases.templates import level_words, size_words
+
+TEMPLATES: dict[str, str] = {
+    "air-that-stays-is-negligible": (
+        "negligible: without correlation_time the delays of propagation are constant over {aperture_time:.4g} s; "
+        "with a correlation time of {correlation_time:min} they would use {use:percent .2g} of a requirement at "
+        "most ({keys:and} states how fast they change)"
+    ),
+    "dispersion-over": (
+        "quadratic phase at the edges of the band {phase:size rad}, {limit:limit rad} allowed; autofocus corrects "
+        "phase over slow time, not over the band"
+    ),
+    "content-allowed": "allowed with a zenith_electron_content of {content:limit 1/m^2}",
+}
+
+_AIR_MAKES = {
+    "quadratic_phase_error": ("have a quadratic phase of", "rad"),
+    "cubic_phase_error": ("have a cubic phase of", "rad"),
+    "location_error": ("move the image by another", "m"),
+    "islr": ("add an ISLR of", "dB"),
+}
+
+
+def _air_that_stays(aperture_time: float, correlation_time: float) -> str:
+    return (
+        f"without correlation_time the delays of propagation are constant over {aperture_time:.4g} s; with a "
+        f"correlation time of {correlation_time / 60:g} min they would"
+    )
+
+
+def _add_correlation_time(keys: Sequence[str]) -> str:
+    return f"add {' and '.join(keys)}, 1e9 s for a constant delay"
+
+
+@composed
+def air_stays(
+    aperture_time: float, correlation_time: float, key: str, size: float, use: float, keys: Sequence[str]
+) -> str:
+    """Said of a requirement that rests on delays of the air that stay in a long aperture. [s, s, rad or m or dB]"""
+    does, unit = _AIR_MAKES[key]
+    shown = level_words(size) if unit == "dB" else size_words(size, unit)
+    return (
+        f"{_air_that_stays(aperture_time, correlation_time)} {does} {shown}, {100 * use:.3g} % of what is allowed: "
+        f"{_add_correlation_time(keys)}"
+    )
+
+
+@composed
+def air_stays_untaken(
+    aperture_time: float, correlation_time: float, kind: str, size: float, keys: Sequence[str], lines: Sequence[str]
+) -> str:
+    """Said of a delay that stays in a long aperture, where no requirement takes what it would do. [s, s, rad]"""
+    added = " or ".join(f"`{line}`" for line in lines)
+    return (
+        f"{_air_that_stays(aperture_time, correlation_time)} have {effect_words(kind, size)}, which no requirement "
+        f"judges: {_add_correlation_time(keys)}, or {added} to requirements"
+    )
+
+
+@composed
+def below_the_ionosphere(platform: str) -> str:
+    """Said of the electron content on a leg that lies within the air."""
+    if platform == "mission":
+        return "both platforms fly below the ionosphere: no electrons on their legs"
+    return f"the {platform} flies below the ionosphere: no electrons on its leg"
+
+
+@composed
+def runs_along_the_ground(platform: str) -> str:
+    """Said of the delay on a leg that is seen too low, and of which nothing may be stated."""
+    if platform == "mission":
+        return "both legs run along the ground: the delay at the zenith does not give theirs"
+    return f"the leg of the {platform} runs along the ground: the delay at the zenith does not give its delay"

@@ -1,0 +1,109 @@
+"""Sentences about the inputs of a mission: paths, logs, parts, unused keys."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from bisar_budget.phrases.notes import composed
+from bisar_budget.phrases.templates import size_words
+from bisar_budget.units import format_quantity
+
+TEMPLATES: dict[str, str] = {
+    "log-leaves-too-much": (
+        "the residual of the smoothed log is {phase:rad} rms along the line of sight, more than {most:g} rad: state "
+        "{key}: smoothed if the processor uses the smoothed path, raw if it uses the fixes"
+    ),
+    "overrides-a-part": "{key} replaces {text} of {part}",
+    "keys-not-used": "not used by this check: {keys:list}",
+}
+
+_SCENE_AXES = {"x": "east", "y": "north", "z": "up"}
+
+
+@dataclass(frozen=True)
+class StatedError:
+    """An error that the source of a path states, beside the declared one: sizes along `axes`, in a unit.
+
+    `words` name the source, `key` is where the file would declare it. Without `axes` both are root-sum-squares.
+    """
+
+    words: str
+    kind: str
+    stated: Sequence[float]
+    declared: Sequence[float]
+    unit: str
+    key: str
+    is_declared: bool
+    axes: Sequence[str] = ()
+
+    @property
+    def declared_words(self) -> str:
+        """The declared error in a sentence."""
+        if not self.is_declared:
+            return f"no {self.kind} error is declared"
+        return f"{_sizes(self.declared, self.unit)} is declared"
+
+
+def _sizes(sizes: Sequence[float], unit: str) -> str:
+    """One size where all are alike, else each."""
+    words = [size_words(size, unit) for size in sizes]
+    return words[0] if len(set(words)) == 1 else ", ".join(words)
+
+
+def _axes(names: Sequence[str]) -> str:
+    return ", ".join(_SCENE_AXES.get(name, name).replace("_", "-") for name in names)
+
+
+@composed
+def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -> str:
+    """Said of a position error that is less than the doubt of the platform's path. [m]"""
+    stated = "no position error is declared" if declared is None else f"{size_words(declared, 'm')} is declared"
+    return f"the path may be {size_words(doubt, 'm')} off ({words}), but {stated}: declare the error in {key}"
+
+
+@composed
+def input_states_more(error: StatedError) -> str:
+    """Said of a declared error that is less than the one which the source of the path states. [m], [m/s]"""
+    within = f" ({_axes(error.axes)})" if error.axes else ""
+    stated = f"a {error.kind} error of {_sizes(error.stated, error.unit)}{within} is stated"
+    return f"{error.words}: {stated}, but {error.declared_words}: declare at least that in {error.key}"
+
+
+@composed
+def log_is_flown_as_it_is(figure: str) -> str:
+    """Said of the rows of a log whose processor flies the fixes."""
+    if figure == "grid":
+        return "the log quantises its fixes: a uniform error, constant over the aperture at worst"
+    return "the processor uses the fixes of the log: their residual from the smoothed path adds to the ISLR"
+
+
+@composed
+def log_is_coarse(step: float, declared: float | None, axis: str, key: str) -> str:
+    """Said of a log whose fixes are written to a step that is large beside the declared position error. [m]"""
+    beside = "no position error is declared"
+    if declared is not None:
+        beside = f"more than a tenth of the declared {size_words(declared, 'm')}"
+    return (
+        f"the log quantises its fixes in steps of {size_words(step, 'm')} ({axis}), {beside}: state {key}: smoothed "
+        "if the processor uses a smoothed path, raw if it uses the fixes"
+    )
+
+
+@composed
+def input_usually_has_more(error: StatedError) -> str:
+    """Said of a declared error that is less than a third of the usual one of a log's quality. [m]"""
+    return (
+        f"{error.words} usually have an error of {size_words(max(error.stated), error.unit)} on each axis,"
+        f" but {error.declared_words}: declare at least a third of the usual error in {error.key}"
+    )
+
+
+@composed
+def orbit_errors_are_independent(platform: str, position_m: float, rate: float, velocity: float) -> str:
+    """Said of the position and velocity errors of a platform in free fall. [m, rad/s, m/s]"""
+    sigma, rest = format_quantity(position_m, "m"), format_quantity(velocity, "m/s")
+    return (
+        f"the {platform} is in free fall: a position error of {sigma} goes with a velocity error of about "
+        f"{format_quantity(rate * position_m, 'm/s')} (rate of the orbit times position error); the file declares "
+        f"{rest}, independent of the position, which is pessimistic; the covariance of both says more "
+        "(motion_error.covariance)"
+    )

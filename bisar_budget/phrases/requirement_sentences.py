@@ -1,0 +1,97 @@
+"""Sentences about requirements, declarations, specifications and waivers."""
+
+from collections.abc import Sequence
+from datetime import date
+
+from bisar_budget.phrases.notes import composed
+
+TEMPLATES: dict[str, str] = {
+    "over-the-limit-without-autofocus": "{times:.3g} times the limit without autofocus",
+    "near-the-limit-with-autofocus": "uses {utilization:percent} of the limit with autofocus",
+    "above-warn-above": "above {warn_above:percent g} of the limit",
+    "aggregate-decides": "combine is {combine}: the aggregate decides",
+    "stated-along-other-axes": "the file states this error along other axes ({axes:list}): those rows decide",
+    "no-specifications": "no specifications: {why}",
+    "more-than-specified": "the file declares more than is specified",
+    "specified-and-not-declared": "{key} is specified, and the file does not declare it",
+    "no-requirement": "no requirement in the file: computed, not judged",
+    "no-requirement-of": "no requirements.{metric} in the file: computed, not judged",
+    "declared-off-its-source": "{key}: {level} {off}",
+}
+
+_SHOWN_EFFECTS = {
+    "cubic": "cubic phase of {} rad at the aperture edge",
+    "spread": "phase of {} rad rms that adds to the ISLR",
+    "tone": "tone of {} rad",
+}
+
+_NEEDED_DECLARATIONS = {
+    "quadratic_phase_error": "has a quadratic phase (velocity, acceleration, imu, random, oscillator, timing)",
+    "cubic_phase_error": "has a cubic phase (velocity, acceleration, imu, random, oscillator, timing)",
+    "location_error": "displaces the image (position, velocity, time_tag, lever_arm, random, timing, propagation)",
+    "pslr": "makes paired echoes (vibration.sinusoidal, oscillator.spurs, oscillator.acceleration_sensitivity)",
+    "islr": "adds to the ISLR (vibration, random, oscillator, synchronization, propagation with a correlation_time)",
+}
+
+
+def effect_words(kind: str, size: float) -> str:
+    """Size of an effect that no requirement judges."""
+    return _SHOWN_EFFECTS[kind].format(f"{size:.3g}")
+
+
+@composed
+def confidence(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> str:
+    """Said of a mission whose requirements are met, behind `met`."""
+    covered = f"with coverage factor {coverage_factor:g}"
+    if not has_sigma:
+        if not has_bounds:
+            return "for the stated values"
+        return "for the stated bounds" if coverage_factor == 1 else f"for the stated bounds {covered}"
+    sigma = "at 1 sigma" if coverage_factor == 1 else covered
+    return f"{sigma} and for the stated bounds" if has_bounds else sigma
+
+
+@composed
+def effect_is_not_judged(kind: str, size: float, total: float, lines: Sequence[str]) -> str:
+    """Said of a row with an effect that no requirement takes."""
+    alone = f", {total:.3g} rad with the others" if total > 1.005 * size else ""
+    added = " or ".join(f"`{line}`" for line in lines)
+    return f"{effect_words(kind, size)}{alone}, which no requirement judges: add {added} to requirements"
+
+
+@composed
+def effect_is_negligible(kind: str, total: float, keys: Sequence[str]) -> str:
+    """Said of a mission with a small effect that no requirement takes."""
+    return (
+        f"negligible: {effect_words(kind, total)} in all, which no requirement judges ({' or '.join(keys)} would): "
+        "below a tenth of the quadratic requirement and below 0.08 rad"
+    )
+
+
+@composed
+def nothing_judges(key: str) -> str:
+    """Said of a requirement without a row that judges it."""
+    return f"no declared error {_NEEDED_DECLARATIONS[key]}"
+
+
+@composed
+def not_declared_as_required(key: str, lacks: str = "") -> str:
+    """Said of an error that the file should declare; `lacks` is what half of it needs to have an effect."""
+    if lacks:
+        return f"requirements.declare asks for {key}, which is declared in part: the file has no {lacks}"
+    return f"the file has no {key}, which requirements.declare asks for"
+
+
+@composed
+def declarations_are_missing(keys: Sequence[str]) -> str:
+    """Said of all errors that the file should declare."""
+    *others, last = keys
+    said = f"{', no '.join(others)} and no {last}" if others else last
+    return f"the file has no {said}, which requirements.declare asks for"
+
+
+@composed
+def waived(line: int | None, until: date, reason: str, is_expired: bool, waiver_id: str) -> str:
+    """Said of a row, or a requirement, that fails."""
+    place = "--set" if line is None else f"line {line}"
+    return f"{'expired ' if is_expired else ''}waiver of {place} ({waiver_id}), until {until}: {reason}"

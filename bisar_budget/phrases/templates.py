@@ -1,0 +1,139 @@
+"""Templates of sentences, filled with quantities in SI units.
+
+A field of a template, `{name:format}`, names a quantity and its format:
+
+- a unit (`{length:m}`, `{level:dB}`): three digits with a readable prefix; `{length:m 2}`: two; `{level:dB down}`:
+  rounded down; `{phase:rad}` three digits without a prefix, to compare with π/4;
+- `{size:size m}`: a magnitude, which may be infinite; `{limit:limit m}`: a limit, rounded down;
+- `{acceleration:m/s^2 as g}`: in another unit of the same dimension;
+- `{share:percent}`: a fraction in percent with three digits; `{share:percent .0f}` in a format of Python;
+- `{time:min}`: seconds in minutes; `{cycles:cycles}`: three digits rounded down, without a unit;
+- `{rows:count row}`: a count with its noun;
+- `{ids:list}`, `{keys:and}`, `{keys:or}`: items joined; `{names:and platforms.*.oscillator}` each within a pattern;
+- a format of Python (`{factor:g}`).
+
+A unit may be a field itself: `{size:size {unit}}`.
+"""
+
+import math
+import string
+from collections.abc import Callable, Iterable, Mapping
+from typing import SupportsFloat
+
+from bisar_budget.units import format_in, format_limit, format_quantity
+
+_UNITS = ("m", "s", "Hz", "dB", "m/s", "m/s^2")  # of quantities with a readable prefix
+
+
+def _number(value: object) -> float:
+    if not isinstance(value, SupportsFloat):
+        raise TypeError(f"no number: {value!r}")
+    return float(value)
+
+
+def _items(value: object) -> list[str]:
+    if not isinstance(value, Iterable):
+        raise TypeError(f"no items: {value!r}")
+    return [str(item) for item in value]
+
+
+def size_words(size: float, unit: str) -> str:
+    """A magnitude: metres with a prefix, phases in radians without, to be compared with π/4."""
+    if not math.isfinite(size):
+        return "without a value (no ground point has this range history)"
+    return format_quantity(size, unit) if unit == "m" else f"{abs(size):.3g} {unit}"
+
+
+def over_words(size: float, limit: float, unit: str) -> str:
+    """A magnitude with its limit: `1.2 rad, 0.785 rad allowed`."""
+    return f"{size_words(size, unit)}, {format_limit(limit, unit)} allowed"
+
+
+def level_words(level_db: float, rounding: str = "nearest") -> str:
+    """A level with three digits. [dB]"""
+    return format_quantity(level_db, "dB", 3, rounding)
+
+
+def cycles_words(cycles: float) -> str:
+    """A number of cycles that is below a limit: three digits, rounded down, so that they do not reach it."""
+    return format_quantity(cycles, "", 3, "down")
+
+
+def in_brackets(text: str, remark: str) -> str:
+    """A text with a remark in brackets; without brackets if the remark is empty."""
+    return f"{text} ({remark})" if remark else text
+
+
+def _quantity(value: object, unit: str, options: str) -> str:
+    given = options.removeprefix("as ")
+    if given != options:
+        return format_in(_number(value), unit, given)
+    words = options.split()
+    digits = next((int(word) for word in words if word.isdecimal()), 3)
+    return format_quantity(_number(value), unit, digits, "down" if "down" in words else "nearest")
+
+
+def _percent(value: object, options: str) -> str:
+    return f"{100 * _number(value):{options or '.3g'}} %"
+
+
+def _joined(separator: str) -> Callable[[object, str], str]:
+    def written(value: object, pattern: str) -> str:
+        items = _items(value)
+        return separator.join([pattern.replace("*", item) for item in items] if pattern else items)
+
+    return written
+
+
+def _count(value: object, noun: str) -> str:
+    return f"{value} {noun}{'' if value == 1 else 's'}"
+
+
+_FORMATS: Mapping[str, Callable[[object, str], str]] = {
+    "rad": lambda value, _: f"{_number(value):.3g} rad",
+    "size": lambda value, unit: size_words(_number(value), unit),
+    "limit": lambda value, unit: format_limit(_number(value), unit),
+    "percent": _percent,
+    "min": lambda value, _: f"{_number(value) / 60:g} min",
+    "cycles": lambda value, _: cycles_words(_number(value)),
+    "count": _count,
+    "list": _joined(", "),
+    "and": _joined(" and "),
+    "or": _joined(" or "),
+}
+
+
+class _Filler(string.Formatter):
+    """Fill the fields of a template; a missing field raises `KeyError`."""
+
+    def format_field(self, value: object, format_spec: str) -> str:
+        """One quantity in its format."""
+        kind, _, options = format_spec.partition(" ")
+        if kind in _FORMATS:
+            return _FORMATS[kind](value, options)
+        return _quantity(value, kind, options) if kind in _UNITS else format(value, format_spec)
+
+
+_FILLER = _Filler()
+
+
+def fill(template: str, quantities: Mapping[str, object]) -> str:
+    """Fill a template.
+
+    Raises
+    ------
+    KeyError
+        A field of the template has no quantity.
+    TypeError
+        A quantity is no number, or not several items, but its format needs one.
+    """
+    return _FILLER.vformat(template, (), quantities)
+
+
+def fields(template: str) -> set[str]:
+    """Names of the fields of a template, with those within formats."""
+    names = set[str]()
+    for _, name, format_spec, _ in _FILLER.parse(template):
+        if name is not None:
+            names |= {name} | fields(format_spec or "")
+    return names

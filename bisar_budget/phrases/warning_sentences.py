@@ -1,0 +1,77 @@
+"""Warnings about a mission file."""
+
+from collections.abc import Sequence
+
+from bisar_budget.phrases.notes import composed
+from bisar_budget.units import format_quantity
+
+TEMPLATES: dict[str, str] = {
+    "another-mission": "the mission checked is not that of the file: {changes}",
+    "id-of-no-row": "requirement_ids: no row has the id {row_id}",
+    "no-orbit-to-turn": "earth_orientation: not used, since no platform has an orbit",
+    "full-model-gates": (
+        "allocation.model {model}: the published model ignores the direct path; the full model decides"
+    ),
+    "nothing-declared": "no error is declared: nothing was judged",
+    "path-is-doubtful": "platforms.{platform}: {doubt}",
+    "nothing-swings-the-arm": (
+        "platforms.{platform}.motion_error.lever_arm.arm: attitude errors swing it, but imu states none: add "
+        "imu.attitude, gyro_bias or angle_random_walk"
+    ),
+    "nothing-shakes-the-oscillator": (
+        "platforms.{platform}.oscillator.acceleration_sensitivity has no effect: vibration and turns act on it, but "
+        "the file has none: add oscillator.vibration, or sinusoidal or spectrum to motion_error.vibration"
+    ),
+    "stated-twice": (
+        "platforms.{platform}.motion_error: acceleration and the accelerometer bias are both stated; they add"
+    ),
+    "correlations-not-used": (
+        "platforms.{platform}.motion_error.covariance: correlations are not used where each error is judged alone; "
+        "combine: rss uses them"
+    ),
+    "exchanges-are-rare": (
+        "synchronization.interval: pulses are exchanged less than once in an aperture of {aperture_time:g} s; "
+        "interpolation between them may make the phase worse than without synchronisation"
+    ),
+    "walks-over-range-cells": (
+        "autofocus.n_pull: {n_pull:g} is limited to {cap}, f0/B, where the range walk is half a cell; an error of "
+        "{n_pull:g}π rad walks {cells:.3g} cells, which a one-dimensional correction does not remove"
+    ),
+    "smears-beyond-the-scene": (
+        "autofocus.n_pull: an error of {n_pull:g}π rad smears a point over {smear:m}; {algorithm} needs {room:g} "
+        "times that. A scene with a radius of {radius:m} holds n_pull {largest_n_pull}"
+    ),
+    "waiver-matches-nothing": "waiver {row_id}: matches no row",
+    "waiver-matches-everything": "waiver {row_id}: names every row and would hide any new failure",
+    "waiver-not-used": "waiver {row_id}: not used: no row that it names fails",
+    "limit-is-optimistic": "{row_id}: optimistic limit: {shown}",
+}
+
+
+@composed
+def fit_changes_allowables(platform: str, acceleration: float, change: float, row_id: str) -> str:
+    """Said of a log whose noise is an error of the path's acceleration. [m/s²]"""
+    size = format_quantity(acceleration, "m/s^2")
+    by = f"by up to {100 * change:.2g} %" if change < 1 else "by a factor of two and more"
+    return (
+        f"platforms.{platform}: the noise of the log leaves the acceleration of its path uncertain by {size} (1"
+        f" sigma, along the line of sight), which changes allowables {by} ({row_id}): a longer or a more accurate log"
+        " reduces it"
+    )
+
+
+@composed
+def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence[float], has_axes: bool) -> str:
+    """Said of a satellite's path without the acceleration of its orbit. [m/s, m/s²]"""
+    components = ", ".join(f"{component + 0.0:.3f} m/s^2" for component in acceleration)
+    if has_axes:
+        how = "(gravity of a flattened Earth, less what its rotation adds)"
+    else:
+        how = (
+            "(towards the Earth's centre; the Earth's rotation changes it by up to 1.1 m/s^2, which needs the "
+            "latitude)"
+        )
+    return (
+        f"platforms.{platform}: {speed / 1e3:.3g} km/s is the speed of a satellite, but the path is straight. "
+        f"A circular orbit has acceleration: [{components}] {how}"
+    )
