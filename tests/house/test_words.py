@@ -101,7 +101,7 @@ def classes_defined_twice() -> int:
     return sum(count > 1 for count in counts.values())
 
 
-BOUNDS = {empty_names: 676, bare_constants: 146, any_annotations: 628, classes_defined_twice: 2}
+BOUNDS = {empty_names: 676, bare_constants: 146, any_annotations: 629, classes_defined_twice: 2}
 
 
 @pytest.mark.parametrize("count", BOUNDS, ids=lambda count: count.__name__)
