@@ -262,8 +262,8 @@ class SpecificationRow(FamilyRow):
         )
 
 
-def _amplitude(level: Floats) -> Any:
-    return 10 ** (level / 20)
+def _amplitude(level: Floats) -> Floats:
+    return np.asarray(10 ** (level / 20))
 
 
 def _owner(key: str) -> str:

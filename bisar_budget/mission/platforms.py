@@ -758,8 +758,7 @@ def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: floa
 
 def least_baseline(apart: PlatformState, half: PerCase) -> Floats:
     """Least distance of the platforms over an aperture of half-length `half` [s]. [m]"""
-    least: Floats = np.asarray(norm(apart.place(half * _FINE_APERTURE_TIMES))).min(axis=0)
-    return least
+    return np.asarray(norm(apart.place(half * _FINE_APERTURE_TIMES)).min(axis=0))
 
 
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
