@@ -3,27 +3,16 @@
 `note(code, **quantities)` fills the template of a code. Quantities are in SI and radians, or ids and names.
 """
 
-from bisar_budget.phrases import (
-    air_sentences,
-    draw_sentences,
-    image_sentences,
-    input_sentences,
-    limit_sentences,
-    no_limit_sentences,
-    oscillator_sentences,
-    requirement_sentences,
-    scene_sentences,
-    tone_sentences,
-    vibration_sentences,
-    warning_sentences,
-)
 from bisar_budget.phrases.air_sentences import (
+    AIR_SENTENCES,
     air_stays,
     air_stays_untaken,
     below_the_ionosphere,
     runs_along_the_ground,
 )
+from bisar_budget.phrases.draw_sentences import DRAW_SENTENCES
 from bisar_budget.phrases.image_sentences import (
+    IMAGE_SENTENCES,
     echoes_measured,
     in_its_worst_phase,
     phase_does_not_grow,
@@ -31,6 +20,7 @@ from bisar_budget.phrases.image_sentences import (
     sigma_of_time_series,
 )
 from bisar_budget.phrases.input_sentences import (
+    INPUT_SENTENCES,
     StatedError,
     input_in_doubt,
     input_states_more,
@@ -40,6 +30,7 @@ from bisar_budget.phrases.input_sentences import (
     orbit_errors_are_independent,
 )
 from bisar_budget.phrases.limit_sentences import (
+    LIMIT_SENTENCES,
     aggregate_over,
     cubic_phase_over,
     location_over,
@@ -47,8 +38,11 @@ from bisar_budget.phrases.limit_sentences import (
     published_model_does_not_hold,
     quadratic_phase_over,
 )
+from bisar_budget.phrases.no_limit_sentences import NO_LIMIT_SENTENCES
 from bisar_budget.phrases.notes import COMPOSED, NOTHING, Note
+from bisar_budget.phrases.oscillator_sentences import OSCILLATOR_SENTENCES
 from bisar_budget.phrases.requirement_sentences import (
+    REQUIREMENT_SENTENCES,
     confidence,
     declarations_are_missing,
     effect_is_negligible,
@@ -57,9 +51,11 @@ from bisar_budget.phrases.requirement_sentences import (
     nothing_judges,
     waived,
 )
+from bisar_budget.phrases.scene_sentences import SCENE_SENTENCES
 from bisar_budget.phrases.templates import fill
-from bisar_budget.phrases.tone_sentences import echoes_together_over
+from bisar_budget.phrases.tone_sentences import TONE_SENTENCES, echoes_together_over
 from bisar_budget.phrases.vibration_sentences import (
+    VIBRATION_SENTENCES,
     both_platforms_vibrate,
     does_as_much_as_along_the_sight,
     oscillator_does_not_vibrate,
@@ -69,7 +65,7 @@ from bisar_budget.phrases.vibration_sentences import (
     slower_than_three_cycles,
     spectrum_shakes,
 )
-from bisar_budget.phrases.warning_sentences import fit_changes_allowables, satellite_flies_straight
+from bisar_budget.phrases.warning_sentences import WARNING_SENTENCES, fit_changes_allowables, satellite_flies_straight
 
 __all__ = (
     "NOTHING",
@@ -117,21 +113,21 @@ __all__ = (
     "waived",
 )
 
-SUBJECTS = (
-    air_sentences,
-    draw_sentences,
-    warning_sentences,
-    image_sentences,
-    input_sentences,
-    limit_sentences,
-    no_limit_sentences,
-    oscillator_sentences,
-    requirement_sentences,
-    scene_sentences,
-    tone_sentences,
-    vibration_sentences,
+SENTENCE_TABLES = (
+    AIR_SENTENCES,
+    DRAW_SENTENCES,
+    IMAGE_SENTENCES,
+    INPUT_SENTENCES,
+    LIMIT_SENTENCES,
+    NO_LIMIT_SENTENCES,
+    OSCILLATOR_SENTENCES,
+    REQUIREMENT_SENTENCES,
+    SCENE_SENTENCES,
+    TONE_SENTENCES,
+    VIBRATION_SENTENCES,
+    WARNING_SENTENCES,
 )
-TEMPLATES: dict[str, str] = {code: text for subject in SUBJECTS for code, text in subject.TEMPLATES.items()}
+TEMPLATES: dict[str, str] = {code: text for table in SENTENCE_TABLES for code, text in table.items()}
 CODES: dict[str, str] = TEMPLATES | COMPOSED  # template, or docstring of the function, of every sentence
 
 

@@ -6,7 +6,7 @@ from bisar_budget.phrases.notes import composed
 from bisar_budget.phrases.requirement_sentences import effect_words
 from bisar_budget.phrases.templates import level_words, size_words
 
-TEMPLATES: dict[str, str] = {
+AIR_SENTENCES: dict[str, str] = {
     "air-that-stays-is-negligible": (
         "negligible: without correlation_time the delays of propagation are constant over {aperture_time:.4g} s; "
         "with a correlation time of {correlation_time:min} they would use {use:percent .2g} of a requirement at "

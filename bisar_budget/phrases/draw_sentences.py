@@ -1,6 +1,6 @@
 """Sentences about Monte Carlo draws."""
 
-TEMPLATES: dict[str, str] = {
+DRAW_SENTENCES: dict[str, str] = {
     "drawn-through-exact-ranges": (
         "every draw uses exact ranges: the declared errors are too large for sums of their effects"
     ),

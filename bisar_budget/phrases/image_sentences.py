@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from bisar_budget.phrases.notes import composed
 from bisar_budget.units import format_quantity
 
-TEMPLATES: dict[str, str] = {
+IMAGE_SENTENCES: dict[str, str] = {
     "autofocus-refuted": "passes only with autofocus, which the image at that limit refutes: {shown}",
     "limit-refuted": "inside its limit of {limit}, which images refute: {shown}",
     "optimistic-limit": "optimistic limit: {shown}",

@@ -7,7 +7,7 @@ from bisar_budget.phrases.notes import composed
 from bisar_budget.phrases.templates import size_words
 from bisar_budget.units import format_quantity
 
-TEMPLATES: dict[str, str] = {
+INPUT_SENTENCES: dict[str, str] = {
     "log-leaves-too-much": (
         "the residual of the smoothed log is {phase:rad} rms along the line of sight, more than {most:g} rad: state "
         "{key}: smoothed if the processor uses the smoothed path, raw if it uses the fixes"

@@ -4,7 +4,7 @@ from bisar_budget.phrases.notes import composed
 from bisar_budget.phrases.templates import in_brackets, over_words, size_words
 from bisar_budget.units import format_limit, format_quantity
 
-TEMPLATES: dict[str, str] = {
+LIMIT_SENTENCES: dict[str, str] = {
     "no-image-of": (
         "no ground point has the range history of so large an error: its QPE reaches {limit:limit rad} at "
         "{allowable:limit {unit}}"

@@ -1,6 +1,6 @@
 """Sentences that explain why a row has no limit or no value."""
 
-TEMPLATES: dict[str, str] = {
+NO_LIMIT_SENTENCES: dict[str, str] = {
     "no-quadratic-term-of-position": "no quadratic term: a position error moves the image (Table I)",
     "no-component": "no quadratic term: the platform's {cause} has no component along {axis}",
     "no-common-component": "no quadratic term: the platforms' {cause} have no component along {axis}, or cancel",

@@ -1,6 +1,6 @@
 """Sentences about oscillators, clocks and their synchronisation."""
 
-TEMPLATES: dict[str, str] = {
+OSCILLATOR_SENTENCES: dict[str, str] = {
     "clocks-are-not-set": (
         "{row_ids:list}: free-running oscillators displace the image as they drift after they were set, and the "
         "file does not state how they were set; add synchronization.method holdover with age and averaging, or "

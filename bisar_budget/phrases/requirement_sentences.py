@@ -5,7 +5,7 @@ from datetime import date
 
 from bisar_budget.phrases.notes import composed
 
-TEMPLATES: dict[str, str] = {
+REQUIREMENT_SENTENCES: dict[str, str] = {
     "over-the-limit-without-autofocus": "{times:.3g} times the limit without autofocus",
     "near-the-limit-with-autofocus": "uses {utilization:percent} of the limit with autofocus",
     "above-warn-above": "above {warn_above:percent g} of the limit",

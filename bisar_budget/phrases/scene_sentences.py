@@ -1,6 +1,6 @@
 """Sentences about the scene and the geometry of the collection."""
 
-TEMPLATES: dict[str, str] = {
+SCENE_SENTENCES: dict[str, str] = {
     "same-at-the-edge": "the declared errors have the same quadratic phase at the edge and at the centre",
     "drift-is-open-at-the-edge": (
         "{row_ids:list}: the drift of free-running oscillators since they were set is not counted: the file does "

@@ -89,7 +89,7 @@ def _count(value: object, noun: str) -> str:
     return f"{value} {noun}{'' if value == 1 else 's'}"
 
 
-_FORMATS: Mapping[str, Callable[[object, str], str]] = {
+_QUANTITY_FORMATS: Mapping[str, Callable[[object, str], str]] = {
     "rad": lambda value, _: f"{_number(value):.3g} rad",
     "size": lambda value, unit: size_words(_number(value), unit),
     "limit": lambda value, unit: format_limit(_number(value), unit),
@@ -109,8 +109,8 @@ class _Filler(string.Formatter):
     def format_field(self, value: object, format_spec: str) -> str:
         """One quantity in its format."""
         kind, _, options = format_spec.partition(" ")
-        if kind in _FORMATS:
-            return _FORMATS[kind](value, options)
+        if kind in _QUANTITY_FORMATS:
+            return _QUANTITY_FORMATS[kind](value, options)
         return _quantity(value, kind, options) if kind in _UNITS else format(value, format_spec)
 
 

@@ -3,7 +3,7 @@
 from bisar_budget.phrases.notes import composed
 from bisar_budget.phrases.templates import level_words
 
-TEMPLATES: dict[str, str] = {
+TONE_SENTENCES: dict[str, str] = {
     "spreads-too-much": "ISLR of {level_db:dB}, {limit_db:dB down} allowed",
     "noise-spreads-too-much": (
         "ISLR of {level_db:dB} by noise, {limit_db:dB down} allowed; largest: {row_id}, {largest_db:dB}"

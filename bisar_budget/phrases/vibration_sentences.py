@@ -4,7 +4,7 @@ from bisar_budget.phrases.notes import composed
 from bisar_budget.phrases.templates import cycles_words
 from bisar_budget.units import format_limit, format_quantity
 
-TEMPLATES: dict[str, str] = {
+VIBRATION_SENTENCES: dict[str, str] = {
     "felt-vibration-lacks": (
         "platforms.{platform}.oscillator.vibration replaces the airframe's vibration, but has no {key}, which the "
         "airframe has: add platforms.{platform}.oscillator.vibration.{key}"

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from bisar_budget.phrases.notes import composed
 from bisar_budget.units import format_quantity
 
-TEMPLATES: dict[str, str] = {
+WARNING_SENTENCES: dict[str, str] = {
     "another-mission": "the mission checked is not that of the file: {changes}",
     "id-of-no-row": "requirement_ids: no row has the id {row_id}",
     "no-orbit-to-turn": "earth_orientation: not used, since no platform has an orbit",

@@ -656,7 +656,7 @@ class ExactRanges:
         change = lanes.clock(1.0) - course * along.sum(axis=0)
         if self.has_direct_path:
             *between, baseline = _take_cases([*self._between, self.baselines], lanes.case)
-            vector, way = between + shifts[0] - shifts[1], ways[0] - ways[1]
+            vector, way = np.array(np.broadcast_arrays(*between)) + shifts[0] - shifts[1], ways[0] - ways[1]
             apart = norm(tuple(vector))
             remaining += apart - baseline
             change += np.where(apart > 0, course * dot(tuple(vector), tuple(way)) / apart, 0.0)

@@ -12,7 +12,7 @@ from bisar_budget import phrases
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import load_mission
-from bisar_budget.phrases import CODES, SUBJECTS, Note
+from bisar_budget.phrases import CODES, SENTENCE_TABLES, Note
 from bisar_budget.phrases.notes import COMPOSED
 from bisar_budget.phrases.templates import fields, fill
 from bisar_budget.report import Style, render
@@ -56,8 +56,7 @@ def test_every_sentence_of_a_verdict_has_its_code(name: str) -> None:
 
 
 def test_no_two_sentences_have_one_code() -> None:
-    tables = [table.TEMPLATES for table in SUBJECTS]
-    codes = [code for table in tables for code in table] + [*COMPOSED]
+    codes = [code for table in SENTENCE_TABLES for code in table] + [*COMPOSED]
     assert len(codes) == len(set(codes)) == len(CODES) > 190
 
 
