@@ -549,9 +549,11 @@ class ExactRanges:
 
     @cached_property
     def hidden_weights(self) -> Floats:
-        """Parts of the hidden phase per metre at each node, whose squares add up, (4, nodes, n). [rad/m]
+        """Four parts of the hidden phase, one for each order 0 to 3, per metre of range error at each node. [rad/m]
 
-        By orders 0 to 3. The rest beyond order 3 counts only with the small b², or in full where the aperture turns.
+        The array is (4, nodes, n). The square of the hidden phase is the sum of the squares of the parts. The rest of
+        the range error beyond order 3 has no part here. Its weight in the hidden phase is only the small b², except
+        in cases in which a line of sight turns far.
         """
         of_orders = np.array([self.band, (1 + self.band) / 3, self.band / 5 / 1.5**2, self.band / 7 / 2.5**2])
         of_orders[3] += self.is_turned / (7 * 2.5**2)
@@ -850,7 +852,7 @@ class _PointSearch:
             self._set_cases()
 
     def _keep(self, done: Indices, view: "_GroundView", step: Floats) -> None:
-        """Keep the lanes that have settled."""
+        """Mark the lanes `lane[done]` as settled, and store their view, point, step and determinant."""
         if done.size:
             arrays = [self.lane, view.seen, view.determinant, step, self.point]
             self.settled.append(arrays if done.size == self.lane.size else _take(arrays, done))
