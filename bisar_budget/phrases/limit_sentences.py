@@ -26,7 +26,7 @@ LIMIT_SENTENCES: dict[str, str] = {
     "passes-from": "passes with autofocus from n_pull {n_pull:g}",
     "beyond-autofocus": "no autofocus corrects this: N_pull would have to be {n_pull}, {allowed}",
     "other-model-is-beyond": "beyond it by the {model} model: QPE {phase:size {unit}}, {limit:limit {unit}} allowed",
-    "other-model-allows": "fails by the {model} model: {limit:{unit} down} allowed",
+    "other-model-allows": "fails by the {model} model: {limit:limit {unit}} allowed",
     "other-model-spreads": "fails by the {model} model: ISLR of {level_db:dB}",
     "wrong-height-defocuses": "a bistatic image defocuses on a wrong height",
     "position-defocuses": "the line of sight turns, and the image displaced by a position error defocuses",

@@ -234,7 +234,7 @@ def test_formulas_and_numbers_are_explained(run, tmp_path, model: str) -> None:
         "common.velocity.line_of_sight": ("φ_t/unit", "φ_r/unit"),
         "receiver.imu.attitude": ("f_u", "R(τ)·l", "l_u"),
         "receiver.imu.angle_random_walk": ("N_g·W(τ)",),
-        "receiver.lever_arm.attitude": ("l_u = sqrt(", "a part of receiver.imu.attitude"),
+        "receiver.lever_arm.attitude": ("l_u = sqrt(", "part of receiver.imu.attitude"),
         "receiver.lever_arm.uncertainty": ("u_l = sqrt(",),
         "common.random.GNSS": ("τ_c", "common_motion_error.random"),
     }

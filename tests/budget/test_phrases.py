@@ -4,6 +4,7 @@ import ast
 import json
 import math
 import pickle
+import re
 from collections.abc import Iterator
 
 import pytest
@@ -76,6 +77,17 @@ class TestTemplates:
             given = {keyword.arg for keyword in call.keywords}
             assert given == fields(phrases.TEMPLATES[code]), (place, code)
 
+    @pytest.mark.parametrize("unit", ["m", "m/s^2", "s^2/m", "dB", "rad", "1/s^2"])
+    def test_every_template_can_be_filled(self, unit: str) -> None:
+        """A format that takes a unit takes any: the unit of a sensitivity to acceleration was none of the known."""
+        items = re.compile(r"{(\w+):(?:list|and|or)\b")
+        for code, template in phrases.TEMPLATES.items():
+            quantities: dict[str, object] = dict.fromkeys(fields(template), 1.5)
+            quantities |= {key: ["a", "b"] for key in items.findall(template)} | {"unit": unit}
+            note = phrases.note(code, **quantities)
+            assert note.code == code
+            assert "{" not in note
+
     def test_every_template_is_used(self) -> None:
         used = {argument.value for _, call in self.calls() for argument in call.args}
         assert phrases.TEMPLATES.keys() == used
@@ -100,7 +112,7 @@ class TestTemplates:
             ("{length:m} and {length:m 2}", {"length": 12345.0}, "12.3 km and 12 km"),
             ("{size:size {unit}}", {"size": -2.0, "unit": "rad"}, "2 rad"),
             ("{size:size m}", {"size": math.inf}, "without a value (no ground point has this range history)"),
-            ("{limit:{unit} down}", {"limit": 1.2399, "unit": "m"}, "1.23 m"),
+            ("{limit:limit {unit}}", {"limit": 1.2399e-3, "unit": "s^2/m"}, "0.0121 /g"),
             ("{level:dB}, {level:dB down}", {"level": -18.456}, "-18.5 dB, -18.5 dB"),
             ("{share:percent}, {share:percent .0f}", {"share": 0.1234}, "12.3 %, 12 %"),
             ("{a:m/s^2 as g}", {"a": 9.80665}, "1 g"),
