@@ -118,7 +118,7 @@ class SetNumber(SetValue):
 
     @classmethod
     def of(cls, key: str, number: float, unit: str) -> "SetNumber":
-        """The number for a key; `unit` is the SI unit."""
+        """Replacement of the value of `key` by a number in the SI unit `unit`, which may be empty."""
         set_number = cls(key, f"{number!r} {unit}".rstrip())
         set_number.value = set_number.text if unit in _BY_UNIT else number
         return set_number

@@ -331,10 +331,10 @@ def given_unit(text: str, unit: str) -> str:
 
 
 def format_in(value: float, unit: str, written_unit: str, digits: int = 3, rounding: str = "nearest") -> str:
-    """Write an SI value in a unit of the same dimension: 349 µrad is `0.02 deg` if the file uses degrees.
+    """Write an SI value in `written_unit`, a unit of the same dimension: 349 µrad is `0.02 deg`.
 
-    Without a unit the text is the same as by `format_quantity`. A number with more than six digits or zeros has a
-    power of ten.
+    If `written_unit` is empty, or for a level in dB, the text is that of `format_quantity`. Numbers from 1e6 on, and
+    numbers below 1e-4, have an exponent, such as `2e6`.
     """
     if not written_unit or unit == "dB" or not math.isfinite(value):
         return format_quantity(value, unit, digits, rounding)

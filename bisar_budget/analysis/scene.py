@@ -211,7 +211,7 @@ class ScenePhases:
         return self.exact.at(*at(radius, azimuth), of)
 
     def places(self, radius: Floats, azimuth: Floats, of: Indices) -> ScenePlaces:
-        """Phases, size of their differences, and clearances at places."""
+        """Phases of the errors at ground points, combined size of their differences from the centre, clearances."""
         return self.there(self.ranges_at(radius, azimuth, of), of)
 
     def there(self, there: ExactRanges, of: Indices) -> ScenePlaces:
@@ -611,7 +611,7 @@ def _largest(phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> He
 
 
 def _over_at_the_edge(edges: SceneEdges, members: Sequence[Sequence[int]], of: Indices, rims: Rims) -> Floats:
-    """Phases at the edge of what is inside its limit at the centre and over it there, else 0, (names, of). [rad]"""
+    """Combined phases above their limits at the edge but not at the centre, (names, of); 0 for all others. [rad]"""
     phases, limit = edges.phases, edges.limit[:, of] * _LIMIT_FACTOR
     more = phases.more[:, of]
 
@@ -784,12 +784,12 @@ def where(
 
 # ---------------------------------------------------------------------- in words
 class SceneEdge(NamedTuple):
-    """Difference that the edge of the scene of one mission adds, in words.
+    """Largest change of the quadratic phase from the scene centre to the edge of one mission's scene, with notes.
 
-    `difference` is the largest of the quadratic phases between edge and centre, combined as the mission says [rad],
-    at `azimuth` on the rim. `autofocus_radius` is that within which it stays inside the total budget [m]; None where
-    it does as far as `searched` [m]. `degeneracy` says why a part of the edge has no
-    image, `doubt` which error is over its limit there and not at the centre.
+    `difference` is this change [rad], combined by the mission's rule, at `azimuth` on the rim. `autofocus_radius` is
+    the radius within which the change stays inside the total budget [m], or None if it does so as far as `searched`
+    [m]. `degeneracy` says why a part of the edge has no image. `doubt` names an error that is over its limit at the
+    edge, but not at the centre.
     """
 
     radius: float

@@ -156,7 +156,7 @@ class _Delay(NamedTuple):
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phase of each course, (courses, places). [rad]"""
+        """Quadratic phase by each independent course of the delay at ground points, (courses, points). [rad]"""
         along = np.zeros(())
         for platform_index, middle in zip(self.platform_indices, self.middles, strict=True):
             x, y, z = (component[of] for component in middle)

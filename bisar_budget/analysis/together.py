@@ -170,10 +170,11 @@ class Together:
         return self.combined(self.cubics_without_coverage(split, owner), self.rule_of_all)
 
     def moves(self, rule: str) -> Moves:
-        """Displacement of each error of motion, to be combined by a rule. [m]
+        """Displacement by each error of motion, in the form in which the rule combines displacements. [m]
 
-        By the sign that moves farther. For a sum over all signs: half of the difference between the two signs, and
-        once the rest, which all signs share.
+        Under the rule `sum`, which combines all signs, each error has half the difference between the displacements
+        by its two signs. The mean of the two displacements does not depend on the sign: a further entry holds its sum
+        over all errors. Under all further rules, each error has the sign that moves the image farther.
         """
         does = {error.subject.id: self.errors.does(self.model, error) for error in self.motion}
         if rule != "sum":

@@ -105,7 +105,11 @@ def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: Exac
 def _tones_of_oscillators(
     mission: Mission, geometry: BistaticGeometry
 ) -> Iterator[tuple[Subject, PerCase, LeftTone]]:
-    """Row, peak phase of a free oscillator [rad], and the tone that the synchronization leaves, for each tone."""
+    """Yield the tones of the oscillators: their spurs, and the tones that vibration causes.
+
+    Each item has the subject of the tone's row, the peak phase of the tone without synchronization [rad], and the
+    part of the tone that the synchronization leaves. The phase is 0 for a slow vibration whose tone is not folded.
+    """
     for spur in spurs_of(mission, geometry):
         yield spur.subject, spur.free, spur.left
     for accelerated in accelerated_tones(mission, geometry):

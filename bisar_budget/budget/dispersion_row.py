@@ -37,7 +37,7 @@ def dispersion_rows(judging: Judging, analysis: Analysis) -> Iterator["Dispersio
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DispersionRow(FamilyRow):
-    """Row of dispersion in many cases. [rad]"""
+    """The row that judges the quadratic phase by dispersion in the air, in many cases. [rad]"""
 
     def in_words(self, case: Case, model: str) -> Row:
         """Row of a case in words; it is the same for both models."""

@@ -23,7 +23,10 @@ from bisar_budget.phrases import NOTHING, Note
 def rests_on_doubted_noise(
     errors: Iterable[RandomError], effect_kind: Part, model: str, limit: PerCase
 ) -> PerCaseFlag:
-    """Whether oscillators in doubt use more than a tenth of a limit by one of their effects, in each case."""
+    """Whether the doubted noise of oscillators causes an effect above a tenth of its limit, in each case.
+
+    The effect is the quadrature sum over the oscillators in doubt. `effect_kind` names it, and `limit` has its unit.
+    """
     power: PerCase = 0.0
     for error in errors:
         if error.declared is not None and np.any(error.is_in_doubt):

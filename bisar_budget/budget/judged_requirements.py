@@ -41,10 +41,11 @@ IS_MET = np.array([*(status.complies for status in STATUS.values()), False])
 
 
 class UntakenEffect(NamedTuple):
-    """An effect that no requirement covers: the cases in which it is negligible, and otherwise the rows in it.
+    """An effect that no requirement covers, in many cases, and the rows that cause it.
 
-    `total` is the total of the effect, `parts` has each error's part by row id, and `least` is the smallest part of a
-    row that makes up the effect. [rad]
+    `total` is the effect of all errors together, and `parts` has the magnitude of each error's part by row id. [rad]
+    `is_negligible` marks the cases with a small total. In cases with a large total, `makers` marks by row id the rows
+    that cause the effect: their parts are at least `least`. [rad]
     """
 
     kind: str  # cubic, spread or tone

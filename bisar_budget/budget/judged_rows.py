@@ -137,7 +137,7 @@ class Judged(NamedTuple):
         return self._of_columns(lambda column: column * factor, IN_UNIT)
 
     def held_to(self, key: str) -> "Judged":
-        """The row with requirement `key` as its metric and as the requirement that sets the allowable."""
+        """The row with requirement `key` as its metric; this requirement then sets the allowable in every case."""
         return self._replace(metric=key, binding=np.full_like(self.binding, REQUIREMENTS.index(key)))
 
     def allowable_by(self, model: str) -> Floats:

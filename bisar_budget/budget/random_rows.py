@@ -218,9 +218,10 @@ class RandomRows:
 
     # ---------------------------------------------------------------- powers together
     def islr_rows(self, model: str) -> Iterator["IslrRow"]:
-        """Rows of the sum of spread powers, for the mission and for each owner.
+        """Rows of the summed power that errors spread (ISLR): one row for each owner, and one for the mission.
 
-        The owners have no rows if only wideband vibration and errors with a stated ISLR spread.
+        The rows of the owners have neither a size nor a limit in a case in which only wideband vibration and errors
+        with a stated ISLR spread power.
         """
         mission, split = self.mission, self.allocation.islr
         owners = ("transmitter", "receiver", *(["clock"] if split.clock is not None else []), "mission")

@@ -125,7 +125,7 @@ class SpurRow(FamilyRow):
     is_over_other: Booleans
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Row of a case in words, by the model that judges it."""
+        """The row of a case, with values and remarks as text; `model` is the model that judges the row."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         spur = spurs_of(mission)[self.spur_index]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
@@ -173,7 +173,10 @@ class SpurRow(FamilyRow):
 
 
 def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> tuple[Note, ...]:
-    """Note on the part of a tone that is folded below one cycle per aperture, and on the row that has its phases."""
+    """Note on a part of a tone that exchanged pulses fold below one cycle per aperture; empty without such a part.
+
+    The row `row_id` counts the phases of that part.
+    """
     slow = [
         (float(share), float(frequency))
         for frequency, share in zip(folded.frequencies, folded.shares, strict=True)

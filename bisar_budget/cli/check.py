@@ -140,7 +140,7 @@ class _Gate(click.Command):
 
 
 def _touched(changed: Sequence[str]) -> list[str]:
-    """Missions that a change touches; without any the command ends with 0 and a message."""
+    """List the missions that changed files affect; without such a mission, print a message and exit with code 0."""
     from bisar_budget.cli.touched import touched_missions
 
     files = touched_missions(changed)

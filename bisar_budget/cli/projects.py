@@ -1,4 +1,4 @@
-"""Missions of a run, grouped by their settings, which are the nearest to each mission."""
+"""Missions of a run, grouped by settings. Each mission uses the settings file that is nearest to it."""
 
 import os
 from collections.abc import Iterator, Sequence

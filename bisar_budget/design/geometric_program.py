@@ -67,14 +67,14 @@ class Largest(NamedTuple):
 
 
 def largest_sizes(weights: Floats, rows: Rows) -> Largest:
-    """Maximise Σ wᵢ·log sᵢ within rows that have room.
+    """Find the sizes sᵢ that maximise Σ wᵢ·log sᵢ while no row exceeds its room.
 
     Parameters
     ----------
     weights : (sizes,)
-        All above 0.
+        Weights wᵢ, all above 0.
     rows : Rows
-        With room above 0, and each size in at least one of them.
+        Upper bounds. Each row has room above 0, and each size is in at least one row.
     """
     with np.errstate(divide="ignore"):
         alone = (np.log(rows.room[:, None] / rows.share) - np.log(2 * weights.size)) / rows.power[:, None]

@@ -22,7 +22,7 @@ class ToImage(NamedTuple):
 
     @property
     def seconds(self) -> float:
-        """Estimated time of the images; 0 if it is far below a minute. [s]"""
+        """Estimated time that forming the images takes; 0 if it is far below a minute. [s]"""
         return seconds_to_verify(self.mission, escape(self.row))
 
 

@@ -43,9 +43,9 @@ class OfferedFigure(NamedTuple):
 
 
 class Offer(NamedTuple):
-    """An offer: the file of a mission with its figures, and the verdict of that mission.
+    """An offer compared with a sheet: its mission file, its figures, and the verdict of a check of its mission.
 
-    `notes` name further differences from the mission of the sheet.
+    `notes` name the other sections in which the mission of the offer differs from the mission of the sheet.
     """
 
     file: str

@@ -328,7 +328,7 @@ class _Uses(NamedTuple):
 
 
 class _Neighbours:
-    """The numbers of a mission, and checks of the mission at neighbouring values."""
+    """Checks a mission with a number of its file changed by a few steps, up or down."""
 
     def __init__(
         self, variation: Variation, numbers: Sequence[Stated], worst: str | None, row: str | None, today: date
@@ -439,7 +439,7 @@ Leaf = tuple[str, Reader[object], Content, Mapping[str, object] | None]
 
 
 def _leaves(reader: Reader[object], value: object, path: tuple[str, ...], above: JsonObject | None) -> Iterator[Leaf]:
-    """Key, reader and value of every leaf of a file; for shares also the section of all shares."""
+    """Yield the key, reader and value of every leaf of a file. A share has its section of shares as fourth item."""
     reader = form_of(reader, value)
     children: Sequence[tuple[str, object]] = ()
     if isinstance(value, dict):

@@ -174,7 +174,10 @@ def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
 
 
 def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Number:
-    """The number of a key with the file's value, the largest of three axes, or else with the figure of a part."""
+    """The number that a key names, with its value in the file, or else the figure of the part that the file names.
+
+    If the value has three components, one for each axis, the number has the component of largest magnitude.
+    """
     number = number_of(tree, key, is_for_each=True)
     if number.value is not None:
         return number

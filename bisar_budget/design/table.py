@@ -248,8 +248,9 @@ class Variation:
 class Question(NamedTuple):
     """Everything that a process needs to check cases of a mission.
 
-    `keys` have numbers, `choices` have words. `row` is judged instead of the mission, if set. `breaks` are the
-    statuses that do not comply. `named` has the files that the mission names, if the process cannot read them.
+    `keys` are the varied keys with numbers, and `choices` are the varied keys with words. If `row` is set, this row
+    is judged instead of the whole mission. A case with a status in `breaks` does not comply. `named` holds the files
+    that the mission names, for a process that cannot read them itself.
     """
 
     data: bytes

@@ -246,7 +246,7 @@ def _scaled(value: SectionValue, reader: Reader[object], factor: PerCase, is_clo
 
 
 def _form(reader: Reader[object], value: object) -> Reader[object]:
-    """The form of a reader that read a value."""
+    """The reader that read a value: one of the forms of a `OneOf`, otherwise `reader` itself."""
     if isinstance(reader, OneOf):
         kind = Triple if isinstance(value, tuple) and not hasattr(value, "_fields") else Quantity
         matching = [form for form in reader.forms if isinstance(form, Section) and type(value) is form.kind]

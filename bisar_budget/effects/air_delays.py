@@ -59,10 +59,11 @@ def obliquity(position: Vectors, shell: PerCase) -> PerCase:
 
 
 def leg_factor(delay: str, position: Vectors, middle: Vectors) -> PerCase:
-    """Delay of a leg over the zenith delay, for positions (…) of a platform that is at `middle` at mid-aperture.
+    """Ratio of the delay on a platform's leg to the delay at the zenith, for positions (…) of the platform.
 
-    A platform within the air has a flat Earth below it, and no free electrons on its leg. A leg along the ground, for
-    which the file may not state a delay, has factor 0.
+    `middle` is the platform's position at mid-aperture. If the platform is below `AIR_TOP_M`, the ratio is that of a
+    flat Earth for the neutral air, and 0 for free electrons, which are all above the leg. For the neutral air, the
+    ratio is also 0 at an elevation below `LEAST_ELEVATION_DEG`, for which a mission file must not state a delay.
     """
     height = np.asarray(height_of(middle))
     is_above = height >= AIR_TOP_M

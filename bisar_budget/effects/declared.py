@@ -173,7 +173,7 @@ def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, PerCase]:
 
 
 class OwnPlane(NamedTuple):
-    """Displacement by effects that hold their own displacement, as the effects of the full model do."""
+    """Displacement of the image by the full model, whose effects include the displacement; see `ImagePlane`."""
 
     is_singular: PerCaseFlag = False
 
@@ -599,7 +599,10 @@ class DeclaredErrors:
         return Lanes(case, at_nodes.reshape(len(at_nodes), -1), moves, directions, order, tags)
 
     def _of_lanes(self, values: Any, signs: int) -> Any:
-        """Values of errors (..., errors, cases) for their lanes, (..., lanes); one lane if all lanes share them."""
+        """Repeat values (..., errors, cases) for each sign of an error, (..., lanes).
+
+        Values of one error and one case, which all lanes share, have shape (..., 1).
+        """
         *more, errors, cases = values.shape
         if errors == cases == 1:
             return values[..., 0]

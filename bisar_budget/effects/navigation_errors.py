@@ -198,9 +198,10 @@ def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> tuple[PerCase,
 
 
 def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions: Floats) -> RandomEffect:
-    """Effect of a unit by the full model over the exact paths; `directions` (axes, 3, cases) are its acceleration.
+    """Effect of a unit of the inertial sensor's figure `kind`, by the full model over the exact paths.
 
-    The motion by a unit grows from the motion over an aperture of 2 s as a power of half the aperture time.
+    `directions` (axes, 3, cases) is the acceleration error by a unit of the figure about, or along, each axis. The
+    motion error is computed for an aperture of 2 s. Its square is then scaled by a power of half the aperture time.
     """
     count, along = len(seen.exact.times), seen.range_errors(platform_index, directions[:, :, None])
     scale = seen.exact.half ** _GROWS[kind]
@@ -364,9 +365,10 @@ def _walks(first: int, second: int, count: int) -> _Walks:
 
 @cache
 def _courses_of_both_walks(count: int) -> tuple[Floats, Floats]:
-    """Independent courses of a walk of a tilt over an aperture of 2 s: its double integral, and the walk itself.
+    """Independent courses that make up a tilt's random walk over an aperture of 2 s, at the nodes.
 
-    Both are (courses, nodes). The same course of both has the same noise.
+    Returns the double integral of the walk, and the walk itself, each (courses, nodes). Course i of both comes from
+    the same noise.
     """
     both = np.block([[_walks(a, b, count).at_nodes for b in (2, 0)] for a in (2, 0)])
     twice, once = np.split(factor(both).T, 2, axis=1)

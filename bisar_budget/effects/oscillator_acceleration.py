@@ -182,7 +182,10 @@ def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
 
 
 def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] | None:
-    """Effects of a unit of Γ by the acceleration of a path; None for a path without acceleration."""
+    """Effects by both models of a path's acceleration on the oscillator, for a unit of its sensitivity Γ.
+
+    None for a path without acceleration, or in free fall: the oscillator then feels no acceleration.
+    """
     state: PlatformState = getattr(seen.geometry, name)
     if state.is_quadratic and not np.any(norm(state.acceleration) > _FELT_ACCELERATION_MPS2):
         return None

@@ -191,7 +191,11 @@ def clocks_without_oscillator(mission: Mission) -> tuple[str, ...]:
 
 
 def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Phase noise of a platform's oscillator, or the part left by exchanged pulses, and spurs that they make slow."""
+    """Random error of a platform's oscillator: its phase noise, and its spurs folded below one cycle per aperture.
+
+    Only the noise that the synchronisation of the clocks leaves in the data counts. An unstated oscillator yields
+    nothing.
+    """
     mission = seen.mission
     oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
     if oscillator is None:

@@ -277,7 +277,10 @@ class SensorCases:
         )
 
     def of_process(self, covariance: Floats, beyond: PerCase) -> RandomEffect:
-        """Effect by the full model of a process of the range error: see `effects_of_process`."""
+        """Effect, by the full model, of a random range error with a given covariance.
+
+        `covariance` (nodes, nodes, cases) and `beyond` (cases,) are arguments of `effects_of_process`. [m²]
+        """
         return self._of_noise(effects_of_process(self.exact, self.weights, covariance, beyond))
 
     def _of_noise(self, effects: RangeEffects) -> RandomEffect:

@@ -168,7 +168,11 @@ class _Tone:
         return np.array((quadratic, cubic, hidden, beyond_cubic))
 
     def of(self, way: Vectors, size: PerCase) -> Floats:
-        """Effects, as `of_range`, of a motion of any size [m] along a way of floats, (cases,) or (nodes, cases)."""
+        """Effects of a motion of `size` [m] along the direction `way`, in the fields and shape of `of_range`. [rad]
+
+        Each component of `way` is (cases,) or (nodes, cases). The effects are linear in `size`, except in cases where
+        the second order matters: exact ranges give the effects of these cases.
+        """
         exact, cases = self.exact, self.exact.half.size
         small, size = (
             self.of_range(exact.along(self.platform_index, way) * size),

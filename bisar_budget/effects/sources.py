@@ -289,7 +289,7 @@ class ErrorListing:
         )
 
     def _of_setting(self) -> Iterator[ErrorSource]:
-        """Time and frequency errors that setting the clocks left; in holdover also where the file declares none."""
+        """Time and frequency errors that remain after the clocks are set; in holdover also undeclared errors."""
         sync = self.mission.synchronization
         if sync is None:
             return
@@ -513,7 +513,10 @@ class ErrorListing:
 
 @cache
 def _scene_axes(name: str, kind: str) -> tuple[tuple[Subject, KeyPath, str, Note], ...]:
-    """Subject, path in the file, equation and reason for no limit, along each axis of the scene."""
+    """Texts of the errors along the axes of the scene, by axis.
+
+    Each item has the row's subject, the key path in the file, the equation, and the reason for a missing limit.
+    """
     return tuple(
         (
             subject(name, kind, letter),

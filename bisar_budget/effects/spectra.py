@@ -130,7 +130,7 @@ _MAX_PANEL_COUNT = 4096  # panels in one integration
 
 
 def _tone_edges(aperture_time: float) -> list[float]:
-    """Frequencies between which a tone's parts are smooth. [Hz]"""
+    """Edges of frequency panels, rising; within a panel the parts of a tone are smooth in frequency. [Hz]"""
     scale = math.pi * aperture_time
     edges = [_FIRST_POWER_ANGLE_RAD / scale * _OCTAVE_RATIO**n for n in range(4)]
     return edges + [math.pi * n / scale for n in range(1, _FOLLOWED_TURN_COUNT + 1)]
@@ -333,7 +333,10 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
 
 
 def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Floats) -> Iterator[Floats]:
-    """Mean squares and products of the orders of a tone less the line: 00, 11, 01, 02, 03, 12, 13."""
+    """Mean squares and products of the orders of a tone of amplitude 1, less the line fitted to set the clock.
+
+    Yields Re(A_m·A_n*), in the shape of `f` [Hz], for the pairs of orders mn = 00, 11, 01, 02, 03, 12, 13.
+    """
     quadratic, cubic, _, constant, linear = tone(math.pi * f * aperture_time)
     *_, mean, slope = tone(math.pi * f * averaging)
     turn, rate = np.exp(-2j * math.pi * f * age), 2j / averaging * slope

@@ -98,7 +98,7 @@ class Element:
         return None if node is None else Element(self.file, node)
 
     def one(self, path: str) -> "Element":
-        """First element at a path; a fault if it is missing."""
+        """First element at a path; raises `FormatError` if the path has no element."""
         element = self.maybe(path)
         if element is None:
             raise self.fault("is missing", path)

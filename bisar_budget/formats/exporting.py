@@ -502,7 +502,7 @@ def _pos_vel_err(path: str, covariance: Floats, frame: str) -> _Leaves:
 
 
 def _file(tree: "_ElementTree", vectors: Records, signal: NDArray[np.generic]) -> bytes:
-    """A CPHD file by sarkit's writer."""
+    """Content of a CPHD file, which sarkit writes from the metadata, the per-vector parameters and the signal."""
     skcphd = import_module("sarkit.cphd")
     with tempfile.TemporaryFile() as stream:  # the writer needs a real file
         with skcphd.Writer(stream, skcphd.Metadata(xmltree=tree)) as writer:

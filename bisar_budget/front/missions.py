@@ -90,7 +90,9 @@ def geomspace(start: object, stop: object, count: int) -> Spaced:
 
 
 def cases_of(mission: Mission, values: Mapping[str, object] | str | os.PathLike[str], paired: bool = False) -> Cases:
-    """The cases of a sweep: every combination of the values of each key, the last key the fastest, or a file's cases.
+    """The cases of a sweep over the values of keys, or the cases that a file lists.
+
+    The cases of a sweep are every combination of the values, and the last key varies fastest.
 
     Parameters
     ----------
@@ -105,8 +107,8 @@ def cases_of(mission: Mission, values: Mapping[str, object] | str | os.PathLike[
     Raises
     ------
     QuestionError
-        A key is unknown or has neither number nor word, a key has no values, or pairs differ in length. For a file it
-        is a `TableError`, which has a line for each fault.
+        A key is unknown or takes neither a number nor a word, a key has no values, or paired keys have different
+        numbers of values. A faulty file raises the subclass `TableError`, which has a line for each fault.
     """
     if not isinstance(values, Mapping):
         return table_file(tree_of(mission), os.fspath(values))

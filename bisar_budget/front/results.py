@@ -370,9 +370,10 @@ class SensitivityResult(_Answer):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class AllocateResult(_Answer):
-    """Specifications that together meet every requirement: `specifications`, `complies`, `requirements`.
+    """Specifications that together meet every requirement.
 
-    `offer` compares the figures of another mission with them, if one was given.
+    The attributes `specifications`, `complies` and `requirements` are those of `found`. If another mission was given,
+    `offer` compares the figures of that mission with the specifications.
     """
 
     found: SpecificationSheet

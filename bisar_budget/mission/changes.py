@@ -168,7 +168,10 @@ def _put(container: Content, name: str | int, value: object) -> None:
 
 
 def _value(tree: Tree, change: SetValue, path: KeyPath) -> Content:
-    """The value of an option, read as a value of the file; faults name the option. A number stays as it is."""
+    """Parse the value that an option sets, as if it stood in the file; a number needs no parsing.
+
+    A fault names the option. The result is `INVALID` for a text that cannot be read.
+    """
     if isinstance(change, SetNumber):
         return change.value
     try:

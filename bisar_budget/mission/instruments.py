@@ -312,7 +312,10 @@ class Oscillator(NamedTuple):
 
     @property
     def mask_at_frequency_of_part(self) -> Overridden | None:
-        """Noise of a part that a mask without a frequency replaces; the mask holds at the frequency of the part."""
+        """Noise figure of a part that a mask without a frequency replaces; the mask applies at the part's frequency.
+
+        None if no figure is replaced in this way.
+        """
         return next((figure for figure in self.overridden if figure.frequency), None)
 
     @property

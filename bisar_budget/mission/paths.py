@@ -214,7 +214,7 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
 
 
 def _file_problem(file: str | None, error: PathFileError) -> Problem:
-    """The problem with a file that a key names; the name of the file is in the problem once."""
+    """The problem with a path file that a key may name; the text of the problem names the file only once."""
     words = str(error)
     words = f"{file} {words}" if file is not None and words.startswith("has ") else words
     return Problem(words, error.accepted, error.hint, names_value=file is not None and words.startswith(file))

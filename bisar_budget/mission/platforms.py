@@ -694,7 +694,7 @@ def without_image(
 
 
 def _no_image(geometry: BistaticGeometry, radar: "Radar | None", aperture_time_s: float | None) -> Iterator[Problem]:
-    """Problem of a geometry that forms no image."""
+    """Yield a problem if the geometry forms no image: both platforms are still, or no image plane exists."""
     if all(norm(platform.velocity) < STILL_SPEED_MPS for platform in geometry.both):
         yield Problem("both platforms are still: no aperture", at=("platforms",))
     elif radar and aperture_time_s and (reason := degeneracy(geometry, radar, aperture_time_s)):
@@ -758,8 +758,7 @@ def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: floa
 
 def least_baseline(apart: PlatformState, half: PerCase) -> Floats:
     """Least distance of the platforms over an aperture of half-length `half` [s]. [m]"""
-    least: Floats = np.asarray(norm(apart.place(half * _FINE_APERTURE_TIMES))).min(axis=0)
-    return least
+    return np.asarray(norm(apart.place(half * _FINE_APERTURE_TIMES)).min(axis=0))
 
 
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:

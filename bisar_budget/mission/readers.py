@@ -467,7 +467,7 @@ class TextMap(Reader[dict[str, str]]):
 
 
 class SizeMap(Reader[dict[str, object]]):
-    """A mapping of keys of the file to sizes, which are read later: a size has the reader of its key."""
+    """A mapping from keys of errors to single sizes. The reader of each key reads the size of that key later."""
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, object] | Invalid:
         """Refuse sizes that are lists or mappings."""

@@ -151,7 +151,10 @@ class Revision:
         return None
 
     def _object(self, inside: str) -> "_Object":
-        """The object at a path, or the reason of git why there is none. Small objects are kept for the next call."""
+        """The git object at a path of the commit; its `kind` tells why, if there is no such file or folder.
+
+        An object with at most `MAX_BYTES` bytes of content is kept for the next call.
+        """
         git_object = self._objects.get(inside)
         if git_object is None:
             git_object = _object(self.top, self._commit, inside)

@@ -26,11 +26,12 @@ def picked(mission: Mission, cases: NDArray[np.intp]) -> Mission:
 
 
 def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.intp]]]:
-    """Missions of arrays, one for each shape, with the indices of the missions that each of them holds.
+    """Combine all missions of one shape into one mission whose numbers are arrays; yield it with their indices.
 
-    A number that differs between missions of one shape becomes an array. Missions have one shape if everything but
-    their numbers is the same: keys, words, lengths of lists. A mission of arrays has no sources and no positions in
-    its file, because calculations with arrays never read them.
+    Missions have the same shape if they differ only in numbers, not in keys, words or lengths of lists. A number that
+    differs between the missions becomes an array (missions,), and a number that is the same in all of them stays a
+    number. The combined mission has no sources and no positions in a file, because calculations with arrays never
+    read them.
     """
     shapes: dict[object, tuple[Mission, list[int], list[list[float]]]] = {}
     for index, mission in enumerate(map(_bare, missions)):

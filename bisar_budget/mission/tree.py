@@ -94,8 +94,10 @@ class Tree:
         return tree
 
     def fault(self, mark: ParserEvent, path: KeyPath, problem: str, **details: str) -> None:
-        """Note a fault at a mark of the file, or at the start of the file without a mark.
-        Raises `UnusableError` when the file has `MAX_FAULT_COUNT` faults.
+        """Record a fault at a mark in the file. A fault without a mark is at the start of the file.
+
+        If an option set the value, the fault names the option and has no line. Raises `UnusableError` when the file
+        has `MAX_FAULT_COUNT` faults.
         """
         change = self._change_at(path)
         if change is not None:
@@ -136,9 +138,10 @@ class Tree:
         self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
 
     def document(self, text: str, path: KeyPath, accepted: str) -> Content:
-        """Read the only document of a text into the tree at a path; `INVALID` for an empty text.
+        """Read the only YAML document of a text into the tree at a path; return `INVALID` for an empty text.
 
-        `accepted` completes the sentence for a second document. Raises `yaml.YAMLError` too.
+        Raises `UnusableError` for a second document, and `yaml.YAMLError` for a text that is not YAML. `accepted` is
+        the accepted content in the message about a second document.
         """
         next_event: Callable[[], ParserEvent] = _PARSER(text).get_event
         while type(event := next_event()) is not yaml.DocumentStartEvent:

@@ -49,7 +49,7 @@ class StatedAccuracy(NamedTuple):
 
     @property
     def position_m(self) -> float:
-        """Root-sum-square of the position error over its axes, or the error without a direction. [m]"""
+        """Root-sum-square of the stated position error over its axes, or `total` without a covariance. [m]"""
         variances = (
             [row[axis] for axis, row in enumerate(self.covariance[:3])] if self.covariance else [self.total**2]
         )
@@ -169,7 +169,10 @@ class OrbitState(NamedTuple):
     velocity: Vector
 
     def axes(self, name: str) -> Floats:
-        """Rows of `RTN` (radial, in-track, cross-track) or `TNW` (along the velocity, in-plane, cross-track)."""
+        """Unit vectors of the axes `RTN` (radial, in-track, cross-track) or `TNW` (velocity, in-plane, cross-track).
+
+        The vectors are the rows of the result (3, 3), along the axes of the Earth.
+        """
         position, velocity = np.array(self.position), np.array(self.velocity)
         across = np.cross(position, velocity)
         across /= np.linalg.norm(across)

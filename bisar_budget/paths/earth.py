@@ -195,7 +195,10 @@ def geodetic(point: Vector) -> Geodetic:
 
 
 def _directions(latitude: PerCase, longitude: PerCase) -> Floats:
-    """East, north and up (3, ..., 3) at places, each (...)."""
+    """Unit vectors to the east, north and up at places, in Earth-fixed axes.
+
+    Latitude and longitude are (...) in radians. The result (3, ..., 3) is indexed by direction, place and component.
+    """
     sine, cosine, zero = np.sin(latitude), np.cos(latitude), np.zeros_like(longitude)
     sine_l, cosine_l = np.sin(longitude), np.cos(longitude)
     east = (-sine_l, cosine_l, zero)

@@ -133,7 +133,7 @@ def hold_to_bytes(data: bytes, max_bytes: int, name: str) -> None:
 
 
 class PathDoubt(NamedTuple):
-    """Largest distance of the truth from a path, from knowledge about its source [m], and the words for the cause."""
+    """How far the true path may lie from a known path: the largest distance `size` [m], and `words` for its cause."""
 
     size: float
     words: str

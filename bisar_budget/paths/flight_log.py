@@ -240,7 +240,10 @@ def _hold_to_datum(lines: Sequence[str], name: str) -> None:
 
 
 def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats, Instant | None, str]:
-    """Times [s], day and seconds of the scale from which they count, and how well that is known."""
+    """Times [s], the instant in the scale of the header from which the times count, and words for its accuracy.
+
+    The instant is None if the log does not state it, and the words may be empty.
+    """
     time_index = header.index_of("time")
     counted_s = np.zeros(len(table.lines))
     if time_index is not None:

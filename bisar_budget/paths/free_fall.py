@@ -100,7 +100,10 @@ class FreeFall:
         return gravity, spin
 
     def rate_against_stars(self, position: Vectors) -> Vectors:
-        """Rate, in the axes of the scene, of a position error that is at rest against the stars: −ω×p. [1/s · m]"""
+        """Rate −ω×p, in the scene's axes, of a position error p that is constant relative to the stars.
+
+        The result is in m/s for `position` in m, and in 1/s for a unit vector.
+        """
         x, y, z = cross(self.rotation, position)
         return (-x * self.share, -y * self.share, -z * self.share)
 
@@ -126,7 +129,11 @@ class FreeFall:
 
 
 def of_scene(axes: SceneAxes | None) -> FreeFall:
-    """Free fall in the axes of a scene; without a place on the Earth it is above the centre and does not turn."""
+    """Dynamics of free fall in the axes of a scene.
+
+    If the scene has no place on the Earth (None), the Earth's centre is one Earth radius below the scene centre, and
+    the axes do not turn.
+    """
     if axes is None:
         return FreeFall((0.0, 0.0, -EARTH_RADIUS_M), (0.0, 0.0, 0.0))
     return FreeFall(axes.place((0.0, 0.0, 0.0)), axes.turned((0.0, 0.0, ROTATION_RATE_RAD_PER_S)))

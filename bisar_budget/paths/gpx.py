@@ -76,7 +76,7 @@ def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
 
 
 def _chosen(tracks: Sequence[MessageElement], track_name: str, name: str) -> int:
-    """Index of the track of a name, or else of a number, from 1."""
+    """Index, counted from 0, of the track with the given name or, if no track has it, with that number, from 1."""
     matches = [number for number, track in enumerate(tracks) if _name_of(track) == track_name.strip()]
     if len(matches) == 1:
         return matches[0]

@@ -34,7 +34,10 @@ class Instant(NamedTuple):
         return (self.day - other.day) * DAY_S + (self.seconds - other.seconds)
 
     def as_text(self) -> str:
-        """2026-06-01T05:20:31.250Z, to a millisecond; a modified Julian day outside the years 1 to 9999."""
+        """The instant as text like 2026-06-01T05:20:31.250Z, rounded to a millisecond.
+
+        For an instant outside the years 1 to 9999, the text is the modified Julian day, such as `MJD -700000.50000`.
+        """
         try:
             moment = Instant(self.day, round(self.seconds, 3)).as_datetime()
         except OverflowError:

@@ -22,7 +22,7 @@ _DECIMAL_PATTERN = re.compile(r"\s*[+-]?(\d+(?:\.\d*)?|\.\d+)([eEdD][+-]?\d+)?\s
 
 
 def hold_to_size(size: int, name: str, part: str = "objects") -> None:
-    """Refuse a file that is too large; `part` names the content to keep."""
+    """Refuse a file above `MAX_MARKUP_BYTES`; the message advises the user to keep only the `part` that is needed."""
     if size > MAX_MARKUP_BYTES:
         raise PathFileError(f"{name}: is larger than {MAX_MARKUP_BYTES // 1_000_000} MB; keep the {part} needed")
 

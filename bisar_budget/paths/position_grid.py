@@ -68,7 +68,7 @@ def _roughness(times: Floats, values: Floats) -> float:
 
 
 def geodetic_grid(times: Floats, latitude: Floats, longitude: Floats, height: Floats) -> Matrix:
-    """One step north, east and up, each in the axes of the Earth; zeros for a coordinate without a grid. [m]"""
+    """Vectors of one grid step in latitude, longitude and height, in Earth-fixed axes; zeros without a grid. [m]"""
     middle = len(times) // 2
     middle_fix = np.array([latitude[middle], longitude[middle], height[middle]])
     units = (_ARC_UNITS_RAD, _ARC_UNITS_RAD, _LENGTH_UNITS_M)

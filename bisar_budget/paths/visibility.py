@@ -44,9 +44,10 @@ class OrbitGap(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """A part of a span in which a satellite is above an elevation. [s]
+    """Part of a span in which a satellite is above an elevation, from `start` to `stop`. [s]
 
-    `rises` and `sets` are false for a satellite above the elevation at the beginning, or at the end, of known orbits.
+    `rises` is false if the satellite is already above the elevation when the known orbits begin. `sets` is false if
+    the satellite is still above the elevation when they end.
     """
 
     start: float

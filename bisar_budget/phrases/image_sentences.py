@@ -1,4 +1,4 @@
-"""Sentences about images at the limits: verdicts, and reasons for none."""
+"""Sentences about images formed at the limits: verdicts, and reasons why an image or a verdict is missing."""
 
 import math
 from collections.abc import Sequence

@@ -70,7 +70,7 @@ def effect_is_negligible(kind: str, total: float, keys: Sequence[str]) -> str:
 
 @composed
 def nothing_judges(key: str) -> str:
-    """Said of a requirement without a row that judges it."""
+    """Sentence for a requirement that no row judges, because the file does not declare the errors for it."""
     return f"no declared error {_NEEDED_DECLARATIONS[key]}"
 
 

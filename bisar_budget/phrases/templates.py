@@ -131,7 +131,7 @@ def fill(template: str, quantities: Mapping[str, object]) -> str:
 
 
 def fields(template: str) -> set[str]:
-    """Names of the fields of a template, with those within formats."""
+    """Names of all fields of a template, including fields inside the format specification of another field."""
     names = set[str]()
     for _, name, format_spec, _ in _FILLER.parse(template):
         if name is not None:

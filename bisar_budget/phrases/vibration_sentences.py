@@ -55,7 +55,7 @@ def share_of_power_over(metric: str, rule: str) -> str:
 def slower_than_three_cycles(
     cycles: float, quadratic: float, limit: float, cubic: float, cubic_limit: float | None
 ) -> str:
-    """Said of a vibration. [rad]"""
+    """Sentence for a vibration below three cycles per aperture: its worst-case phases and their limits. [rad]"""
     return (
         f"{cycles_words(cycles)} cycles per aperture: below three there is also "
         f"{_in_the_worst_phase(quadratic, limit, cubic, cubic_limit)}; the same motion, not counted again in a sum"

@@ -112,7 +112,7 @@ class PointSettings:
 POINT_SETTINGS = PointSettings()
 
 # Number of arrays of both platforms that hold measured paths, and the number together with the arrays of a step.
-_MEASURED_ARRAY_COUNT, _ARRAY_COUNT = 5, 9
+_MEASURED_ARRAY_COUNT, _ARRAY_COUNT = 5, 11
 
 
 def aperture_nodes(aperture_time_s: float) -> Floats:
@@ -549,9 +549,11 @@ class ExactRanges:
 
     @cached_property
     def hidden_weights(self) -> Floats:
-        """Parts of the hidden phase per metre at each node, whose squares add up, (4, nodes, n). [rad/m]
+        """Four parts of the hidden phase, one for each order 0 to 3, per metre of range error at each node. [rad/m]
 
-        By orders 0 to 3. The rest beyond order 3 counts only with the small b², or in full where the aperture turns.
+        The array is (4, nodes, n). The square of the hidden phase is the sum of the squares of the parts. The rest of
+        the range error beyond order 3 has no part here. Its weight in the hidden phase is only the small b², except
+        in cases in which a line of sight turns far.
         """
         of_orders = np.array([self.band, (1 + self.band) / 3, self.band / 5 / 1.5**2, self.band / 7 / 2.5**2])
         of_orders[3] += self.is_turned / (7 * 2.5**2)
@@ -655,11 +657,11 @@ class ExactRanges:
         remaining = lanes.clock(size) + (true_ranges - distances).sum(axis=0)
         change = lanes.clock(1.0) - course * along.sum(axis=0)
         if self.has_direct_path:
-            *between, baseline = _take_cases([*self._between, self.baselines], lanes.case)
-            vector, way = np.array(np.broadcast_arrays(*between)) + shifts[0] - shifts[1], ways[0] - ways[1]
-            apart = norm(tuple(vector))
+            (baseline,) = _take_cases([self.baselines], lanes.case)
+            vector, way = tracks[0] - tracks[1] + shifts[0] - shifts[1], ways[0] - ways[1]
+            apart = np.sqrt((vector * vector).sum(axis=0))
             remaining += apart - baseline
-            change += np.where(apart > 0, course * dot(tuple(vector), tuple(way)) / apart, 0.0)
+            change += np.where(apart > 0, course * (vector * way).sum(axis=0) / apart, 0.0)
         (weights,) = _take_cases([self.product_weights], lanes.case)
         seen = np.array((remaining, *looks.sum(axis=0)))
         view = _GroundView(seen, looks.swapaxes(0, 1), distances, self.sampling.centred, weights)
@@ -729,7 +731,8 @@ class _PointSearch:
     """Newton's method for the points of lanes, by the range errors that measured paths leave.
 
     `lane` are the indices of the lanes that have not settled, `of` their cases, and `point` their points so far,
-    east and north. [m] A lane that has settled keeps its view before the last step, and this step.
+    east and north. [m] `settled` holds the lanes that settled in each step: indices, what was seen before the step,
+    the determinant of H there, the step, and the points after it.
     """
 
     def __init__(
@@ -738,10 +741,7 @@ class _PointSearch:
         self.exact, self.of, self.point, self.clock, self.measured = exact, of, point, clock, measured
         self.case, self.lane = of, np.arange(of.size)
         self.room = room[_MEASURED_ARRAY_COUNT:, ..., : of.size]
-        self.is_settled = np.zeros(of.size, dtype=bool)
-        self.last_view = np.empty((3, exact.fit.shape[1], of.size))
-        self.last_point, self.last_step = np.empty((2, 2, of.size))
-        self.last_determinant = np.empty(of.size)
+        self.settled: list[list[Any]] = []
         self._set_cases()
 
     def run(self) -> None:
@@ -772,8 +772,9 @@ class _PointSearch:
         slope = slope[:2]
         for _ in range(POINT_SETTINGS.max_descent_steps):
             view = self._view()
-            falls = view.variance <= least
-            least = np.minimum(least, view.variance)
+            variance = view.variance
+            falls = variance <= least
+            least = np.minimum(least, variance)
             damping = damping * np.where(falls, 1 / POINT_SETTINGS.damping_ratio, POINT_SETTINGS.damping_ratio)
             best_point = np.where(falls, self.point, best_point)
             xx, xy, yy = bends = np.where(falls, view.bends, bends)
@@ -796,28 +797,25 @@ class _PointSearch:
         The range error is what was left before the last step, plus the change by the step. A phase below the rounding
         counts as 0.
         """
-        exact, lanes = self.exact, np.flatnonzero(self.is_settled)
-        if not lanes.size:
+        if not self.settled:
             return
-        view, step = self.last_view.take(lanes, axis=-1), self.last_step[:, lanes]
-        k, band, rounding = _take_cases([exact.k, exact.band, exact.rounding], self.case[lanes])
-        determinant = self.last_determinant[lanes]
-        turn = image_plane.turn(
-            determinant,
-            image_plane.orientation(view[1:], exact.fit, band, determinant),
-            exact.matrix,
-            self.case[lanes],
-        )
-        remaining = view[0] + view[1] * step[0] + view[2] * step[1]
+        exact = self.exact
+        by_step = zip(*self.settled, strict=True)
+        lanes, seen, determinant, step, point = (np.concatenate(arrays, axis=-1) for arrays in by_step)
+        case = self.case[lanes]
+        k, band, rounding = _take_cases([exact.k, exact.band, exact.rounding], case)
+        orientation = image_plane.orientation(seen[1:], exact.fit, band, determinant)
+        turn = image_plane.turn(determinant, orientation, exact.matrix, case)
+        remaining = seen[0] + seen[1] * step[0] + seen[2] * step[1]
         orders = exact.fit @ remaining
-        is_turned = exact.is_turned if exact.is_turned.size == 1 else exact.is_turned[self.case[lanes]]
+        is_turned = exact.is_turned if exact.is_turned.size == 1 else exact.is_turned[case]
         hidden, beyond_cubic = _unresolved(orders, exact.mean_squares(remaining, orders), k, band, is_turned)
         phases = np.array((k * orders[2], k * orders[3], hidden, beyond_cubic))
         phases = np.where(np.abs(phases) > rounding, phases, 0.0)
         is_ahead = turn > -POINT_SETTINGS.folded_fraction
         lanes = lanes[is_ahead]
         points.is_settled[lanes] = True
-        for kept, values in zip(points[1:], (*self.last_point[:, self.is_settled], *phases, turn), strict=True):
+        for kept, values in zip(points[1:], (*point, *phases, turn), strict=True):
             kept[lanes] = values[is_ahead]
 
     def _view(self) -> "_GroundView":
@@ -847,20 +845,17 @@ class _PointSearch:
 
     def _go_on(self, going: Indices) -> None:
         """Go on with some of the lanes."""
-        self.lane, self.of, self.point = self.lane[going], self.of[going], self.point[:, going]
-        (self.clock,), self.measured = _take([self.clock], going), self.measured.take(going, axis=-1)
+        self.lane, self.of = self.lane[going], self.of[going]
+        self.point, self.clock, self.measured = _take([self.point, self.clock, self.measured], going)
         self.room = self.room[..., : going.size]
         if self.exact.k.size > 1:
             self._set_cases()
 
     def _keep(self, done: Indices, view: "_GroundView", step: Floats) -> None:
-        """Keep the lanes that have settled."""
+        """Mark the lanes `lane[done]` as settled, and store their view, point, step and determinant."""
         if done.size:
-            lanes = self.lane[done]
-            self.is_settled[lanes] = True
-            self.last_view[..., lanes] = view.seen.take(done, axis=-1)
-            self.last_point[:, lanes], self.last_step[:, lanes] = self.point[:, done], step[:, done]
-            self.last_determinant[lanes] = view.determinant[done]
+            arrays = [self.lane, view.seen, view.determinant, step, self.point]
+            self.settled.append(arrays if done.size == self.lane.size else _take(arrays, done))
 
 
 class _GroundView:
@@ -876,8 +871,6 @@ class _GroundView:
         Ranges of both platforms. [m]
     nearest : (lanes,)
         The smallest range. [m]
-    variance : (lanes,)
-        V. [m²]
     slope : (2, lanes)
         Half the slope of V, east and north. [m]
     matrix : (2, 2, lanes)
@@ -889,12 +882,17 @@ class _GroundView:
     def __init__(self, seen: Floats, looks: Floats, distances: Floats, centred: Floats, weights: Floats) -> None:
         self.seen, self.looks, self.distances, self._centred = seen, looks, distances, centred
         self.nearest = distances.min(axis=(0, 1))
-        parts = centred @ seen
-        self._weighted = weights * parts
-        products = np.einsum("anc,bnc->abc", self._weighted, parts)
-        self.variance, self.slope, self.matrix = products[0, 0], products[0, 1:], products[1:, 1:]
+        self._parts = centred @ seen
+        self._weighted = weights * self._parts
+        products = np.einsum("anc,bnc->abc", self._weighted[1:], self._parts)
+        self.slope, self.matrix = products[:, 0], products[:, 1:]
         (xx, xy), (_, yy) = self.matrix
         self.determinant = xx * yy - xy * xy
+
+    @property
+    def variance(self) -> Floats:
+        """V at the points, (lanes,). [m²]"""
+        return np.asarray(np.einsum("nc,nc->c", self._weighted[0], self._parts[0]))
 
     @cached_property
     def node_weights(self) -> Floats:
@@ -951,9 +949,9 @@ def _grown(measured: Floats, point: Floats, room: Floats) -> tuple[Floats, Float
     and the ranges, (2, nodes, lanes). [m]
     """
     (p, true_range, squared_range), over_ground, point = measured[2:], measured[:2], point[:, None, None]
-    looks, grown, distances = room[:2], room[2], room[3]
+    looks, both, grown, distances = room[:2], room[2:4], room[4], room[5]
     np.subtract(over_ground, point, out=looks)
-    both = over_ground + looks
+    np.add(over_ground, looks, out=both)
     both *= point
     np.add(both[0], both[1], out=grown)
     np.subtract(squared_range, grown, out=distances)

@@ -1,9 +1,10 @@
 """Paths of the image point as errors grow.
 
-A path starts at the scene centre, without an error. It ends where half a cycle is hidden and the gradients of V span
-less than a fifth of the area that they span at the centre: no ground point has the range history of a larger error.
-Near a fold the gradients are almost parallel. Where nothing is hidden there, the path goes on. Where the peak that is
-followed fades into a wider one, the path goes on from the wider peak.
+A path is the position of the image point as a function of the size of an error. It starts at the scene centre, at
+size 0. It ends where the hidden phase exceeds π and the gradients of V (see `exact_ranges`) span less than a fifth of
+the area that they span at the centre: no ground point has the range history of a larger error. The gradients are
+almost parallel near a fold. If the hidden phase does not exceed π at a fold, the path continues. If the peak on the
+path fades into a wider peak, the path continues from the wider peak.
 
 All lanes take each step together. A few lanes try several sizes in one step, because arrays of a few lanes cost
 little. `ranges.limit_search` finds the first size at which a path reaches a limit.
@@ -191,7 +192,11 @@ class PointPaths:
         self._insert(lane[is_kept], point[:, is_kept])
 
     def _sizes_of_step(self, lane: Indices, size: Floats) -> tuple[Indices, Indices, Floats, Floats]:
-        """Lanes, indices of the known points before, sizes of the step, and distances to a fold, by lane and size."""
+        """Choose the error sizes that the next step of each lane tries.
+
+        Returns, for each size to try, the lane, the index of the last known point at a smaller size, the size, and
+        the increase in size from that point to a fold, (tries,) each, in the order of lanes and sizes.
+        """
         index = (self.known_points[SIZE, lane] < size[:, None]).sum(axis=1) - 1
         last = self._point(lane, index)
         to_fold = self._distance_to_fold(index, lane, last)

@@ -94,17 +94,18 @@ class Drawing(NamedTuple):
     chunk: int
 
     def pieces(self) -> Iterator[DrawsPiece]:
-        """Cut the draws into pieces, always the same ones; none where they are held to nothing."""
+        """Divide the draws into pieces, always in the same way; yield no pieces if no requirement is judged."""
         size = min(EXACT_PIECE_DRAWS, self.chunk) if self.is_exact else self.chunk
         for start in range(0, self.draws if self.judged else 0, size):
             yield DrawsPiece(start, min(start + size, self.draws))
 
 
 class Tally(NamedTuple):
-    """Counts and sums of squares of one piece.
+    """Counts of draws, and sums of squared errors, over one piece of the draws.
 
-    For each requirement the draws in which it held, those that have an image, and the sum of squares over these; the
-    draws in which all held.
+    `holds` counts the draws that meet each requirement, and `all_hold` counts the draws that meet all requirements.
+    `imaged` counts the draws that have an image, and `squares` is the sum of the squared errors over these draws, for
+    each requirement.
     """
 
     holds: tuple[int, ...]
@@ -332,7 +333,10 @@ class Drawer:
         return Tally(tuple(holds), tuple(imaged), tuple(squares), all_hold)
 
     def _go_to(self, start: int) -> None:
-        """Have streams of the chunk at a draw."""
+        """Move the random streams to the draw `start`.
+
+        The streams begin again at the start of the draw's chunk if they are in another chunk, or past the draw.
+        """
         chunk = start // self._drawing.chunk
         if chunk != self._chunk or start < self._at:
             self._chunk, self._at = chunk, chunk * self._drawing.chunk

@@ -186,7 +186,10 @@ class _Predictions:
         self.variables = variables
 
     def combined(self, judged: HeldSum, rule: str) -> float | None:
-        """Size that a rule of `allocation.combine` holds to the limit, coverage factor included; None: no image."""
+        """Combined size of the errors that a requirement counts, by a rule of `allocation.combine`, in its unit.
+
+        The size includes the coverage factor. None if the errors leave no image.
+        """
         members = [phase for phase in self.together.phases if phase.owner in judged.owners]
         if judged.columns == (0,):
             size = self.together.judged(members, rule)

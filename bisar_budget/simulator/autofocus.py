@@ -244,9 +244,10 @@ def autofocus_in_scene_axes(
 
 
 def aperture_band(spectrum: Complexes) -> Indices:
-    """Indices of the aperture's band in a spectrum along the second axis, in ascending frequency.
+    """Indices of the frequencies that the aperture fills in a spectrum (lines, frequencies), in ascending frequency.
 
-    The band may wrap around. Without an empty gap the whole sampling band is the aperture, centred on zero.
+    The spectrum is in the order of the FFT, and the filled band may wrap around its ends. If no empty gap is wide
+    enough, the aperture fills the whole spectrum, and the indices begin at the most negative frequency.
     """
     count = spectrum.shape[1]
     strength = np.sqrt(np.mean(np.abs(spectrum) ** 2, axis=0))

@@ -61,15 +61,15 @@ _PULSES_PER_CELL, _LARGE_PATCH_CELLS = 4, 128  # a response repeats after as man
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RangeLines:
-    """Ground pixels along lines of equal range and of equal Doppler, in which a response is a product.
+    """Ground pixels along lines of equal range and of equal Doppler; a response is the product of its two cuts.
 
-    A straight grid leaves a response where a platform is near: its ridge follows an ellipse, and its sidelobes in
-    range follow lines of equal Doppler. Here the pixels of a line have one range sum at the aperture midpoint, those
-    of a column one change of the range sum over the aperture. Lines are followed from the middle outwards, so a patch
-    may bend around a platform.
+    A straight grid does not follow a response where a platform is near: the ridge of the response follows an ellipse,
+    and the range sidelobes follow lines of equal Doppler. Here the pixels of a line have the same range sum at the
+    aperture midpoint, and the pixels of a column have the same change of the range sum over the aperture. Lines are
+    followed from the middle outwards, so a patch may bend around a platform.
 
-    Where the line of sight turns so far that Doppler turns back, as on a full circle, no range sums of three moments
-    locate a point: there pixels lie along straight lines, and sample the full wave-number support.
+    If the line of sight turns so far that Doppler turns back, as on a full circle, the range sums at three moments do
+    not determine a point. The pixels then lie along straight lines, and sample the full wave-number support.
 
     `transmitter` and `receiver` are the measured positions at an odd number of times, evenly over the aperture,
     (times, 3). [m]
@@ -254,10 +254,11 @@ class RangeLines:
 
 
 class Chip(NamedTuple):
-    """Image of a patch, (nx, ny), and its pixels, (nx, ny, 3) [m], `spacing` apart at the middle [m].
+    """Image of a patch, (nx, ny), and the ground points of its pixels, (nx, ny, 3). [m]
 
-    Lines, along y′, are lines of equal range, columns those of equal Doppler, by the measured paths. The phase of the
-    range to each pixel at the midpoint is taken out, so that the spectrum is that of the aperture, about zero.
+    `spacing` is the distance of neighbouring pixels in the middle of the patch, along x′ and y′ [m]. Lines of pixels
+    along y′ have equal range, and columns have equal Doppler, both by the measured paths. The phase of the
+    range to each pixel at the midpoint is removed, so the spectrum of the image is that of the aperture, about zero.
     """
 
     image: Complexes
@@ -305,9 +306,10 @@ class PointCollection:
         return taylor_window(count) if self.is_tapered else np.ones(count)
 
     def flight(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> Flight:
-        """Fly both platforms with errors. If the direct path is the clock, path errors are part of the clock error.
+        """Fly both platforms with errors, and return the flown paths and the clock errors at the slow times.
 
-        Wideband vibration needs a generator.
+        If the receiver takes the direct path as its clock, the errors of both paths also cause a clock error. Errors
+        with wideband vibration need the generator `rng`.
         """
         metre_motions = direct_path_ways(self.geometry, slow_time) if self.has_direct_path else (None, None)
         transmitter = path(self.geometry.transmitter, slow_time, errors.transmitter, rng, metre_motions[0])

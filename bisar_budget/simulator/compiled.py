@@ -520,7 +520,7 @@ def _leg(position, box, centres):
 
 @_compiled
 def _bend(distance, size):
-    """Largest excess of a distance over its tangent, within `size` of the point of contact."""
+    """Upper bound of the error when a distance is approximated linearly around a point, up to `size` from it. [m]"""
     return min(size, size * size / (2.0 * (distance - size))) if distance > size else 2.0 * size
 
 

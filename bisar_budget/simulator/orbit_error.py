@@ -1,7 +1,7 @@
-"""The error of a platform in free fall as flown: the orbit of its measured state less the orbit of its true state.
+"""Path error of a platform in free fall: the orbit from its measured state minus the orbit from its true state.
 
-Both orbits are propagated, each by the whole law of gravity. The effects of an error use the linearised dynamics of
-`paths.free_fall`; the simulator judges them, so it must not share them.
+Both orbits follow the full law of gravity. The budget uses the linearised dynamics of `paths.free_fall` instead. The
+simulator checks the budget, so it does not use these dynamics.
 """
 
 import math

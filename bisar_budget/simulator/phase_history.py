@@ -142,7 +142,10 @@ class Errors(NamedTuple):
         return self._replace(transmitter=self.transmitter.still(), receiver=self.receiver.still())
 
     def slow(self) -> "Errors":
-        """The same errors with the smooth parts of all courses: a few nodes would take noise for a phase."""
+        """The same errors, but each error course is replaced by its smooth part.
+
+        Noise would distort a phase that is computed from a few nodes only.
+        """
         return self._replace(
             transmitter=self.transmitter.slow(),
             receiver=self.receiver.slow(),

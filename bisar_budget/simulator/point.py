@@ -413,10 +413,11 @@ def declared_errors(mission: Mission) -> Errors:
 
 
 def _turned(vectors: Sequence[Sequence[float] | None], state: PlatformState, frame: str, factor: float) -> PathError:
-    """Turn position, velocity and acceleration errors from a frame's axes to the scene's axes, signs kept.
+    """Turn position, velocity and acceleration errors from the axes of a frame to the axes of the scene.
 
-    The velocity of a platform in free fall is against the stars in `ric`, and the rate of the Earth-fixed vector in
-    all other frames.
+    The errors keep their signs and are multiplied by `factor`. For a platform in free fall, a velocity error in the
+    frame `ric` is relative to the stars and is converted to the rate of the position error in the scene's axes, which
+    turn with the Earth. In all further frames, a velocity error is this rate already.
     """
     axes, turned = state.frame(frame), []
     for vector in vectors:
@@ -577,9 +578,10 @@ def pulses_for(mission: Mission, cells: int) -> int:
 
 
 def _measured(cut: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:
-    """Measure a cross-range cut through a peak, with the peak moved to the middle.
+    """Measure the impulse response of a cross-range cut, with the peak rolled to the middle of the cut.
 
-    A smear over most of the patch has its peak at one end and would wrap around; the cut is then doubled with zeros.
+    A smear over most of the patch peaks near one end of the cut, so a roll wraps the smear around. If the measurement
+    fails, zeros double the length of the cut, and the cut is measured again.
     """
     count, column = cut.size, int(np.argmax(np.abs(cut)))
     try:

@@ -515,7 +515,7 @@ def _cosines_and_sines(frequency: Floats, times: Floats) -> tuple[Floats, Floats
 
 
 def _phasors(turns: float, count: int) -> Complexes:
-    """Phasors of the tones 1 … `count` at the time at which tone 1 has turned `turns` times."""
+    """Phasors exp(2πi·n·turns) of the tones n = 1 … `count`, (count,); tone 1 has made `turns` cycles."""
     side = math.isqrt(count) + 1
     coarse = np.exp(2j * math.pi * turns * np.arange(side + 1) * side)
     phasors: Complexes = np.multiply.outer(coarse, np.exp(2j * math.pi * turns * np.arange(side))).ravel()

@@ -144,7 +144,7 @@ def amplitude_share(own: Expr, other: Expr) -> Expr:
 
 
 def motion_of_phase(phase: Expr) -> Expr:
-    """Motion along the line of sight with a given phase, one way. [m]"""
+    """Motion of one platform along its line of sight that causes a given phase on the one-way path. [m]"""
     motion = positive("A")
     (solution,) = solve(Eq(published.one_way_phase(motion), phase), motion)
     return solution

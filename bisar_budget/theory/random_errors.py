@@ -255,9 +255,10 @@ def tone_slow() -> tuple[Expr, ...]:
 
 
 def tone_fast() -> tuple[Expr, ...]:
-    """`Moments` and `PlaceMoments` of a fast tone, sine and cosine averaged, in `inverse` powers of the angle.
+    """Mean squares and products of the parts of a fast tone, in the fields of `Moments` and `PlaceMoments`.
 
-    Order n of a tone turns by n quarters of a cycle, so orders n and n + 2 have opposite signs.
+    Products of sine and cosine are averaged over a cycle. The results are in the even inverse powers `inverse` of the
+    angle. Order n of a tone turns by n quarters of a cycle, so orders n and n + 2 have opposite signs.
     """
     quadratic, cubic, left, constant, linear = tone_in_terms()
     mean = {sine**2: Rational(1, 2), cosine**2: Rational(1, 2), sine * cosine: Integer(0)}

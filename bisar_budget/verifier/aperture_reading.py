@@ -201,9 +201,11 @@ def _distance(positions: Floats, points: Floats, squares: Floats) -> Floats:
 def _fit_to_pulses(
     pulse_pixels: _Pixels, slow_time: Floats, images: Sequence[Complexes], columns: int
 ) -> tuple[Floats, float]:
-    """Polynomial through the phases of single pulses, and the share of the aperture that they cover.
+    """Fit a polynomial to the phases of single pulses, and measure the share of the aperture that these pulses cover.
 
-    The share is 0 if the middle of the aperture is missing. `images` are with and without error, of the same pixels.
+    The polynomial has Legendre coefficients over the aperture. [rad] The share is 0 if the pulses in the middle of
+    the aperture are missing, or too few pulses remain. `images` are the image with errors and the error-free image,
+    at the same pixels, in lines of `columns` pixels.
     """
     scaled_time = 2 * slow_time / pulse_pixels.collection.aperture_time
     # A taper over the ends of a line, each half as long as a response without smear.

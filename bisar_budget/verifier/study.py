@@ -100,7 +100,7 @@ class Study:
 
     @property
     def models(self) -> tuple[Model, ...]:
-        """Models that gate; under `strictest` both."""
+        """Models that decide the verdicts: one model, or both models under `strictest`."""
         return tuple(getattr(self.analysis, name) for name in self.analysis.gates)
 
     @property
@@ -114,7 +114,7 @@ class Study:
 
     @cached_property
     def unfocused_models(self) -> tuple[Model, ...]:
-        """Models that gate, of the mission without autofocus: their phases do not include its gain."""
+        """The gating models for the same mission without autofocus, so that no phase includes the autofocus gain."""
         if self.allocation.autofocus_gain == 1:
             return self.models
         unfocused = self.mission._replace(autofocus=self.mission.autofocus._replace(n_pull=None))

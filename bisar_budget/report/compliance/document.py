@@ -38,7 +38,7 @@ class Badge:
 
     @property
     def words(self) -> str:
-        """Word of the status on a page."""
+        """The word that a page shows for the status or the verdict."""
         return STATUS[self.status].words if self.status in STATUS else self.status
 
 

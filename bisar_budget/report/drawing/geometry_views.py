@@ -445,7 +445,7 @@ def _range(view: _View, platform: _Platform) -> str:
 
 
 def _directions(canvas: svg.Canvas, panel: _Panel, view: _View) -> Iterator[svg.DrawnLabel]:
-    """Draw φ_b of (11), and perpendicular to it the line along which errors smear, (31)."""
+    """Draw the look direction φ_b, equation (11), and the line across it along which errors smear, equation (31)."""
     scene, look = panel.pixel(_SCENE_CENTRE), float(view.findings.geometry.look_azimuth)
     tip = _turned(scene, _LOOK_PX, look)
     ends = [_turned(scene, sign * _SMEAR_PX, look + math.pi / 2) for sign in (-1, 1)]

@@ -497,7 +497,7 @@ class Residual:
         return [f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, values, strict=True)]
 
     def rest_steps(self) -> Iterator[Step]:
-        """Steps of the range error beyond the cubic, and its rms phase."""
+        """Steps that list the range error beyond the cubic at the nodes, and compute the rms of its phase."""
         yield step("Beyond P₃ there", *self.listed(self.beyond))
         terms = self._products(self.beyond)
         wavelength = number(self.radar.wavelength)
@@ -659,7 +659,7 @@ def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
 
 
 def no_limit(row: Row) -> Step:
-    """The step of a row without a limit."""
+    """Step of the explanation that says that a row has no limit, and why."""
     return step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
 
 

@@ -416,7 +416,7 @@ def _power_of_f(exponent: float) -> str:
 
 
 def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization) -> Iterator[Step]:
-    """Step of the drift since a clock was set: orders 0 and 1 of its range error at the centre frequency."""
+    """Step with sigmas and correlation of orders 0 and 1 of the range error by a clock's drift since its setting."""
     T, age, averaging = (
         np.array([value or 0.0]) for value in (mission.collection.aperture_time, sync.age, sync.averaging)
     )

@@ -466,7 +466,7 @@ def _latex_filled(formula: str, values: Mapping[str, float]) -> str:
 
 
 def _latex_symbols(values: Mapping[str, float]) -> re.Pattern[str]:
-    """Pattern of complete symbols, which are no letters of a LaTeX command."""
+    """Pattern that matches the symbols in LaTeX text, but not as parts of longer names or of commands."""
     longest_first = "|".join(re.escape(symbol) for symbol in sorted(values, key=len, reverse=True))
     return re.compile(rf"(?<![A-Za-z\\])(?:{longest_first})(?![A-Za-z])")
 

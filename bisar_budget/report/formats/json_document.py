@@ -84,7 +84,7 @@ def document_text(form: str, content: Mapping[str, object]) -> str:
 
 
 def outside_item(mission: "AboutMission") -> dict[str, object]:
-    """Changes and overrides from outside the mission file, the same in every contract."""
+    """JSON item of changes and overrides from outside the mission file; all JSON documents have the same item."""
     return {
         "set": [change._asdict() for change in mission.changes],
         "overrides": [override._asdict() for override in mission.overrides],

@@ -221,7 +221,7 @@ def _remarks(sheet: SpecificationSheet) -> Iterator[str]:
 
 
 def _side(figure: OfferedFigure) -> str:
-    """Side of the specification on which an offered figure lies, or the remark of a figure without a side."""
+    """Text that says whether an offered figure is inside its specification, or why it cannot be compared."""
     if figure.is_inside is None:
         return figure.remark
     return "inside" if figure.is_inside else "OUTSIDE"

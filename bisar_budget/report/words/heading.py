@@ -1,4 +1,4 @@
-"""Words above findings: mission, geometry, budget, model, paths, and overrides from outside the file."""
+"""Heading above findings: mission, geometry, budget, model, paths, and settings from outside the mission file."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -46,7 +46,7 @@ def requirement_id(requirement: JudgedRequirement) -> str:
 
 
 def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
-    """Write the table of requirements, in the order of the contract."""
+    """Yield the lines of the table of requirements, in the order in which the JSON document lists them."""
     for requirement in mission.requirements:
         is_open = requirement.is_unjudged
         remark = ", ".join([*use_remarks(requirement), *(waiver.words for waiver in requirement.waivers)])
