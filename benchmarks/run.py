@@ -2,7 +2,8 @@
 
     python benchmarks/run.py            # all
     python benchmarks/run.py cold       # one of: cold, sensors, paths, gate, formats, report, evaluators, montecarlo
-    python benchmarks/run.py --against ../before    # cold and gate of another checkout and of this one, in turn
+    python benchmarks/run.py --against ../before    # cold, gate and examples of another checkout and of this one
+    python benchmarks/run.py examples --against ../before    # each example in a running process, in turn
 
 Absolute times on a shared machine mean little; each figure is measured side by side with its yardstick,
 A B A B …, and the ratio of the medians is what counts. Accuracy stands beside each figure.
@@ -18,7 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -185,6 +186,47 @@ def gate(runs: int) -> None:
                 )
 
 
+CHECKS = """import sys, time
+from click.testing import CliRunner
+from bisar_budget.cli import cli
+for line in sys.stdin:
+    start = time.process_time()
+    result = CliRunner().invoke(cli, ["check", line.strip()], prog_name="bisar-budget")
+    seconds = time.process_time() - start
+    assert result.exit_code in (0, 1), result.output
+    print(seconds, flush=True)"""
+
+
+def running(checkout: Path) -> Callable[[Path], float]:
+    """Start a process of a checkout; the result checks a mission there and returns the seconds of CPU."""
+    pipe = subprocess.PIPE
+    worker = subprocess.Popen((sys.executable, "-c", CHECKS), stdin=pipe, stdout=pipe, cwd=checkout, text=True)
+
+    def check(mission: Path) -> float:
+        assert worker.stdin is not None
+        assert worker.stdout is not None
+        print(mission, file=worker.stdin, flush=True)
+        return float(worker.stdout.readline())
+
+    return check
+
+
+def examples(sides: Mapping[str, Path], runs: int) -> None:
+    """Each example of the other checkout in one running process per side, the sides taking turns."""
+    print("check of each example in a running process, after ÷ before, CPU (geometric mean at most 1.3)")
+    missions = sorted((sides["before"] / "specs" / "missions").glob("*.yaml"))
+    checks = [running(checkout) for checkout in sides.values()]
+    ratios, of_runs = [], [0.0] * runs
+    for mission in missions:
+        _, *pairs = [[check(mission) for check in checks] for _ in range(runs + 1)]  # one round of warm-up
+        before, after = (statistics.median(times) for times in zip(*pairs, strict=True))
+        ratios.append(math.log(after / before))
+        of_runs = [sum_ + math.log(b / a) / len(missions) for sum_, (a, b) in zip(of_runs, pairs, strict=True)]
+        print(f"  {mission.stem:36} {after * 1e3:6.1f} ms ÷ {before * 1e3:6.1f} ms = {after / before:.2f}")
+    mean, least, most = map(math.exp, (statistics.fmean(ratios), min(of_runs), max(of_runs)))
+    print(f"  geometric mean {mean:.2f}, of single runs {least:.2f} to {most:.2f}")
+
+
 def against(before: Path, task: str, runs: int | None) -> None:
     """Another checkout and this one side by side, with one interpreter and on the other's mission files."""
     sides = {"before": before.resolve(), "after": ROOT}
@@ -225,6 +267,8 @@ def against(before: Path, task: str, runs: int | None) -> None:
             with tempfile.TemporaryDirectory() as folder:
                 files = a_thousand(folder, sources)
                 compare(runs or TASKS["gate"][1], process(sys.executable, "-c", PARSE, *files), *files)
+    if task in ("examples", "all"):
+        examples(sides, runs or 21)
 
 
 def formats(runs: int) -> None:
@@ -410,14 +454,16 @@ TASKS = {
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("task", nargs="?", choices=[*TASKS, "all"], default="all")
+    parser.add_argument("task", nargs="?", choices=[*TASKS, "examples", "all"], default="all")
     parser.add_argument("--runs", type=int, help="rounds, after one of warm-up")
     parser.add_argument(
-        "--against", type=Path, metavar="PATH", help="another checkout: cold and gate of both, in turn"
+        "--against", type=Path, metavar="PATH", help="another checkout: cold, gate and examples of both, in turn"
     )
     chosen = parser.parse_args()
-    if chosen.against is not None and chosen.task not in ("cold", "gate", "all"):
-        parser.error(f"--against measures cold and gate, not {chosen.task}")
+    if chosen.against is not None and chosen.task not in ("cold", "gate", "examples", "all"):
+        parser.error(f"--against measures cold, gate and examples, not {chosen.task}")
+    if chosen.against is None and chosen.task == "examples":
+        parser.error("examples needs --against")
     with tempfile.TemporaryDirectory() as folder:
         ENVIRONMENT["PYTHONPYCACHEPREFIX"] = folder
         if chosen.against is not None:
