@@ -462,7 +462,7 @@ def _headed(tree: JsonObject, header: str, line_number: int, file: str) -> tuple
         try:
             key = _column(tree, cell)
             if varied.setdefault(tuple(parts_of(key.key)), key) is not key:
-                raise InvalidValueError("stands twice", "accepted: each key once")
+                raise InvalidValueError("is given twice", "accepted: each key once")
         except InvalidValueError as error:
             problem = error.problem
             faults.append(

@@ -499,7 +499,7 @@ class Weights(Reader[dict[str, float]]):
             names = tuple([read_part(Text(), name, (*path, index), report) for index, name in enumerate(value)])
             repeated = [index for index, name in enumerate(names) if name in names[:index]]
             for index in repeated:
-                report((*path, index), Problem("stands twice", "accepted: each key once"))
+                report((*path, index), Problem("is given twice", "accepted: each key once"))
             return dict.fromkeys(names, 1.0) if are_valid(names) and not repeated else INVALID
         weights = {key: read_part(_WEIGHT, weight, (*path, key), report) for key, weight in value.items()}
         return weights if has_valid_values(weights) else INVALID

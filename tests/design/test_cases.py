@@ -249,7 +249,7 @@ class TestTables:
             (f"{TIME} [s]; {AZIMUTH} [deg]\n1;1\n", "Cells are separated by commas"),
             ("collection.aperture_tim [s]\n1\n", "Did you mean 'collection.aperture_time'?"),
             ("name\n1\n", "c.csv:1:1: name: is no number with a unit"),
-            (f"{TIME} [s],{TIME} [ms]\n1,2\n", f"c.csv:1:30: {TIME} [ms]: stands twice"),
+            (f"{TIME} [s],{TIME} [ms]\n1,2\n", f"c.csv:1:30: {TIME} [ms]: is given twice"),
             (f"{TIME} [s]\n1\nx\n", f"c.csv:3:1: {TIME}: is no number (got x); accepted: a number of s"),
             (f"{TIME} [s],radar.bandwidth [Hz]\n1, 2 kHz\n", "c.csv:2:4: radar.bandwidth: is no number (got 2 kHz)"),
             (f"{TIME} [s]\n1_0\n", "is no number (got 1_0)"),

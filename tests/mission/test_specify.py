@@ -28,7 +28,7 @@ def test_keys_have_their_weights_and_those_of_a_list_one() -> None:
         ({KEY: 0}, "must be greater than 0"),
         ({KEY: -1}, "must be greater than 0"),
         ({KEY: "much"}, "must be a number (got much)"),
-        ([KEY, KEY], "stands twice"),
+        ([KEY, KEY], "is given twice"),
         ("velocity", "must be keys with their weights, or a list of keys"),
         ([f"{KEY}s"], f"names no key of a mission file; accepted: a key of an error with one number, such as {KEY}"),
         (["velocity"], "names no key of a mission file"),
