@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
@@ -60,7 +61,7 @@ class Error(NamedTuple):
     terms of t̃. `declared` carries sign and coverage factor. `cap` is the size at which it takes a platform farther
     than a tenth of its slant range within the aperture, of a clock that at which a range sum has no ground point any
     more: it is no less than the distance of the platforms. `is_stated` tells the axes of the file from those of the
-    scene, along which the same error is shown again.
+    scene, along which the same error is shown again. A platform in free fall flies its `paths` as another orbit.
     """
 
     id: str
@@ -70,6 +71,7 @@ class Error(NamedTuple):
     declared: float | None
     cap: float
     is_stated: bool = True
+    is_of_a_path: bool = True  # not the height of a scene, which changes no orbit
 
 
 def errors_of(mission: Mission) -> Iterator[Error]:
@@ -94,6 +96,8 @@ def errors_of(mission: Mission) -> Iterator[Error]:
                 continue
             for letter, direction, size in zip(FRAME_AXES[error.frame], axes, sizes, strict=True):
                 paths = _unit_path((index,), order, direction)
+                if kind == "position" and error.frame == "ric" and state.fall is not None:
+                    paths[index, 1] = -np.cross(_earth(mission)[1], direction)  # at rest against the stars
                 yield Error(f"{name}.{kind}.{letter}", name, paths, np.zeros(4), float(size), cap)
     near, still = FAR * min(ranges), np.zeros((2, 3, 3))
     for order, term in enumerate(CLOCK):
@@ -113,7 +117,8 @@ def errors_of(mission: Mission) -> Iterator[Error]:
     if mission.scene.height_error is not None:
         # A scene that is higher than the processor takes it for: both platforms are measured too high above it.
         paths = _unit_path(both, 0, np.eye(3)[2])
-        yield Error("mission.terrain", "mission", paths, np.zeros(4), mission.scene.height_error, near)
+        height = mission.scene.height_error
+        yield Error("mission.terrain", "mission", paths, np.zeros(4), height, near, is_of_a_path=False)
 
 
 def _is_heard(mission: Mission) -> bool:
@@ -122,6 +127,43 @@ def _is_heard(mission: Mission) -> bool:
 
 def _states(mission: Mission) -> tuple[PlatformState, PlatformState]:
     return mission.geometry.transmitter, mission.geometry.receiver
+
+
+def _earth(mission: Mission) -> tuple[Array, Array]:
+    """The Earth's centre [m] and rotation [rad/s] in the scene's axes."""
+    axes = mission.scene.axes
+    if axes is None:
+        return np.array((0.0, 0.0, -6.371e6)), np.zeros(3)
+    return np.array(axes.place((0.0, 0.0, 0.0))), np.array(axes.turned((0.0, 0.0, 7.292115e-5)))
+
+
+def _unit_motions(mission: Mission, state: PlatformState, tau: Array) -> Array:
+    """Motion by unit errors at mid-aperture, (3 orders, 3 axes, n, 3): a polynomial, or a disturbed orbit. [m]
+
+    δr̈ = Gδr − ω×(ω×δr) − 2ω×δṙ + a, G = μ/r³·(3r̂r̂ᵀ − 1), by the Dormand-Prince method.
+    """
+    if state.fall is None:
+        powers = np.array([np.ones_like(tau), tau, tau**2 / 2])
+        straight: Array = np.einsum("on,af->oanf", powers, np.eye(3))
+        return straight
+    centre, rotation = _earth(mission)
+    turn = np.cross(rotation, np.eye(3)).T  # turn @ v is ω×v
+
+    def rates(time: float, values: Array) -> Array:
+        offset = np.array(state.place(time)) - centre
+        square = offset @ offset
+        gravity = 3.986004418e14 / square**1.5 * (3 * np.outer(offset, offset) / square - np.eye(3))
+        place, velocity, push = values.reshape(3, 3, 9)
+        pull = gravity @ place - turn @ (turn @ place) - 2 * turn @ velocity + push
+        return np.concatenate((velocity, pull, np.zeros((3, 9)))).ravel()
+
+    motions = np.empty((3, 3, len(tau), 3))
+    for is_side in (tau >= 0, tau < 0):
+        times = tau[is_side][np.argsort(np.abs(tau[is_side]))]
+        run = solve_ivp(rates, (0.0, times[-1]), np.eye(9).ravel(), "DOP853", times, rtol=1e-11, atol=1e-9)
+        places = run.y.reshape(3, 3, 3, 3, -1)[0]  # component, order, axis, time
+        motions[:, :, np.flatnonzero(is_side)[np.argsort(np.abs(tau[is_side]))]] = places.transpose(1, 2, 3, 0)
+    return motions
 
 
 def _unit_path(platforms: Sequence[int], order: int, direction: Array) -> Array:
@@ -191,7 +233,11 @@ class Lanes:
             ground = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
             self.true = self.true - ground[:, None, None, :]  # (L, 2, n, 3)
         self.recorded = np.linalg.norm(self.true, axis=-1)
-        self.error = np.einsum("lkof,on->lknf", np.array([e.paths for e in errors]), powers)
+        units = np.array([_unit_motions(mission, state, tau) for state in _states(mission)])
+        straight = np.einsum("on,af->oanf", powers, np.eye(3))
+        self.error = np.array(
+            [np.einsum("koa,koanf->knf", e.paths, units if e.is_of_a_path else 0 * units + straight) for e in errors]
+        )
         self.is_heard = _is_heard(mission)
         self.apart, self.parted = self.true[:, 0] - self.true[:, 1], self.error[:, 0] - self.error[:, 1]
         clock = np.array([e.clock for e in errors])
