@@ -22,6 +22,7 @@ LOCAL_AXES = ("RTN", "TNW")  # of an orbit; other names of CCSDS for the same ax
 _EQUAL_VARIANCE_FRACTION = 1e-6  # difference of equal variances after a turn of axes
 _ROUNDED_EIGENVALUE_FRACTION = 1e-4  # of the largest; a matrix with few digits may have one this far below 0
 _AXES_SYNONYMS = {"RSW": "RTN", "RIC": "RTN", "QSW": "RTN"}
+_ROUNDED_VARIANCE_FRACTION = 1e-12  # of a velocity's variance by the turn of axes
 _AXES_SUFFIXES = ("_INERTIAL", "_ROTATING")
 _VELOCITY_STEP_S = 0.5
 
@@ -202,11 +203,17 @@ def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: t
 
 
 def with_rate(covariance: Floats, rate: Sequence[float] | Floats) -> Floats:
-    """Covariance (6, 6) in axes that turn less by a rate [rad/s]: δv becomes δv + rate × δr."""
+    """Covariance (6, 6) in axes that turn less by a rate [rad/s]: δv becomes δv + rate × δr.
+
+    A velocity of which only rounding is left has no variance.
+    """
     x, y, z = rate
     matrix = np.eye(6)
     matrix[3:, :3] = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
-    return np.asarray(matrix @ covariance @ matrix.T)
+    turned = matrix @ covariance @ matrix.T
+    rounding = _ROUNDED_VARIANCE_FRACTION * np.dot(rate, rate) * np.trace(covariance[:3, :3])
+    is_known = np.diag(turned) > np.array((-1.0, -1.0, -1.0, rounding, rounding, rounding))
+    return np.where(np.logical_and.outer(is_known, is_known), turned, 0.0)
 
 
 def stated_of_orbit(
