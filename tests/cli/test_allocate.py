@@ -171,7 +171,7 @@ class TestOffer:
         assert all(sides.values())
         found = run("allocate", mission, "--compare", offer)
         assert found.exit_code == 0
-        assert "of 7 figures 1 is outside" in found.stdout
+        assert "1 of 7 figures outside" in found.stdout
         assert "OUTSIDE" in found.stdout
 
     def test_an_offer_with_which_the_mission_fails_is_exit_1(self, run, mission, offer) -> None:
@@ -229,7 +229,7 @@ class TestOffer:
     ("arguments", "code", "said"),
     [
         (["--for", "radar.bandwidth"], 2, "is no error that can be specified"),
-        (["--for", KEY, "--for", KEY], 2, "stands twice"),
+        (["--for", KEY, "--for", KEY], 2, "is given twice"),
         (["--for", f"{KEY}s"], 2, f"Did you mean '{KEY}'"),
         (["--reserve", "100"], 2, "--reserve"),
         (["--reserve", "nan"], 2, "--reserve: nan is no part of a limit"),
@@ -271,4 +271,4 @@ class TestReport:
         path, report = tmp_path / "m.yaml", tmp_path / "report.md"
         path.write_text(mission_text(allocation__combine="each", allocation__specify=[KEY]))
         assert run("check", path, "--report", report).exit_code in (0, 1)
-        assert "no specifications: combine: each holds every error alone to its limit" in report.read_text()
+        assert "no specifications: combine: each judges every error alone" in report.read_text()
