@@ -297,12 +297,12 @@ def test_everything_complies(run: Callable) -> None:
     done = run("solve", SECTION_V, "--for", "collection.aperture_time", "--between", "1 s..1.2 s")
     assert done.exit_code == 0
     assert done.stdout.startswith("collection.aperture_time: every value of the range complies\n")
-    assert "Least left   1.2 s: pass, transmitter.acceleration.x uses 47.1 %" in done.stdout
+    assert "Least margin 1.2 s: pass, transmitter.acceleration.x uses 47.1 %" in done.stdout
 
 
 def test_a_number_that_changes_nothing_is_said_to(run: Callable) -> None:
     done = run("solve", SECTION_V, "--for", "radar.bandwidth")
-    assert "No effect    radar.bandwidth changes nothing that decides" in done.stdout
+    assert "No effect    radar.bandwidth does not change the deciding row" in done.stdout
     assert "No effect" not in run("solve", SECTION_V, "--for", "collection.aperture_time").stdout
 
 
