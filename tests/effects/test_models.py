@@ -225,7 +225,7 @@ class TestEach:
         together = math.hypot(*(math.hypot(*r.displacement_m) for r in found.rows if r.displacement_m))
         assert one.declared < 8 < together
         assert one.status == "warn"
-        assert "each error alone" in one.reason
+        assert "each error is judged alone" in one.reason
         assert f"{together:.3g} m" in one.reason
         few = findings(**errors, requirements__location_error="30 m", allocation__combine="each")
         assert row(few, "mission.location_error").status == "pass"

@@ -193,7 +193,7 @@ class TestSetting:
         notes = [
             " ".join(map(str, findings(synchronization=HOLDOVER | more).notes)) for more in ({}, {"time_error": 0})
         ]
-        assert "no synchronization.time_error and synchronization.frequency_error: the clocks are taken" in notes[0]
+        assert "no synchronization.time_error and synchronization.frequency_error: the clocks are assumed" in notes[0]
         assert "no synchronization.frequency_error: the clocks" in notes[1]
 
     def test_declare_asks_for_the_key_that_holdover_has(self) -> None:
