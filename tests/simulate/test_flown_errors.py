@@ -5,6 +5,7 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.simulator.phase_history import path
 from bisar_budget.simulator.point import declared_errors
 from tests.conftest import ROOT, mission_text
 
@@ -47,5 +48,10 @@ def test_a_wrong_height_of_the_scene_is_flown(height: float) -> None:
             mission_text(platforms=platforms, scene={"height_error": height}, allocation__coverage_factor=2)
         )
     )
-    assert flown.transmitter.position == (0.0, 0.0, 2.0 + height)
-    assert flown.receiver.position == (0.0, 0.0, height)
+    assert flown.transmitter.position == (0.0, 0.0, 2.0)
+    assert flown.transmitter.height == flown.receiver.height == height
+    states = Analysis(parse_mission(mission_text(platforms=platforms))).geometry.both
+    times = np.array([-1.0, 0.0, 1.0])
+    for state, error, raised in zip(states, (flown.transmitter, flown.receiver), (2.0 + height, height), strict=True):
+        flight = path(state, times, error)
+        assert flight.measured - flight.actual == pytest.approx(np.outer(np.ones(3), (0.0, 0.0, raised)))

@@ -176,7 +176,7 @@ class TestCheckWithImages:
         assert f"the image shows 0.417 rad{name} at it, the budget is 0.392 rad" in str(judged.notes)
         assert verification.numbers(shown)[3:] == ("0.393", "0.417")
         remarks = " ".join(verification.geometry_remarks([shown]))
-        assert ("least quadratic part 0.030 of 0.417 rad, receiver.velocity.y" in remarks) == bool(name)
+        assert ("smallest quadratic part 0.030 of 0.417 rad, receiver.velocity.y" in remarks) == bool(name)
 
     def test_a_row_whose_sum_gates_fails_by_its_own_image_too(self) -> None:
         """By root-sum-square a row of its own is for information; its limit is what the image speaks of."""
