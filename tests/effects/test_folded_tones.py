@@ -112,7 +112,7 @@ def test_what_is_folded_on_the_mainlobe_is_no_echo() -> None:
 
 def test_the_note_says_where_it_is_folded_to() -> None:
     found = bb.check(bb.loads(spur(50.2)))["receiver.oscillator.spur.0"]
-    assert any("fold it to 0.2 Hz, 0.8 cycles per aperture" in note for note in found.notes)
+    assert any("folds it to 0.2 Hz, 0.8 cycles per aperture" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("frequency", [51.0, 54.0, 33.0, 9.0])

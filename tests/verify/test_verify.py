@@ -47,7 +47,7 @@ def test_the_scenes_edge_has_a_reason() -> None:
     assert rows_to_verify(mission) == limited
     (row,) = verify_mission(mission, "mission.spatial_variance").rows
     assert (row.verdict, row.budget_rad) == ("not_evaluated", pytest.approx(math.pi / 4))
-    assert "two places" in row.reason
+    assert "two points" in row.reason
 
 
 def test_acceleration_and_clock_limits_of_section_v() -> None:
@@ -321,7 +321,7 @@ class TestTogether:
     def test_location_of_errors_that_move_nothing_says_so(self) -> None:
         error = {"platforms__receiver__motion_error": {"acceleration": [1e-6, 0, 0]}}
         row = verdicts("mission.location_error", requirements__location_error=2, **error)["mission.location_error"]
-        assert "move nothing by (25)" in row.reason
+        assert "by (25) the declared errors do not displace" in row.reason
 
     def test_worst_case_sums_reach_their_budgets(self) -> None:
         rows = verdicts("*.quadratic_phase_error", allocation__combine="sum", **ERRORS)
