@@ -4,7 +4,8 @@
 
     result = bb.check(bb.load("mission.yaml"))
 
-Numbers are SI and radians. What is named here is read when it is asked for: the package alone imports nothing.
+Numbers are in SI units and radians. Each name of the package is imported when it is first used, so `import
+bisar_budget` alone imports nothing else.
 """
 
 from importlib import import_module
@@ -60,7 +61,7 @@ __all__ = ["__version__", *sorted(_FROM)]
 
 
 def __getattr__(name: str) -> object:
-    """A name of `__all__`, from where it lives."""
+    """Import a name of `__all__` from the module that defines it."""
     if name not in _FROM:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_FROM[name]}"), name)

@@ -1,4 +1,4 @@
-"""`python -m bisar_budget` is the `bisar-budget` command."""
+"""Run the `bisar-budget` command by `python -m bisar_budget`."""
 
 from bisar_budget.cli import main
 

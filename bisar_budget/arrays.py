@@ -1,4 +1,4 @@
-"""Types of arrays, and of numbers that may stand for one case or for many."""
+"""Types of arrays, and of values that are a number for one case or an array for many."""
 
 from typing import Any
 

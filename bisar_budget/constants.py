@@ -1,4 +1,4 @@
-"""Physical constants and fixed tolerances, each with its unit and origin; words of the command's options."""
+"""Physical constants and fixed tolerances, each with unit and origin, and words for options of the command line."""
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0  # exact (SI, CGPM 1983)
 STANDARD_GRAVITY_MPS2 = 9.80665  # exact (CGPM 1901); data sheets state accelerometer bias in g

@@ -1,6 +1,6 @@
-"""Packages of each optional part of the tool, and the command that installs them.
+"""Packages that the optional parts of the tool need, and the command that installs them.
 
-Messages name the packages, not the extra: bisar-budget is not on PyPI, and its name there may become a stranger's.
+Messages name the packages, not the extra: bisar-budget is not on PyPI, and someone else may register its name there.
 """
 
 from collections.abc import Mapping
@@ -17,5 +17,5 @@ PACKAGES_OF_EXTRA: Mapping[str, tuple[str, ...]] = {
 
 
 def install_command(extra: str) -> str:
-    """Command that installs the packages of an extra into the running environment."""
+    """Command that installs the packages of an extra into the current environment."""
     return f"pip install {' '.join(PACKAGES_OF_EXTRA[extra])}"

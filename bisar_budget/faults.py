@@ -1,4 +1,4 @@
-"""Faults of input, with all that is needed to correct them: place, problem, given value, accepted values."""
+"""Faults of input files, with all that is needed to correct them: place, problem, given value, accepted values."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
@@ -9,14 +9,14 @@ ParserEvent = Any
 
 
 def upwards(path: KeyPath) -> Iterator[KeyPath]:
-    """A path and the paths above it, the nearest first; without the path of the file itself."""
+    """Yield a path and the paths above it, the nearest first, but not the path of the file itself."""
     return (path[:length] for length in range(len(path), 0, -1))
 
 
 class Region(NamedTuple):
     """Region of a value in a file, counted from 1 in characters; `end_column` is the column after its last character.
 
-    The ends are None for a mapping or a list: a message points at its start only.
+    The ends are None for a mapping or a list, because a message points only at its start.
     """
 
     line: int
@@ -26,10 +26,10 @@ class Region(NamedTuple):
 
 
 class Place(int):
-    """Line of a value in a file, from 1, together with the region of the value.
+    """Line of a value in a file, counted from 1, together with the region of the value.
 
-    It is a number for all code that needs the line. Reports for editors and pull requests use the region. `text` is
-    the value as written in the file; empty for a mapping or a list.
+    The place is a number, for code that only needs the line. Reports for editors and pull requests use the region.
+    `text` is the value as written in the file; it is empty for a mapping or a list.
     """
 
     region: Region
@@ -37,9 +37,12 @@ class Place(int):
 
     @classmethod
     def of(cls, event: ParserEvent) -> "Place":
-        """Place of an event of the YAML parser; each event has a single place, since many rows point at the same key.
+        """Place of an event of the YAML parser.
 
-        The place keeps four numbers and the text. It frees the parser's marks: they are half the memory of a mission.
+        Each event has a single place object, because many rows refer to the same key.
+
+        The place stores four numbers and the text, not the marks of the parser, which would take half the memory of a
+        mission.
         """
         fields: dict[str, ParserEvent] = event.__dict__
         position: Place | None = fields.get("place")
@@ -55,14 +58,14 @@ class Place(int):
 
 
 def printable(text: str) -> str:
-    """Write text from a user on one line, without effects on a terminal."""
+    """Write a user's text on one line, without control characters that affect a terminal."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def shown(text: str) -> str:
-    """Write a value from a file as short text, without effects on a terminal."""
+    """Write a value from a file as short text, without control characters that affect a terminal."""
     text = printable(text[:61])
     return text if len(text) <= 60 else text[:57] + "..."
 
@@ -78,7 +81,7 @@ def fault_words(problem: str, given: str = "", accepted: str = "", hint: str = "
 
 
 def sentences(*texts: str) -> str:
-    """Join texts by full stops, except after a text that ends with a question mark; the last text is unchanged."""
+    """Join texts as sentences: each but the last gets a full stop, unless it ends with a question mark."""
     joined = ""
     for text in filter(None, texts):
         joined = f"{closed(joined)} {text}" if joined else text
@@ -86,12 +89,12 @@ def sentences(*texts: str) -> str:
 
 
 def closed(text: str) -> str:
-    """The text with a full stop at its end, unless it ends with a full stop or a question mark."""
+    """Add a full stop to a text, unless it ends with a full stop or a question mark."""
     return text if text.endswith((".", "?")) else f"{text}."
 
 
 class SetValue(NamedTuple):
-    """A value that an option puts in place of the mission file's value: `--set radar.bandwidth=150MHz`.
+    """Value from an option that replaces the value of the mission file: `--set radar.bandwidth=150MHz`.
 
     `text` is the value as written in a file.
     """
@@ -101,7 +104,7 @@ class SetValue(NamedTuple):
 
     @property
     def option(self) -> str:
-        """Beginning of a message about the value."""
+        """First words of a message about the value: the option that gave it."""
         return f"--set {printable(self.key)}"
 
 
@@ -109,29 +112,30 @@ _BY_UNIT = ("m/s^2", "(m/s^2)^2/Hz", "m^2/Hz")  # of keys whose readers need the
 
 
 class SetNumber(SetValue):
-    """A number in SI that replaces a value, as in a case of a sweep: readers take the number, people read the text.
+    """Number in SI units that replaces a value, such as in one case of a sweep, with its text.
 
-    `value` is the number that readers take, or the text for a key with several dimensions.
+    Readers of the mission use `value`, and messages show the text. `value` is the number, or the text for a key with
+    several dimensions.
     """
 
     value: float | str
 
     @classmethod
     def of(cls, key: str, number: float, unit: str) -> "SetNumber":
-        """Replacement of the value of `key` by a number in the SI unit `unit`, which may be empty."""
+        """Replace the value of `key` by a number in the SI unit `unit`, which may be empty."""
         set_number = cls(key, f"{number!r} {unit}".rstrip())
         set_number.value = set_number.text if unit in _BY_UNIT else number
         return set_number
 
 
 class Changed:
-    """Replaces the parser's event of a value: the value comes from an option and has no line."""
+    """Replacement for the parser's event of a value that comes from an option and has no line in a file."""
 
     start_mark = None
 
 
 def changes_words(changes: Sequence[SetValue]) -> str:
-    """Write the options that changed a mission in a form for the command line; empty without options."""
+    """Write the options that changed a mission as on the command line; empty without options."""
     if not changes:
         return ""
     from shlex import quote
@@ -140,10 +144,10 @@ def changes_words(changes: Sequence[SetValue]) -> str:
 
 
 class Problem(NamedTuple):
-    """A problem with a value, before its file is known.
+    """Problem with a value, before the file of the value is known.
 
-    `at` is the path of the wrong value below the checked value. `names_value`: the text already contains the value.
-    `is_of_key`: the key is wrong, for any value.
+    `at` is the path of the wrong value relative to the checked value. `names_value` is true if the text already
+    contains the value. `is_of_key` is true if the key is wrong, whatever its value.
     """
 
     problem: str
@@ -155,7 +159,7 @@ class Problem(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Words for the full problem: the fault, the accepted values, and the hint."""
+        """Text of the full problem: the fault, the accepted values, and the hint."""
         return fault_words(self.problem, "", self.accepted, self.hint)
 
 
@@ -168,10 +172,10 @@ class InvalidValueError(ValueError):
 
 
 class Fault(NamedTuple):
-    """One fault of a mission file. Line and column count from 1; None for a fault of the whole file.
+    """One fault of a mission file. Line and column are counted from 1; None for a fault of the whole file.
 
-    `option` is the option that gave the value, instead of a line; empty for a value in the file. `file` is the file
-    of the mission; it is known for faults of a `MissionError`.
+    `option` is the option that gave the value; it is empty for a value in the file. `file` is the file of the
+    mission, known for faults of a `MissionError`.
     """
 
     line: int | None
@@ -186,7 +190,7 @@ class Fault(NamedTuple):
 
     @property
     def message(self) -> str:
-        """The problem, without its place, the given value and the accepted values."""
+        """The problem without its place, the given value and the accepted values."""
         return self.problem
 
     def __str__(self) -> str:
@@ -202,7 +206,7 @@ def file_fault(problem: str, hint: str = "") -> Fault:
 
 
 class ClusterError(Exception):
-    """Workers, or a folder of parts, that cannot be used; the message gives the reason and a remedy."""
+    """Workers or a folder of parts cannot be used; the message gives the reason and a remedy."""
 
 
 class WorkerLostError(Exception):
@@ -210,9 +214,10 @@ class WorkerLostError(Exception):
 
 
 class MissionError(Exception):
-    """A mission file that cannot be used, with all of its faults, in file order.
+    """A mission file cannot be used. The error has all faults of the file, in file order.
 
-    `data` is the file as read, byte for byte; None without a file, or if the file is longer than the part read.
+    `data` is the content of the file in bytes. It is None without a file, or if the file is longer than the part that
+    was read.
     """
 
     def __init__(self, file: str, faults: tuple[Fault, ...]) -> None:

@@ -1,8 +1,8 @@
 """Bistatic geometry at the aperture midpoint: look vectors, angles, ground gradients, frames.
 
 Frame: scene centre at the origin, ground plane z = 0, x east, y north, z up. SI units, radians.
-Vectors are tuples, whose components are the numbers of one case or arrays of many, (cases,). A result from plain
-numbers is a plain float: this takes a tenth of the time of a NumPy scalar.
+Vectors are tuples. Their components are numbers for one case, or arrays (cases,) for many. Functions of plain numbers
+return plain floats, which takes a tenth of the time of NumPy scalars.
 """
 
 import math
@@ -39,9 +39,10 @@ FRAME_AXES = {
 
 
 class UndefinedFrameError(ValueError):
-    """A frame that a platform does not have: a still platform has no track, a platform overhead no cross direction.
+    """A platform does not have the frame: a still platform has no track frame, one overhead no cross direction.
 
-    Without the scene's latitude and longitude the Earth's centre is not known, and no platform has `ric`.
+    Without the latitude and longitude of the scene the Earth's centre is unknown, and no platform has the frame
+    `ric`.
     """
 
 
@@ -49,7 +50,7 @@ _ARRAY = np.ndarray
 
 
 def _either(of_numbers: Callable[..., PerCase], of_arrays: Callable[..., PerCase]) -> Callable[..., PerCase]:
-    """A function of numbers or arrays, from one function of numbers and one function of arrays."""
+    """Combine a function of numbers and a function of arrays into one function of either."""
 
     def function(*values: PerCase) -> PerCase:
         return of_arrays(*values) if _ARRAY in map(type, values) else of_numbers(*values)
@@ -115,19 +116,19 @@ def without_rounding(a: Vector) -> Vector: ...
 @overload
 def without_rounding(a: Vectors) -> Vectors: ...
 def without_rounding(a: Vectors) -> Vectors:
-    """Set components to zero that are only rounding errors relative to the vector's length: cos 90° is 6e-17."""
+    """Set components of a vector to zero that are only rounding relative to its length: cos 90° is 6e-17."""
     floor = VECTOR_ROUNDING_FRACTION * norm(a)
     return (_above(floor, a[0]), _above(floor, a[1]), _above(floor, a[2]))
 
 
 def plain_vector(a: Vectors) -> Vector:
-    """The vector of one case in plain numbers."""
+    """Convert the vector of one case to plain numbers."""
     x, y, z = a
     return (float(x), float(y), float(z))
 
 
 def _of_cases(values: Floats, asked: PerCase) -> PerCase:
-    """Values of cases (cases,); a float if there is one case and `asked` is a number."""
+    """Return values (cases,), or a float if there is one case and `asked` is a number."""
     return values if np.ndim(asked) or values.size > 1 else values.item()
 
 
@@ -136,7 +137,7 @@ def _minus(a: Vectors, b: Vectors) -> Vectors:
 
 
 def _number_of_cases(number: PerCase, cases: Indices) -> PerCase:
-    """The numbers of some cases; a number that all cases share is unchanged."""
+    """Select the numbers of some cases; a number that all cases share is unchanged."""
     return number[cases] if isinstance(number, np.ndarray) and number.size > 1 else number
 
 
@@ -146,7 +147,7 @@ def _vector_of_cases(vector: Vectors, cases: Indices) -> Vectors:
 
 
 class CurvedPath(Protocol):
-    """A path that no single polynomial of slow time describes."""
+    """Path that is not a single polynomial of slow time."""
 
     @property
     def count(self) -> int:
@@ -156,48 +157,49 @@ class CurvedPath(Protocol):
         """Position and velocity at slow times from the midpoint. [m], [m/s]"""
 
     def of(self, cases: Indices) -> "CurvedPath":
-        """The paths of some cases, by their indices."""
+        """Select the paths of some cases, by their indices."""
 
 
 class Fall(Protocol):
-    """The dynamics of errors of a platform in free fall: `paths.free_fall.FreeFall`."""
+    """Dynamics of the errors of a platform in free fall; implemented by `paths.free_fall.FreeFall`."""
 
     def motions(self, path: "PlatformState", half: NDArray[np.float64], places: NDArray[np.float64]) -> Any:
-        """Motion by unit errors of the state at mid-aperture, (3, 3, 3, nodes, cases). [m]"""
+        """Motion that unit errors of the state at mid-aperture cause, (3, 3, 3, nodes, cases). [m]"""
 
     def rate_against_stars(self, position: Vectors) -> Vectors:
-        """Rate in the axes of the scene of a position error that is at rest against the stars."""
+        """Rate, in the axes of the scene, of a position error that is constant relative to the stars."""
 
     def orbit_rate(self, path: "PlatformState") -> Vectors:
         """Angular rate of the orbit. [rad/s]"""
 
     @property
     def centre(self) -> Vectors:
-        """The Earth's centre. [m]"""
+        """Position of the Earth's centre. [m]"""
 
     @property
     def rotation(self) -> Vectors:
-        """Rate at which the axes of the scene turn against the stars. [rad/s]"""
+        """Rate at which the axes of the scene rotate relative to the stars. [rad/s]"""
 
     def of(self, cases: Any) -> "Fall":
-        """The dynamics in some of the cases, by their indices."""
+        """Select the dynamics of some cases, by their indices."""
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """A path in polynomials, each over its own piece of slow time; the first and the last continue beyond the ends.
+    """Path of several polynomials, each for its own piece of slow time.
 
-    Each piece counts time from its own middle. A polynomial about the midpoint of a long aperture would lose digits
-    in powers of hundreds of seconds. Numbers may be arrays (cases,).
+    The first and the last polynomial continue beyond the ends. The time of each piece is relative to the middle of
+    the piece, because a polynomial about the midpoint of a long aperture would lose digits in powers of hundreds of
+    seconds. Numbers may be arrays (cases,).
 
     Attributes
     ----------
     starts : tuple
-        Time at which each piece except the first begins, rising. [s]
+        Times at which the pieces except the first begin, in rising order. [s]
     middles : tuple
         Origin of the time of each piece. [s]
     powers : tuple
-        Coefficients of time to the power 0, 1, … of each piece. [m], [m/s], …
+        Coefficients of the powers 0, 1, … of time, for each piece. [m], [m/s], …
     """
 
     starts: tuple[PerCase, ...]
@@ -211,7 +213,7 @@ class Pieces:
 
     @cached_property
     def _arrays(self) -> tuple[Floats, Floats, Floats]:
-        """Starts (pieces - 1, …), middles (pieces, …), powers (pieces, …, order + 1, 3), with … () or (cases,)."""
+        """Starts (pieces - 1, …), middles (pieces, …) and powers (pieces, …, order + 1, 3); … is () or (cases,)."""
         numbers = [x for powers in self.powers for vector in powers for x in vector]
         every = np.array(np.broadcast_arrays(*self.starts, *self.middles, *numbers), dtype=float)
         starts, middles, powers = np.split(every, (len(self.starts), len(self.starts) + self.count))
@@ -239,7 +241,7 @@ class Pieces:
         return (float(x), float(y), float(z)), (float(u), float(v), float(w))
 
     def of(self, cases: Indices) -> "Pieces":
-        """The paths of some cases, by their indices; numbers that all cases share are unchanged."""
+        """Select the paths of some cases, by their indices; numbers that all cases share are unchanged."""
         starts, middles = (
             tuple(_number_of_cases(number, cases) for number in numbers) for numbers in (self.starts, self.middles)
         )
@@ -252,7 +254,7 @@ class Pieces:
 
 @dataclass(frozen=True)
 class _Apart:
-    """A path less a second path; at least one of the paths is in pieces."""
+    """Difference of two paths, at least one of which is in pieces."""
 
     path: "PlatformState"
     other: "PlatformState"
@@ -271,12 +273,12 @@ class _Apart:
 
 @dataclass(frozen=True, kw_only=True)
 class PlatformState:
-    """The path of one platform over the aperture, a function of slow time; for one case or many.
+    """Path of one platform over the aperture as a function of slow time, for one case or many.
 
-    Position [m] and velocity [m/s] at the midpoint, acceleration [m/s²], and in `bends` the coefficients of τ³, τ⁴, …
+    Position [m] and velocity [m/s] at the midpoint, acceleration [m/s²], and the coefficients of τ³, τ⁴, … in `bends`
     [m/s³], [m/s⁴], … form a polynomial. Without a `curve` the polynomial is the full path; with a `curve` it is the
-    path near the midpoint. `radial` are the axes of the platform's `ric` frame, if the Earth's centre is known.
-    `fall` are the dynamics of errors of a platform in free fall; None for any other platform.
+    path near the midpoint. `radial` are the axes of the platform's `ric` frame if the Earth's centre is known. `fall`
+    is the dynamics of the errors of a platform in free fall; None for any other platform.
     """
 
     position: Vectors
@@ -289,12 +291,12 @@ class PlatformState:
 
     @property
     def is_still(self) -> PerCaseFlag:
-        """Whether the platform does not move; a path in pieces always moves."""
+        """Whether the platform does not move. A path in pieces counts as moving."""
         return self.curve is None and self.travelled(1.0) < STILL_SPEED_MPS
 
     @property
     def is_straight(self) -> bool:
-        """Whether the velocity is constant; for one case."""
+        """Whether the velocity is constant, for a platform of one case."""
         return self.acceleration == STRAIGHT and self.is_quadratic
 
     @property
@@ -304,7 +306,7 @@ class PlatformState:
 
     @property
     def rates(self) -> tuple[Vectors, ...]:
-        """Velocity, acceleration, jerk, …: rates of the position at the midpoint. [m/s], [m/s²], …"""
+        """Derivatives of the position at the midpoint: velocity, acceleration, jerk, … [m/s], [m/s²], …"""
         faster = ((bend, math.factorial(power)) for power, bend in enumerate(self.bends, 3))
         return (self.velocity, self.acceleration, *((b[0] * n, b[1] * n, b[2] * n) for b, n in faster))
 
@@ -344,7 +346,7 @@ class PlatformState:
         return _minus(self.place(tau + delay_s), self.place(tau))
 
     def of(self, cases: Indices) -> "PlatformState":
-        """The paths of some cases, by their indices; numbers that all cases share are unchanged."""
+        """Select the paths of some cases, by their indices; numbers that all cases share are unchanged."""
         return PlatformState(
             position=_vector_of_cases(self.position, cases),
             velocity=_vector_of_cases(self.velocity, cases),
@@ -367,7 +369,7 @@ class PlatformState:
 
     @cached_property
     def look_rate(self) -> Vectors:
-        """Rate of u: v⊥/R with v⊥ = v − u(u·v). [1/s]"""
+        """Rate of the unit vector u: v⊥/R with v⊥ = v − u(u·v). [1/s]"""
         u, v, R = self.look, self.velocity, self.slant_range
         radial = dot(u, v)
         return (
@@ -377,7 +379,7 @@ class PlatformState:
         )
 
     def travelled(self, duration_s: PerCase) -> PerCase:
-        """Upper bound on the length of the path from the midpoint within a time. [m]"""
+        """Upper bound of the distance that the platform travels within a time before or after the midpoint. [m]"""
         if self.curve is not None:
             x, y, z = (np.diff(component, axis=0) for component in self._looks(duration_s))
             steps = norm((x, y, z))
@@ -387,19 +389,19 @@ class PlatformState:
         return way + sum((norm(bend) * duration_s**power for power, bend in enumerate(self.bends, 3)), 0.0)
 
     def sinks(self, duration_s: PerCase) -> PerCase:
-        """Upper bound on the descent of the platform below its midpoint height within a time. [m]"""
+        """Upper bound of the descent of the platform below its midpoint height, within a time of the midpoint. [m]"""
         if self.curve is not None:
             return _of_cases(self.position[2] - self._looks(duration_s)[2].min(axis=0), duration_s)
         way = absolute(self.velocity[2]) * duration_s + absolute(self.acceleration[2]) * duration_s**2 / 2
         return way + sum((absolute(bend[2]) * duration_s**power for power, bend in enumerate(self.bends, 3)), 0.0)
 
     def _looks(self, duration_s: PerCase) -> VectorArrays:
-        """Positions within a time of the midpoint, equally many on each side, (samples, cases). [m]"""
+        """Positions at evenly spaced times within a duration before and after the midpoint, (samples, cases). [m]"""
         count = _MIN_LOOK_COUNT if self.curve is None else max(_MIN_LOOK_COUNT, _LOOKS_PER_PIECE * self.curve.count)
         return self.place(np.linspace(-1.0, 1.0, 2 * count + 1)[:, None] * duration_s)
 
     def less(self, other: "PlatformState") -> "PlatformState":
-        """The path less a second path, at each time; the difference has no frame of an orbit."""
+        """Subtract a second path at each time. The difference has no `ric` frame."""
         return PlatformState(
             position=_minus(self.position, other.position),
             velocity=_minus(self.velocity, other.velocity),
@@ -410,17 +412,20 @@ class PlatformState:
 
     @property
     def azimuth(self) -> PerCase:
-        """Azimuth from east, counter-clockwise, φ of (6). [rad]"""
+        """Azimuth φ of (6), counter-clockwise from east. [rad]"""
         return _arctan2(self.position[1], self.position[0])
 
     @property
     def elevation(self) -> PerCase:
-        """Elevation above the ground plane as seen from the scene centre, θ of (6). [rad]"""
+        """Elevation θ of (6), above the ground plane as seen from the scene centre. [rad]"""
         return _arctan2(self.position[2], _hypot(self.position[0], self.position[1]))
 
     @property
     def squint(self) -> float | None:
-        """Angle of the line of sight from broadside, positive forward; None for a still platform. One case. [rad]"""
+        """Squint of one case: angle of the line of sight from broadside, positive forward. [rad]
+
+        None for a still platform.
+        """
         speed = float(norm(self.velocity))
         if speed == 0:
             return None
@@ -428,7 +433,7 @@ class PlatformState:
         return math.asin(max(-1.0, min(1.0, sine))) if abs(sine) > VECTOR_ROUNDING_FRACTION else 0.0
 
     def has_frame(self, name: str, margin: float = 1.0) -> PerCaseFlag:
-        """Whether the platform has a frame, with a margin for rounding."""
+        """Whether the platform has a frame; `margin` is a margin for rounding."""
         if name in ("scene", "ric"):
             return name == "scene" or self.radial is not None
         first = self._first_axis(name)
@@ -441,19 +446,21 @@ class PlatformState:
         return self.velocity if name == "track" else self.position
 
     def frame(self, name: str) -> Axes:
-        """Axes of a frame as unit vectors of the scene, right-handed, in the order of `FRAME_AXES`.
+        """Axes of a frame as right-handed unit vectors in the axes of the scene, in the order of `FRAME_AXES`.
 
-        `track`: along the velocity; cross is horizontal, to the left; up completes it (vertical in level
-        flight). `look`: line of sight from the scene centre to the platform; cross is horizontal; up
-        completes it. `ric`: away from the Earth's centre; in-track and cross-track belong to the orbit, whose
-        plane contains the velocity against the stars; cross-track is its normal.
+        In `track`, the first axis is along the velocity, cross is horizontal and to the left, and up completes the
+        frame (vertical in level flight). In `look`, the first axis is the line of sight from the scene centre to the
+        platform, cross is horizontal, and up completes the frame. In `ric`, the first axis points away from the
+        Earth's centre. The plane of the orbit contains the velocity relative to the stars; in-track lies in this
+        plane, and cross-track is its normal.
 
-        With many cases, the axes are NaN in the cases without the frame.
+        If there are many cases, the axes are NaN in cases without the frame.
 
         Raises
         ------
         UndefinedFrameError
-            Track frame of a still platform, a first axis that is vertical, or no Earth's centre.
+            The frame is `track` and the platform is still, the first axis is vertical, or the Earth's centre is
+            unknown.
         """
         has_it = self.has_frame(name)
         if not isinstance(has_it, np.ndarray) and not has_it:
@@ -486,7 +493,10 @@ def state_from_angles(
     acceleration: Vectors = STRAIGHT,
     bends: tuple[Vectors, ...] = (),
 ) -> PlatformState:
-    """Position and velocity from range and angles; `speed` is over ground, `climb` its vertical part."""
+    """Path of a platform from range, angles and speed at the midpoint.
+
+    `speed` is the speed over ground, and `climb` the vertical part of the velocity.
+    """
     position = (
         slant_range * _cos(azimuth) * _cos(elevation),
         slant_range * _sin(azimuth) * _cos(elevation),
@@ -503,7 +513,7 @@ def state_from_angles(
 
 @dataclass(frozen=True, kw_only=True)
 class BistaticGeometry:
-    """Both platforms together, with the gradients of range and Doppler on the ground; for one case or many."""
+    """Geometry of both platforms, with the gradients of range and Doppler on the ground, for one case or many."""
 
     transmitter: PlatformState
     receiver: PlatformState
@@ -515,26 +525,27 @@ class BistaticGeometry:
 
     @cached_property
     def apart(self) -> PlatformState:
-        """The transmitter relative to the receiver: the position is the baseline."""
+        """Path of the transmitter relative to the receiver; its position is the baseline."""
         return self.transmitter.less(self.receiver)
 
     @property
     def echo_delay(self) -> PerCase:
-        """Delay of the scene centre's echo after the direct path, at mid-aperture. [s]"""
+        """Delay of the scene centre's echo relative to the direct path, at mid-aperture. [s]"""
         t, r = self.both
         return (t.slant_range + r.slant_range - self.apart.slant_range) / SPEED_OF_LIGHT_MPS
 
     def at(self, tau: PerCase) -> "BistaticGeometry":
-        """The geometry at slow times [s], with straight paths through the positions at these times."""
+        """Geometry at slow times [s], with straight paths through the positions at these times."""
         transmitter, receiver = (
             PlatformState(position=p, velocity=v) for p, v in (path.at(tau) for path in self.both)
         )
         return BistaticGeometry(transmitter=transmitter, receiver=receiver)
 
     def sights(self, *, has_direct_path: bool) -> tuple[Vectors, Vectors]:
-        """Decrease of range at mid-aperture per metre of motion of the transmitter, and of the receiver. [-]
+        """Decrease of the range at mid-aperture per metre of motion of each platform, transmitter first. [-]
 
-        The lines of sight u_t, u_r; with a direct path as clock u_t − b, u_r + b, with b towards the transmitter.
+        These are the lines of sight u_t and u_r. If the direct path is the clock, they are u_t − b and u_r + b, with
+        b the unit vector from receiver to transmitter.
         """
         t, r = self.transmitter.look, self.receiver.look
         if not has_direct_path:
@@ -544,19 +555,19 @@ class BistaticGeometry:
 
     @cached_property
     def range_gradient(self) -> tuple[PerCase, PerCase]:
-        """Sum s of the look vectors on the ground: range changes by −s·x. [-]"""
+        """Sum s of the look vectors on the ground; the range to a ground point x changes by −s·x. [-]"""
         t, r = self.transmitter.look, self.receiver.look
         return (t[0] + r[0], t[1] + r[1])
 
     @cached_property
     def doppler_gradient(self) -> tuple[PerCase, PerCase]:
-        """Rate of s on the ground. [1/s]"""
+        """Rate ṡ of the range gradient s, on the ground. [1/s]"""
         t, r = self.transmitter.look_rate, self.receiver.look_rate
         return (t[0] + r[0], t[1] + r[1])
 
     @property
     def look_azimuth(self) -> PerCase:
-        """Bistatic look direction φ_b of (11), by atan2. [rad]"""
+        """Bistatic look direction φ_b of (11), computed with atan2. [rad]"""
         return _arctan2(self.range_gradient[1], self.range_gradient[0])
 
     @property
@@ -567,19 +578,19 @@ class BistaticGeometry:
 
     @cached_property
     def gradient_angle(self) -> PerCase:
-        """Angle between the lines of range and Doppler gradient on the ground, 0 to π/2. [rad]"""
+        """Angle between the range gradient and the Doppler gradient on the ground, as lines, 0 to π/2. [rad]"""
         return angle_between_lines(self.range_gradient, self.doppler_gradient)
 
     def range_resolution(self, bandwidth_hz: PerCase, speed_of_light: float) -> PerCase:
-        """Resolution along φ_b on the ground, peak to first null: c/(B|s|). [m]"""
+        """Range resolution along φ_b on the ground, from peak to first null: c/(B|s|). [m]"""
         return speed_of_light / (bandwidth_hz * _hypot(*self.range_gradient))
 
     def cross_range_resolution(self, wavelength_m: PerCase, aperture_time_s: PerCase) -> PerCase:
-        """Resolution across φ_b on the ground, peak to first null on a line of constant range: λ/(T|ṡ⊥|). [m]"""
+        """Cross-range resolution on the ground: λ/(T|ṡ⊥|), peak to first null along a line of constant range. [m]"""
         across = _hypot(*self.doppler_gradient) * _sin(self.gradient_angle)
         return wavelength_m / (aperture_time_s * across)
 
 
 def angle_between_lines(a: tuple[PerCase, PerCase], b: tuple[PerCase, PerCase]) -> PerCase:
-    """Angle between two lines in the plane, regardless of sign, 0 to π/2; 0 if a direction is zero. [rad]"""
+    """Angle between two lines in the plane, without sign, 0 to π/2; 0 if the direction of a line is zero. [rad]"""
     return _arctan2(absolute(a[0] * b[1] - a[1] * b[0]), absolute(a[0] * b[0] + a[1] * b[1]))

@@ -1,13 +1,14 @@
-"""The ground points that an aperture and a band tell apart: the matrix H of the range gradients over both.
+"""The matrix H, which measures how well aperture and band distinguish ground points.
 
-A ground point at a step x from another has a range that differs by g(τ)·x. Here g is the sum of both lines of sight,
-projected on the ground. The variance of the phase over aperture and band, less a constant phase, is k²·xᵀHx with
+The ranges of two ground points at a distance x from each other differ by g(τ)·x. Here g is the sum of both lines of
+sight, projected on the ground. The variance of the phase difference over aperture and band is k²·xᵀHx, with
+k = 2πf₀/c and
 
     H = Cov_τ(g) + b²⟨g gᵀ⟩,    b² = B²/(12 f₀²),
 
-for an evenly filled band of width B about f₀; ⟨ ⟩ is the mean over the aperture. A singular H means that points
-along a line look alike: the collection has no image plane. Derived here. `ranges.exact_ranges` finds the image point
-with H.
+for an evenly filled band of width B about f₀; ⟨ ⟩ is the mean over the aperture. If H is singular, points along a
+line cannot be distinguished: the collection has no image plane. H is half the second derivative of V, the variance
+that the image point minimises (see `ranges.exact_ranges`). Derived here.
 """
 
 import math
@@ -38,28 +39,28 @@ MIN_TURN_FRACTION = 1e-9  # of the turns of both lines of sight, below which the
 
 
 class Band(Protocol):
-    """A radar, by its band. [Hz]"""
+    """Frequency band of a radar. [Hz]"""
 
     @property
     def center_frequency(self) -> PerCase:
-        """Centre of the band."""
+        """Centre of the band. [Hz]"""
 
     @property
     def bandwidth(self) -> PerCase:
-        """Width of the band, evenly filled."""
+        """Width of the evenly filled band. [Hz]"""
 
 
 @dataclass(frozen=True, eq=False)
 class Sampling:
-    """Slow times at which a history is sampled, and the weights that fit Legendre orders to it.
+    """Slow times at which a range history is sampled, and the weights that fit Legendre polynomials to it.
 
     Attributes
     ----------
     places : (samples,)
-        Slow times from −1 to 1, in half apertures.
+        Slow times from −1 to 1, in units of half the aperture time.
     fit : (4, samples)
-        Weights of the mean (the P₀ part), of the P₁ part at the edge, and of the quadratic and the cubic part at the
-        edge: 3/2 of P₂ and 5/2 of P₃.
+        Weights whose products with a history give its mean (P₀ part), its P₁ part at the edge, and its quadratic and
+        cubic part at the edge: 3/2 times the P₂ and 5/2 times the P₃ coefficient.
     """
 
     places: Floats
@@ -67,21 +68,21 @@ class Sampling:
 
     @cached_property
     def centred(self) -> Floats:
-        """Takes a history to its distances from its mean, and to its mean, (samples + 1, samples)."""
+        """Matrix that maps a history to its differences from its mean, and its mean, (samples + 1, samples)."""
         return np.concatenate((np.eye(self.places.size) - self.fit[0], self.fit[:1]))
 
     @cached_property
     def to_ends(self) -> Floats:
-        """Weights (2, samples) that carry a smooth history from the samples to both ends of the aperture."""
+        """Weights (2, samples) that extrapolate a smooth history from the samples to both ends of the aperture."""
         return self._weights_at(np.array((-1.0, 1.0)))
 
     @cached_property
     def to_finest(self) -> Floats:
-        """Weights (FINEST_NODES, samples) that carry a smooth history from the samples to the finest nodes."""
+        """Weights (FINEST_NODES, samples) that interpolate a smooth history from the samples to the finest nodes."""
         return self._weights_at(nodes(FINEST_NODES).places)
 
     def _weights_at(self, slow_times: Floats) -> Floats:
-        """Weights (times, samples) that carry a smooth history from the samples to other slow times over −1 … 1."""
+        """Weights (times, samples) that interpolate a smooth history from the samples to slow times over −1 … 1."""
         degree = min(self.places.size, SIGHT_POLYNOMIAL_COUNT) - 1
         polynomials = np.polynomial.legendre.legvander(self.places, degree)
         return np.asarray(np.polynomial.legendre.legvander(slow_times, degree) @ np.linalg.pinv(polynomials))
@@ -92,7 +93,7 @@ LEGENDRE_LEADING = np.array((1.0, 1.0, 1.5, 2.5))  # coefficient of xⁿ in the 
 
 @cache
 def nodes(count: int) -> Sampling:
-    """Sampling at the nodes of Gauss-Legendre quadrature, which projects each order n: (2n + 1)/2 ∫ρPₙ."""
+    """Sampling at the nodes of Gauss-Legendre quadrature, which gives the order n as (2n + 1)/2 ∫ρPₙ."""
     slow_times, weights = np.polynomial.legendre.leggauss(count)
     orders = np.polynomial.legendre.legvander(slow_times, 3)
     return Sampling(slow_times, ((np.arange(4) + 0.5) * LEGENDRE_LEADING)[:, None] * orders.T * weights)
@@ -101,7 +102,7 @@ def nodes(count: int) -> Sampling:
 def nodes_for(
     geometry: BistaticGeometry, aperture_time_s: PerCase, *, has_direct_path: bool = False
 ) -> int | Indices:
-    """Number of nodes that cases need, for the lines of sight, and for the direct path if it counts."""
+    """Number of nodes that cases need for the lines of sight, and for the direct path if it is the clock."""
     half = aperture_time_s / 2
     turning = (*geometry.both, *((geometry.apart,) if has_direct_path else ()))
     way = reduce(np.maximum, [path.travelled(half) / path.slant_range for path in turning])
@@ -115,18 +116,18 @@ def nodes_for(
 
 
 def band_variance(radar: Band) -> PerCase:
-    """b² of an evenly filled band: the variance of its frequencies over the square of its centre."""
+    """b²: variance of the frequencies of an evenly filled band, divided by the square of its centre."""
     return (radar.bandwidth / radar.center_frequency) ** 2 / 12
 
 
 @dataclass(frozen=True, eq=False)
 class GroundMatrix:
-    """The matrix H: half the second derivative of V over the ground, at a point without range error.
+    """The matrix H of the module docstring: half the second derivative of V over the ground, without range errors.
 
     Attributes
     ----------
     slopes : (2, nodes, cases)
-        Range error at the nodes by a metre east, and north. [m/m]
+        Change of the range error at the nodes per metre east, and per metre north. [m/m]
     fit : (4, nodes)
         Weights of `Sampling.fit`.
     band : (cases,)
@@ -136,9 +137,9 @@ class GroundMatrix:
     covariance : (2, 2, cases)
         Covariance of the gradient over the aperture.
     projection : (2, nodes, cases)
-        Takes range errors ρ at the nodes to ⟨g, ρ⟩ in the product of V, with g the gradient.
+        Weights of range errors ρ at the nodes that give ⟨g, ρ⟩, the scalar product of V with the gradient g.
     xx, xy, yy : (cases,)
-        H = ⟨g, gᵀ⟩.
+        Elements of H = ⟨g, gᵀ⟩.
     """
 
     slopes: Floats
@@ -153,7 +154,7 @@ class GroundMatrix:
 
     @classmethod
     def of(cls, slopes: Floats, fit: Floats, band: Floats) -> "GroundMatrix":
-        """Matrix H from the range error at the nodes by a metre east, and north, (2, nodes, cases)."""
+        """Compute H from the range error at the nodes per metre east, and per metre north, (2, nodes, cases)."""
         weights, gradient = fit[0][:, None], fit[0] @ slopes
         apart = slopes - gradient[:, None]
         weighted = weights * apart
@@ -167,29 +168,29 @@ class GroundMatrix:
 
     @cached_property
     def determinant(self) -> Floats:
-        """Determinant of H, the square of the area that the gradients span."""
+        """Determinant of H: square of the area that the east and north parts of the gradient span."""
         return np.asarray(self.xx * self.yy - self.xy * self.xy)
 
     @property
     def least(self) -> Floats:
-        """The smaller eigenvalue of H: the growth of V along the direction with the worst resolution."""
+        """Smaller eigenvalue of H: increase of V per square metre in the direction with the worst resolution."""
         half, apart = (self.xx + self.yy) / 2, np.hypot((self.xx - self.yy) / 2, self.xy)
         return np.asarray(self.determinant / (half + apart))
 
     @property
     def place_weights(self) -> tuple[Floats, Floats]:
-        """Displacement east and north per metre of range error at the nodes, −H⁻¹⟨g, ·⟩, (nodes, cases). [m/m]"""
+        """Displacement east and north per metre of range error at each node: −H⁻¹⟨g, ·⟩, (nodes, cases). [m/m]"""
         (x, y), determinant = self.projection, self.determinant
         with np.errstate(all="ignore"):
             return (self.xy * y - self.yy * x) / determinant, (self.xy * x - self.xx * y) / determinant
 
     @property
     def sine(self) -> Floats:
-        """Sine of the angle between the directions that band and turn resolve.
+        """Sine of the angle θ between the directions that band and turn resolve.
 
-        Mean gradient and covariance of the gradient over the aperture, each with a trace of one, add to a matrix with
-        the eigenvalues 1 ± cos θ: for a short aperture θ is the angle between range and Doppler gradient. Its
-        condition is cot²(θ/2).
+        The mean gradient, as a matrix, and the covariance of the gradient over the aperture are both scaled to a
+        trace of one. Their sum has the eigenvalues 1 ± cos θ, and the condition cot²(θ/2). For a short aperture θ is
+        the angle between the range gradient and the Doppler gradient.
         """
         x, y = self.range_gradient
         square = x * x + y * y
@@ -202,7 +203,7 @@ class GroundMatrix:
 
     @property
     def turning(self) -> Floats:
-        """Edge of the P₁ part of the gradient across the mean gradient, from the variance in that direction. [m/m]"""
+        """P₁ part at the aperture edge of the gradient across its mean, from the variance across it. [m/m]"""
         x, y = self.range_gradient
         along = self.xx * x * x + 2 * self.xy * x * y + self.yy * y * y
         with np.errstate(all="ignore"):
@@ -210,18 +211,19 @@ class GroundMatrix:
 
     @cached_property
     def orientation(self) -> Floats:
-        """Area between mean gradient and mean Doppler gradient, as in `orientation`."""
+        """Signed area between mean range gradient and mean Doppler gradient, from the function `orientation`."""
         return orientation(self.slopes, self.fit, self.band, self.determinant)
 
     def turned_from(self, centre: "GroundMatrix", case: Indices) -> Floats:
-        """Area that gradients span, over their area at the centre of some cases, as in `turn`."""
+        """Area that the gradient spans, relative to that at the centre of some cases, from the function `turn`."""
         return turn(self.determinant, self.orientation, centre, case)
 
 
 def orientation(slopes: Floats, fit: Floats, band: Floats, determinant: Floats) -> Floats:
-    """Area between mean gradient and mean Doppler gradient, signed; 0 where the aperture resolves more.
+    """Signed area between mean range gradient and mean Doppler gradient.
 
-    The parameters are fields of `GroundMatrix`, and the determinant of H.
+    It is 0 if the aperture resolves much more than these two gradients, that is, if their part of the determinant of
+    H is small. The parameters are fields of `GroundMatrix`, and the determinant of H.
     """
     (x, y), (by_x, by_y) = fit[0] @ slopes, fit[1] @ slopes
     area = x * by_y - y * by_x
@@ -230,7 +232,10 @@ def orientation(slopes: Floats, fit: Floats, band: Floats, determinant: Floats) 
 
 
 def turn(determinant: Floats, orientation: Floats, centre: GroundMatrix, case: Indices) -> Floats:
-    """Area that gradients span, over their area at the centre of some cases; below 0 if turned around."""
+    """Area that the gradient spans, relative to that at the centre of some cases; negative if turned around.
+
+    The area is the root of the determinant of H.
+    """
     at_centre, orientation_at_centre = centre.determinant, centre.orientation
     if at_centre.size > 1:
         at_centre, orientation_at_centre = at_centre[case], orientation_at_centre[case]
@@ -241,10 +246,11 @@ def turn(determinant: Floats, orientation: Floats, centre: GroundMatrix, case: I
 def spans_ground(
     geometry: BistaticGeometry, radar: Band, aperture_time_s: PerCase, cases: int = 1
 ) -> tuple[Booleans, Floats]:
-    """Whether lines of sight turn within the aperture, and the sine of `GroundMatrix.sine`, (cases,).
+    """Whether the lines of sight turn within the aperture, and the sine as in `GroundMatrix.sine`, (cases,).
 
-    Full circles, and apertures that pass through a moment at which range and Doppler gradient are parallel, have an
-    image plane. A collection without an image plane is within a degree of parallel over the whole aperture.
+    Full circles have an image plane. So have apertures with a moment at which the range and Doppler gradients are
+    parallel. If a collection has no image plane, the gradients are within a degree of parallel over the whole
+    aperture.
     """
     half = np.array(np.broadcast_to(np.asarray(aperture_time_s, dtype=float) / 2, (cases,)))
     sampling = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_PATH_NODES)))
@@ -262,7 +268,7 @@ def spans_ground(
 
 
 def degeneracy(geometry: BistaticGeometry, radar: Band, aperture_time_s: float) -> str:
-    """Reason why one collection has no image plane; empty if it has one."""
+    """Reason why a collection has no image plane; empty if it has one."""
     turns, sine = spans_ground(geometry, radar, aperture_time_s)
     if not turns[0]:
         return "both look vectors have a sum that never turns, so that Doppler does not change over the ground"

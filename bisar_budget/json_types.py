@@ -1,4 +1,4 @@
-"""Types of what JSON and YAML documents hold."""
+"""Types of the contents of JSON and YAML documents."""
 
 from typing import Any
 

@@ -1,8 +1,8 @@
-"""Memory that the system allows a process (`ulimit -v`, `ulimit -d`), checked before libraries take their share.
+"""Limits of the memory of a process (`ulimit -v`, `ulimit -d`), checked before libraries allocate memory.
 
-A library in C ends the process if it gets no memory: OpenBLAS ends it with exit code 1 or with the signal of an
-interrupt, when NumPy is imported or first multiplies matrices; LLVM never returns. No code here can catch this, so
-the known need for memory is compared with the limit before.
+A library in C may end the process if it gets no memory. OpenBLAS ends it with exit code 1, or with the signal of an
+interrupt, when NumPy is imported or first multiplies matrices; LLVM never returns. No code here can catch this. The
+known need for memory is therefore compared with the limit first.
 """
 
 import errno
@@ -19,7 +19,7 @@ _MEMORY_ERRORS = ("failed to map segment", "annot allocate memory", "bad_alloc",
 
 
 def limit() -> int | None:
-    """Address space that the system allows this process [B]; None without a limit."""
+    """Limit of the address space of this process [B]; None without a limit."""
     try:
         import resource
     except ImportError:  # Windows
@@ -29,16 +29,16 @@ def limit() -> int | None:
 
 
 def limit_words() -> str:
-    """Words for the limit, for a message; empty without a limit."""
+    """Text about the limit for a message; empty without a limit."""
     allowed = limit()
     return "" if allowed is None else f"the system allows {allowed >> 20} MB (ulimit -v, ulimit -d)"
 
 
 def spare_threads() -> None:
-    """Limit libraries that are not loaded yet to one thread, unless the environment gives OpenBLAS more threads.
+    """Limit libraries that are not loaded yet to one thread, unless the environment sets more threads for OpenBLAS.
 
-    A second thread costs a check an eighth of its time and never saves time: products of matrices are small here.
-    Each thread takes tens of MB, which counts under a limit.
+    A second thread makes a check an eighth slower and never faster, because products of matrices are small here. Each
+    thread takes tens of MB, which count towards a limit.
     """
     if limit() is not None:
         os.environ.update(OPENBLAS_NUM_THREADS="1", ARROW_DEFAULT_MEMORY_POOL="system")
@@ -47,7 +47,7 @@ def spare_threads() -> None:
 
 
 def hold_room(needed: int, purpose: str) -> None:
-    """Raise a `MemoryError` if the system allows less than the memory `needed` for a purpose. [B]"""
+    """Raise a `MemoryError` if the limit is below `needed`, the memory that a purpose needs. [B]"""
     allowed = limit()
     if allowed is not None and allowed < needed:
         raise MemoryError(f"{purpose} needs at least {needed >> 20} MB of memory; {limit_words()}")
@@ -60,7 +60,7 @@ def is_spacious() -> bool:
 
 
 def ran_out(error: BaseException) -> bool:
-    """Whether an error, or a cause of it, is a lack of memory; near the memory limit any error counts as one."""
+    """Whether an error, or one of its causes, is a lack of memory. Near the memory limit any error counts as one."""
     return any(map(_says_memory, _causes(error))) or _is_near_limit()
 
 
@@ -80,7 +80,7 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 
 
 def _is_near_limit() -> bool:
-    """Whether the process once used nearly all of the memory that the limit allows."""
+    """Whether the process has at some time used nearly all of the memory that the limit allows."""
     allowed = limit()
     if allowed is None:
         return False

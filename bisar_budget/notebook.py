@@ -1,4 +1,4 @@
-"""Answers for a notebook: tables and drawings in HTML, in the colours of the notebook's theme."""
+"""HTML for a notebook: tables and drawings of results, in the colours of the notebook's theme."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -29,24 +29,24 @@ _COLOURS = {
 
 
 def page(*elements: str) -> str:
-    """HTML of an answer, from its parts."""
+    """HTML of a result, from its parts."""
     return f'{_NOTEBOOK_STYLE}<div class="bisar-budget">{"".join(elements)}</div>'
 
 
 def heading(status: str, title: str, remark: str = "") -> str:
-    """The verdict, the title of the answer, and a remark beside it."""
+    """HTML of a heading: the verdict, the title of the result, and a remark beside it."""
     texts = f' <span class="muted">{escape(remark)}</span>' if remark else ""
     return f"<p>{badge(status)} <strong>{escape(title)}</strong>{texts}</p>"
 
 
 def badge(status: str) -> str:
-    """A status in its colour."""
+    """HTML of a status in its colour."""
     colour = _COLOURS.get(status, "#57606a")
     return f'<span class="status" style="background: {colour}">{escape(status.replace("_", " "))}</span>'
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table; the values of a column `status` are badges, numbers are aligned to the right."""
+    """HTML table; the values of a column `status` are badges, and numbers are aligned to the right."""
     head = "".join(f"<th>{escape(name)}</th>" for name in columns)
     body = "".join(f"<tr>{''.join(map(_cell, columns, row))}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
@@ -61,5 +61,5 @@ def _cell(column: str, value: object) -> str:
 
 
 def note(text: str) -> str:
-    """A line of text below the answer."""
+    """HTML of a line of text below the result."""
     return f'<p class="muted">{escape(text)}</p>'

@@ -1,7 +1,7 @@
-"""Units that are understood but not accepted: inches, mils, words, prefixes that no table has.
+"""Units that are understood but not accepted: inches, mils, words, and prefixes that are in no table of units.
 
-A message can convert the quantity to an accepted unit, or suggest the spelling that was meant. It never suggests a
-unit that changes the size. The module is imported only after a unit was refused.
+A message can convert the quantity to an accepted unit, or suggest the intended spelling. It never suggests a unit
+that changes the size of the quantity. The module is imported only after a unit was refused.
 """
 
 import math
@@ -18,13 +18,13 @@ _MIN_PLURAL_CHARACTERS = 4  # mils, days
 
 
 class UnitValue(NamedTuple):
-    """Factor of a unit to SI, and the powers of metre, second and radian in the unit."""
+    """Factor of a unit to SI, and exponents of metre, second and radian in the unit."""
 
     factor: float
     powers: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def times(self, other: "UnitValue", exponent: float = 1.0) -> "UnitValue":
-        """Product with a power of a second unit."""
+        """Product with a power of another unit."""
         a, b = self.powers, other.powers
         powers = (a[0] + exponent * b[0], a[1] + exponent * b[1], a[2] + exponent * b[2])
         return UnitValue(self.factor * other.factor**exponent, powers)
@@ -184,7 +184,7 @@ def is_of(written: str, dimension: Dimension) -> bool:
 
 
 def value_of_unit(unit: str) -> UnitValue | None:
-    """Value of a unit made of known units by products, quotients, powers and square roots; None for other text."""
+    """Value of a unit that consists of known units in products, quotients, powers and square roots; else None."""
     tokens: list[str] = []
     end = 0
     while end < len(unit):
@@ -250,13 +250,13 @@ def _atom(name: str) -> UnitValue | None:
 
 
 def _powers_of(dimension: Dimension) -> tuple[float, float, float] | None:
-    """Powers of metre, second and radian in a dimension's SI unit; None for decibels and bytes."""
+    """Exponents of metre, second and radian in the SI unit of a dimension; None for decibels and bytes."""
     value = value_of_unit(dimension.si or "1")
     return None if value is None else value.powers
 
 
 def _of_same_size(value: UnitValue, dimension: Dimension) -> str:
-    """Unit of a dimension with the same size as `value`; empty without such a unit."""
+    """Unit of a dimension that has the same size as `value`; empty if there is none."""
     return next((unit for unit, factor in dimension.units.items() if unit and _is_equal(factor, value.factor)), "")
 
 
@@ -265,15 +265,15 @@ def _is_equal(a: float, b: float) -> bool:
 
 
 def _converted(digits: str, written: str, factor: float, dimension: Dimension) -> str:
-    """Words that convert a number with a unit to an accepted unit."""
+    """Text that converts a number with a unit to an accepted unit."""
     value = float(digits) * factor
     return f"{digits} {written} is {format_quantity(value, dimension.si, 9)}" if math.isfinite(value) else ""
 
 
 def _respelt(unit: str, dimension: Dimension) -> str:
-    """Unit of a dimension whose spelling differs from `unit` only by upper and lower case, or by one slip.
+    """Unit of a dimension whose spelling differs from `unit` only in upper and lower case, or in one slip.
 
-    Empty if a second unit that may have been meant is as near and has a different size.
+    Empty if a second unit of a different size is spelt as similarly.
     """
     candidates = dict(_conceivable(dimension))
     spellings = {unit.lower(), normal_unit(unit.lower().replace("hz", "Hz")).lower()}
@@ -295,7 +295,7 @@ def _is_one_size(factors: list[float]) -> bool:
 
 
 def _conceivable(dimension: Dimension) -> Iterator[tuple[str, float]]:
-    """Units of a dimension, also with further prefixes that may be meant, with their factors."""
+    """Units of a dimension with their factors, including units with further prefixes that may be meant."""
     powers = _powers_of(dimension)
     for unit, factor in dimension.units.items():
         if not unit:

@@ -1,4 +1,4 @@
-"""Resources of a command: files in the package, files of a user, and processors."""
+"""Resources of a command: files of the package, files of the user, and processors."""
 
 import os
 import stat
@@ -26,9 +26,10 @@ FILES_READ: set[tuple[int, int]] = set()
 
 
 class FilesHeld:
-    """The files of a command as first read: all formats and reports of the command use this content.
+    """Contents of the files that a command reads, as first read, so that all its outputs use the same content.
 
-    It keeps contents up to 64 MB in total, and hashes beyond: a larger file that changes meanwhile is refused.
+    Contents are kept up to 64 MB in total. For further files a hash is kept, and a file that has changed at a later
+    reading is refused.
     """
 
     def __init__(self) -> None:
@@ -37,7 +38,7 @@ class FilesHeld:
         self.room = _MAX_HELD_BYTES
 
     def content(self, file: str, most: int, read: Callable[[], bytes]) -> bytes:
-        """Content of a file as first read, at most `most` + 1 bytes; `read` gives the content of an unread file."""
+        """Content of a file as first read, at most `most` + 1 bytes; `read` returns it if the file is new."""
         key = (file if file == "-" else os.path.normpath(file), most)
         held_content = self.known.get(key)
         if isinstance(held_content, bytes):
@@ -66,20 +67,20 @@ _held: FilesHeld | None = None  # None outside of a command: a caller of functio
 
 
 def hold_files() -> None:
-    """Begin a command: forget the files that were read, and keep the content of each file from its first reading."""
+    """Begin a command: forget files that were read before, and keep each file's content from its first reading."""
     global _held
     FILES_READ.clear()
     _held = FilesHeld()
 
 
 def release_files() -> None:
-    """End a command: further reads give the current files."""
+    """End a command: later readings give the current content of files."""
     global _held
     _held = None
 
 
 def held(file: str, most: int, read: Callable[[], bytes]) -> bytes:
-    """Content of a file as this command first read it; outside of a command, the content that `read` gives."""
+    """Content of a file as this command first read it; outside a command, the content that `read` returns."""
     return read() if _held is None else _held.content(file, most, read)
 
 
@@ -96,9 +97,9 @@ _STREAMS = (
 
 
 def special_file(path: str) -> str:
-    """Kind of a file that waits or never ends: a named pipe, a device, a socket; empty for other files.
+    """Kind of a file whose reading may wait or never end: a named pipe, a device, a socket; empty for other files.
 
-    Open streams of this process, such as the streams of a shell's `<(…)`, do not count as special files.
+    Open streams of this process, such as those of a shell's `<(…)`, do not count as special files.
     """
     if os.path.abspath(path).startswith(_STREAMS):
         return ""
@@ -114,7 +115,7 @@ def special_file(path: str) -> str:
 
 
 class UnreadableError(Exception):
-    """A file that cannot be read. The message begins with its name; `is_missing` if the file does not exist."""
+    """A file cannot be read. The message begins with its name; `is_missing` is true if the file does not exist."""
 
     def __init__(self, message: str, *, is_missing: bool = False) -> None:
         super().__init__(message)
@@ -137,7 +138,7 @@ def _read(file: str, most: int, called: str) -> bytes:
 
 
 def standard_input() -> BinaryIO:
-    """Bytes of standard input; raises `ValueError` without a standard input."""
+    """Binary stream of standard input; raises `ValueError` if there is none."""
     if sys.stdin is None:
         raise ValueError("standard input is closed")
     return sys.stdin.buffer
@@ -169,7 +170,7 @@ class Files(Protocol):
 
 
 class Disk:
-    """The current files on the disk, or the files as this command first read them."""
+    """The current files on the disk, or their contents as this command first read them."""
 
     @staticmethod
     def content(file: str, most: int, called: str | None = None) -> bytes:
@@ -186,7 +187,9 @@ DISK = Disk()
 
 
 def locked(folder: str) -> int | None:
-    """Lock a folder for this process, until it closes the returned descriptor or ends; None if locks do not exist.
+    """Lock a folder for this process until the returned descriptor is closed or the process ends.
+
+    None if the system has no locks.
 
     Raises
     ------
@@ -211,12 +214,12 @@ def locked(folder: str) -> int | None:
 
 
 def cores() -> int:
-    """Processors that this process may use."""
+    """Number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def docstring(documented: Callable[..., object] | None) -> str:
-    """Docstring of a class or function at the top of its module; from the source if Python dropped it (-OO)."""
+    """Docstring of a top-level class or function of a module; from the source if Python removed it (-OO)."""
     if sys.flags.optimize < 2:
         return documented.__doc__ or ""
     if documented is None:

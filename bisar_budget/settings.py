@@ -1,4 +1,4 @@
-"""A project's defaults for `check`: the table `[tool.bisar-budget]` of the nearest `pyproject.toml` that has it."""
+"""Defaults of a project for `check`: the table `[tool.bisar-budget]` of the nearest `pyproject.toml` that has one."""
 
 import os
 import re
@@ -34,12 +34,12 @@ SettingValues = Mapping[str, Any]
 
 
 class SettingsError(Exception):
-    """A table that cannot be used; the message names the file and the key."""
+    """The table of settings cannot be used; the message names the file and the key."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """The keys and values of the table; `file` is the file of the table, for messages."""
+    """Keys and values of the table; `file` is the file that contains it, for messages."""
 
     file: str
     values: SettingValues
@@ -53,7 +53,7 @@ def project_settings(folder: str, files: Files = DISK) -> Settings | None:
     Raises
     ------
     SettingsError
-        Not a regular file, neither UTF-8 nor TOML, an unknown key, or a value of the wrong type.
+        The file is not a regular file, or not TOML in UTF-8; a key is unknown, or a value has the wrong type.
     """
     folder = os.path.abspath(folder)
     while True:
@@ -68,7 +68,10 @@ def project_settings(folder: str, files: Files = DISK) -> Settings | None:
 
 @lru_cache(maxsize=4)
 def _parsed(file: str, data: bytes) -> Settings | None:
-    """The table of a `pyproject.toml`, None without it; cached, since every mission that names a part reads it."""
+    """Read the table of a `pyproject.toml`; None if it has none.
+
+    The result is cached, because each mission that names a part reads the table.
+    """
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -101,7 +104,7 @@ def _parsed(file: str, data: bytes) -> Settings | None:
 
 
 def _bytes_of(file: str, files: Files) -> bytes | None:
-    """Content of a file, None if the file does not exist."""
+    """Content of a file; None if the file does not exist."""
     try:
         data = files.content(file, _MAX_SETTINGS_BYTES, f"{file}:")
     except UnreadableError as error:

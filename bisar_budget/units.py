@@ -1,6 +1,6 @@
-"""Quantities as text: read `9.6 GHz` to SI, write SI as `9.60 GHz`.
+"""Quantities as text: read `9.6 GHz` as a number in SI, and write such a number as `9.60 GHz`.
 
-The module has its own small table, because general unit libraries read `3 dBi` as three ampere.
+The module has its own small table of units, because general unit libraries read `3 dBi` as three ampere.
 """
 
 import math
@@ -19,11 +19,11 @@ _MAX_QUANTITY_CHARACTERS = 64  # longer text is not a quantity
 
 
 class Dimension:
-    """A kind of quantity: its name with article, the unit of a bare number, every unit with its factor.
+    """Kind of quantity: its name with an article, the unit of a bare number, and all units with their factors.
 
-    `scales` maps each accepted unit to a factor and a divisor, one of them 1: dividing by a whole number keeps
-    decimals exact, 5 mm is 0.005 m to the bit. `usual` names the usual units if every number needs a unit; it is
-    empty if a bare number is in SI. `offsets` are units of decibels that are read by adding a number.
+    `scales` maps each accepted unit to a factor and a divisor, one of which is 1. Division by a whole number keeps
+    decimals exact: 5 mm is 0.005 m to the bit. `usual` names the usual units if every number needs a unit; it is
+    empty if a bare number is in SI. `offsets` are units of decibels to which a number is added when they are read.
     """
 
     def __init__(
@@ -40,12 +40,12 @@ class Dimension:
 
     @property
     def unit_names(self) -> tuple[str, ...]:
-        """Accepted units, as messages and documents list them."""
+        """Accepted units, as listed in messages and documents."""
         return (*filter(None, self.units), *self.offsets)
 
     @property
     def accepted(self) -> str:
-        """Words that list the accepted units of the number."""
+        """Text that lists the accepted units."""
         units = ", ".join(self.unit_names)
         if self.usual:
             return f"accepted: {self.name} in {units}; only zero needs no unit"
@@ -53,7 +53,7 @@ class Dimension:
 
 
 def _scale(factor: float) -> tuple[float, float]:
-    """Factor and divisor of a unit, one of them 1."""
+    """Factor and divisor of a unit, one of which is 1."""
     inverse = float(round(1 / factor))
     return (1.0, inverse) if inverse and abs(inverse * factor - 1) < 1e-12 else (factor, 1.0)
 
@@ -229,9 +229,9 @@ _OF_SI = {dimension.si: dimension for dimension in reversed(DIMENSIONS) if dimen
 
 
 def parse_quantity(value: object, dimension: Dimension) -> float:
-    """Read `31 km`, `9.6GHz`, `2 µrad`, `1e-12`; a bare number is in SI, or in decibels for a dimension in decibels.
+    """Read a quantity such as `31 km`, `9.6GHz`, `2 µrad` or `1e-12`.
 
-    A bare angle is refused, except zero.
+    A bare number is in SI, or in decibels for a dimension in decibels. A bare angle is refused, except zero.
 
     Parameters
     ----------
@@ -243,12 +243,12 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
     Returns
     -------
     float
-        Finite number in SI; decibels remain decibels.
+        Finite number in SI units; decibels remain decibels.
 
     Raises
     ------
     InvalidValueError
-        Not a number, not finite, an unknown unit, a unit of a different dimension, or no unit if a unit is required.
+        The value is not a finite number, its unit is unknown or of another dimension, or a required unit is missing.
     """
     plain = _plain_quantity(value) if type(value) is str else None
     if plain is not None:
@@ -262,7 +262,7 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
 
 
 def _parse_closely(value: object, dimension: Dimension) -> float:
-    """Read every accepted form of a quantity; an error says why a different form is wrong."""
+    """Read all accepted forms of a quantity; an error explains why another form is wrong."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise _invalid(f"must be {dimension.name}", dimension)
     if not isinstance(value, str):
@@ -310,7 +310,7 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
 
 
 def unit_behind(text: str) -> str:
-    """Unit after the number of a text, as written; the whole text if it has no number."""
+    """Unit after the number in a text, as written; the whole text if it has no number."""
     text = text.strip()
     match = _NUMBER.match(text)
     return text[match.end() :].strip() if match else text
@@ -319,7 +319,7 @@ def unit_behind(text: str) -> str:
 def given_unit(text: str, unit: str) -> str:
     """Unit of the number in a text, spelt as in the tables of units.
 
-    Empty if the text has no unit or is not a quantity of the dimension of `unit`, which is an SI unit.
+    Empty if the text has no unit, or is not a quantity of the same dimension as `unit`, which is an SI unit.
     """
     match = _NUMBER.match(text.strip()) if len(text) <= _MAX_QUANTITY_CHARACTERS else None
     dimension = _OF_SI.get(unit)
@@ -348,7 +348,7 @@ def format_in(value: float, unit: str, written_unit: str, digits: int = 3, round
 
 @cache
 def _pretty(written_unit: str) -> str:
-    """Write a unit of the tables for print: `um` is µm, `m/s^2` m/s², `deg/sqrt(h)` deg/√h, `1/s` /s."""
+    """Write a unit of the tables in print form: `um` as µm, `m/s^2` as m/s², `deg/sqrt(h)` as deg/√h, `1/s` as /s."""
     text = written_unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("°", "deg")
     text = re.sub(r"sqrt\((\w+)\)", r"√\1", text)
     text = re.sub(r"^u(?=m|g|s|rad|Gal)", "µ", text)
@@ -356,7 +356,7 @@ def _pretty(written_unit: str) -> str:
 
 
 def format_limit(limit: float, unit: str) -> str:
-    """Write a limit, rounded down; radians without a prefix, so that readers recognise π/4."""
+    """Write a limit, rounded down; radians have no prefix, so that readers recognise π/4."""
     return f"{_rounded(limit, 3, 'down')} rad" if unit == "rad" else format_quantity(limit, unit, 3, "down")
 
 
@@ -384,7 +384,7 @@ _SHEETS = {
 
 @cache
 def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
-    """Scale, range of sizes and text after the number, for each prefix; the unit without a prefix comes last."""
+    """Scale, range of sizes, and text after the number, for each prefix of a unit; without a prefix last."""
     if unit in _SHEETS:
         scale, suffix = _SHEETS[unit]
         return ((scale, 0.0, math.inf, suffix),)
@@ -397,7 +397,7 @@ def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
 
 
 def _stricter(level: float, digits: int) -> str:
-    """Write a negative level, rounded so that the text is not above the level."""
+    """Write a negative level, rounded so that the text does not exceed the level."""
     step = 10.0 ** (math.floor(math.log10(-level)) - digits + 1)
     return f"{math.floor(level / step * (1 - 1e-12)) * step:.{digits}g}"
 
@@ -429,7 +429,7 @@ def _finite(number: float, dimension: Dimension) -> float:
 
 @lru_cache(256)
 def normal_unit(unit: str) -> str:
-    """Spell a unit as in the tables of units: `µrad` is `urad`, `m/s²` is `m/s^2`, `°/√hr` is `deg/sqrt(h)`."""
+    """Spell a unit as in the tables of units: `µrad` as `urad`, `m/s²` as `m/s^2`, `°/√hr` as `deg/sqrt(h)`."""
     unit = unit.strip()
     for pattern, meant in _SPELLINGS:
         unit = re.sub(pattern, meant, unit)
@@ -441,7 +441,7 @@ def _invalid(problem: str, dimension: Dimension, hint: str = "") -> InvalidValue
 
 
 def _wrong_unit(digits: str, written: str, dimension: Dimension) -> InvalidValueError:
-    """Error for a unit that is unknown or belongs to a different dimension, with the unit that was probably meant."""
+    """Error for a unit that is unknown or of another dimension; its message suggests the intended unit."""
     unit = normal_unit(written)
     if unit.startswith(","):
         return _invalid("has a decimal comma", dimension, "Write a point")

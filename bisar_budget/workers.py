@@ -1,4 +1,4 @@
-"""Long work: its progress, its distribution, and worker processes that always end with the command."""
+"""Long computations: their progress, their distribution, and worker processes that always end with the command."""
 
 import os
 import signal
@@ -23,9 +23,9 @@ Result = TypeVar("Result")
 
 
 class MapBlocks(Protocol):
-    """Lets workers call a function with the common data and each block.
+    """Function that calls another function with common data for each block, in workers.
 
-    It gives each block with its result, in any order. `about` describes a block in messages.
+    It yields each block with its result, in any order. `about` describes a block in messages.
     """
 
     def __call__(
@@ -36,22 +36,23 @@ class MapBlocks(Protocol):
         about: Callable[[Block], str],
         /,
     ) -> Iterator[tuple[Block, Result]]:
-        """Map the blocks."""
+        """Call `function` with the common data and each block, and yield each block with its result."""
 
 
 _POOL_TIMEOUT_S = 10.0  # to wait for the pool's own thread, which ends as soon as its workers end
 
 
 def unseen(done: int, total: int) -> None:
-    """Progress that is not shown."""
+    """Ignore the progress of a computation."""
 
 
 @contextmanager
 def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExecutor]:
-    """Give a pool of processes that leaves no process behind.
+    """Context of a pool of processes that leaves no process behind.
 
-    `start` is `spawn` for fresh interpreters: a fork would copy the threads of a numerical library half way. A
-    `WorkerLostError` reports that a worker was ended from outside, as by the system when memory runs out.
+    `start` is `spawn` for fresh interpreters; a fork would copy the threads of a numerical library in an undefined
+    state. A `WorkerLostError` is raised if a worker is ended from outside, for example by the system when memory runs
+    out.
     """
     worker_count = set(threading.enumerate())
     pool = ProcessPoolExecutor(count, mp_context=get_context(start), initializer=_begin)
@@ -72,7 +73,10 @@ def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExe
 
 
 def in_processes(count: int) -> MapBlocks:
-    """Map blocks in `count` processes; results come in the order of the blocks, computed only a little in advance."""
+    """Return a function that maps blocks in `count` processes.
+
+    Results are in the order of the blocks, and are computed only a few blocks in advance.
+    """
 
     def mapped(
         function: Callable[[Common, Block], Result],
@@ -94,7 +98,7 @@ def in_processes(count: int) -> MapBlocks:
 
 
 def _begin() -> None:
-    """Begin a worker: leave interrupts to the parent, end with the parent, and hide warnings of libraries."""
+    """Set up a worker process: it ignores interrupts, ends with its parent, and hides warnings of libraries."""
     warnings.simplefilter("ignore")
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in ("SIGTERM", "SIGHUP"):  # a fork has the handlers of the command

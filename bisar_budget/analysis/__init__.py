@@ -1,4 +1,4 @@
-"""One mission analysed: its errors and their effects, the division of its budgets, the edge of its scene."""
+"""Analysis of one mission: its errors and their effects, the division of its budgets, the edge of its scene."""
 
 # What other rooms may use.
 __all__ = [

@@ -1,4 +1,4 @@
-"""Division of the budgets between transmitter, receiver and clock; the gain of autofocus and its bounds."""
+"""Division of the budgets between transmitter, receiver and clock, and the gain of autofocus with its bounds."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -21,10 +21,11 @@ EQUAL = Shares(transmitter=0.5, receiver=0.5)
 
 
 class Allocation(NamedTuple):
-    """The divided budgets. `qpe_total` and limits are in [rad], before autofocus; PSLR and ISLR share power.
+    """Budgets divided between the owners.
 
-    `n_pull` is the part of the file's `autofocus.n_pull` that counts, see `effective_n_pull`. `n_pull_stated` is the
-    file's value.
+    `qpe_total` is the total quadratic phase error before autofocus. [rad] `qpe`, `pslr` and `islr` are the shares of
+    the owners. The shares of PSLR and ISLR are shares of power. `n_pull` is the part of the file's `autofocus.n_pull`
+    that counts, see `effective_n_pull`. `n_pull_stated` is the value in the file.
     """
 
     qpe_total: float
@@ -36,25 +37,28 @@ class Allocation(NamedTuple):
 
     @property
     def autofocus_gain(self) -> Any:
-        """Factor on QPE limits: π·N_pull over the total, never below 1 (Section VI; 4·N_pull for π/4)."""
+        """Factor by which autofocus raises QPE limits: π·N_pull divided by the total, at least 1.
+
+        See Section VI. For a total of π/4 it is 4·N_pull.
+        """
         return _gain(self.n_pull, self.qpe_total)
 
     def qpe_limit(self, owner: str) -> float:
-        """QPE that an owner may use, before autofocus. [rad]"""
+        """Largest QPE that an owner may have without autofocus. [rad]"""
         return self.qpe.of(owner) * self.qpe_total
 
     def qpe_allowed(self, owner: str) -> Any:
-        """QPE that an owner may have, autofocus included. [rad]"""
+        """Largest QPE that an owner may have with autofocus. [rad]"""
         return self.qpe_limit(owner) * self.autofocus_gain
 
     def of(self, case: int) -> "Allocation":
-        """The budgets of one of many cases, in plain numbers."""
+        """Return the budgets of one of many cases in plain numbers."""
         return Allocation._make(_plain(figure, case) for figure in self)
 
     def passes_with(self, qpe: float, hidden: float, owner: str, mission: Mission) -> Note:
-        """Note on the N_pull from which a QPE of an owner would pass, or on why no autofocus corrects it.
+        """Note on the smallest N_pull with which an owner's QPE would pass, or on why autofocus cannot correct it.
 
-        Autofocus does not correct the `hidden` phase. The rest of the limit is for the quadratic phase. [rad]
+        Autofocus does not correct the `hidden` phase. The quadratic phase may use the rest of the limit. [rad]
         """
         room = 1 - (hidden / self.qpe_limit(owner)) ** 2
         if room <= 0:
@@ -70,7 +74,10 @@ def _gain(n_pull: float | None, qpe_total: float) -> PerCase:
 
 
 def autofocus_gain_of(mission: Mission) -> PerCase:
-    """Return the factor on QPE limits by a mission's autofocus. It does not depend on the division of the budget."""
+    """Return the factor by which a mission's autofocus raises QPE limits.
+
+    It does not depend on the division of the budget.
+    """
     return _gain(effective_n_pull(mission), mission.requirements.quadratic_phase_error)
 
 
@@ -81,20 +88,20 @@ def _plain(figure: Any, case: int) -> Any:
 
 
 def is_balanced(mission: Mission) -> bool:
-    """Whether the shares of the phase follow from the declared errors."""
+    """Whether the shares of the quadratic phase are set in proportion to the declared errors."""
     split = mission.allocation.split
     return (split.quadratic_phase_error if isinstance(split, MetricSplits) else split) == "balanced"
 
 
 def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
-    """Divide the budgets of a mission by its `allocation.split`.
+    """Divide the budgets of a mission according to its `allocation.split`.
 
     Parameters
     ----------
     mission : Mission
         Some of its numbers may be arrays (cases,). Shares that are `balanced` are then arrays too.
     gates : iterable of Together
-        Declared errors by each model that gates. Only `balanced` needs them: it weighs their phases.
+        Declared errors in each model that gates. They are needed only for `balanced`, which weighs their phases.
     """
     split = mission.allocation.split
     qpe, pslr, islr = (
@@ -111,7 +118,10 @@ def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
 
 
 def _balanced(gates: Sequence[Together]) -> Shares:
-    """Shares in proportion to the declared errors; with several models, by the larger judged phase of each error."""
+    """Shares in proportion to the phases of the declared errors.
+
+    With several models, the larger judged phase of each error counts.
+    """
     weights = []
     for owner in ("transmitter", "receiver"):
         by_model = zip(*(together.judged_parts(together.owed(EQUAL, owner)) for together in gates), strict=True)
@@ -144,15 +154,19 @@ ROOM = {"pga": 3.0, "map_drift": 1.5}  # smallest patch over smear
 
 
 class Caps(NamedTuple):
-    """Largest N_pull by range walk, f₀/B, and by the scene's size; None if the file gives no size.
+    """Largest useful N_pull: the bound f₀/B by range walk, and the bound by the scene's size.
 
-    No gain exceeds the bound of range walk; beyond the bound of the scene the report has a warning.
+    `scene` is None if the file gives no size. The gain is limited to the bound by range walk. Beyond the bound by the
+    scene's size, the report has a warning.
 
-    A phase of π·N at the aperture edge walks λN/2 in range, N·B/2f₀ cells, and smears a point over 4N cross-range
-    cells. Measured on images of points (`tests/simulate/test_pull_in_caps.py`): one-dimensional autofocus works up to
-    half a cell of walk and beyond, but half a cell costs 0.6 dB that no phase removes, a whole cell 1.3 dB. The patch
-    makes autofocus fail, for any walk and bandwidth: phase gradient needs three times the smear, map drift one and a
-    half times. With less they leave the image smeared at a hundredth of a cell of walk as at a third of a cell.
+    A phase of π·N at the aperture edge corresponds to a range walk of λN/2, which is N·B/2f₀ cells, and smears a
+    point over 4N cross-range cells. Images of points were used to measure the bounds
+    (`tests/simulate/test_pull_in_caps.py`). One-dimensional autofocus works for a walk of half a cell and more.
+    However, half a cell costs 0.6 dB that no phase correction recovers, and a whole cell 1.3 dB.
+
+    Autofocus fails if the patch is too small, for any walk and bandwidth. Phase gradient needs a patch of three times
+    the smear, map drift one and a half times. With a smaller patch the image stays smeared, for a walk of a hundredth
+    of a cell as well as for a third of a cell.
     """
 
     walk: float
@@ -160,7 +174,7 @@ class Caps(NamedTuple):
 
 
 def caps(mission: Mission) -> Caps:
-    """Bounds on N_pull that no autofocus of a mission exceeds."""
+    """Upper bounds on N_pull for any autofocus of a mission."""
     walk = range_walk_cap(mission)
     if mission.scene.radius is None:
         return Caps(walk)
@@ -169,12 +183,15 @@ def caps(mission: Mission) -> Caps:
 
 
 def range_walk_cap(mission: Mission) -> float:
-    """Largest N_pull that counts, f₀/B; a number, or an array of many cases."""
+    """Largest N_pull that counts, f₀/B, as a number or as an array (cases,)."""
     return mission.radar.center_frequency / mission.radar.bandwidth
 
 
 def effective_n_pull(mission: Mission) -> float | None:
-    """N_pull of the autofocus: the file's value, up to the cap of range walk; None: no autofocus is declared."""
+    """N_pull of the autofocus: the value in the file, limited to the bound by range walk.
+
+    None if no autofocus is declared.
+    """
     stated, cap = mission.autofocus.n_pull, range_walk_cap(mission)
     if stated is None:
         return None
@@ -182,14 +199,14 @@ def effective_n_pull(mission: Mission) -> float | None:
 
 
 def needed_sentence(n_pull: float, caps: Caps) -> Note:
-    """Note on the N_pull from which an error would pass, or that no N_pull can correct it.
+    """Note on the N_pull from which an error would pass, or on the bound that rules out such an N_pull.
 
     Parameters
     ----------
     n_pull : float
         Smallest N_pull with which the error passes.
     caps : Caps
-        Bounds of the mission by `caps`.
+        Bounds of the mission, from the function `caps`.
     """
     if caps.scene is not None and caps.scene < min(n_pull, caps.walk):
         allowed = f"the scene's size allows {rounded_down(caps.scene)}"
@@ -201,7 +218,10 @@ def needed_sentence(n_pull: float, caps: Caps) -> Note:
 
 
 def _up(number: float) -> str:
-    """Three digits, rounded up; whole from a hundred on, with a space between thousands."""
+    """Format a number with three digits, rounded up.
+
+    Numbers from 100 on are written as whole numbers with a space between thousands.
+    """
     if number >= 100:
         return f"{math.ceil(number * (1 - 1e-12)):,}".replace(",", " ")
     step = 10.0 ** (math.floor(math.log10(number)) - 2)
@@ -209,7 +229,10 @@ def _up(number: float) -> str:
 
 
 def rounded_down(number: float) -> str:
-    """Three digits, rounded down; whole from a hundred on, with a space between thousands."""
+    """Format a number with three digits, rounded down.
+
+    Numbers from 100 on are written as whole numbers with a space between thousands.
+    """
     if number >= 100:
         return f"{math.floor(number * (1 + 1e-12)):,}".replace(",", " ")
     return format_quantity(number, "", 3, "down")

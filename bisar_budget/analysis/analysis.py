@@ -1,6 +1,7 @@
-"""The analysis that a mission's checks share: geometry, every error it can have, and the effects by both models.
+"""Analysis shared by the checks of a mission: geometry, every possible error, and its effects in both models.
 
-Cases of one shape are analysed together. `Case` gives plain numbers of a single case, for the words of a report.
+Cases of the same structure are analysed together. `Case` gives plain numbers of a single case for the text of a
+report.
 """
 
 import math
@@ -38,7 +39,10 @@ __all__ = ["Analysis", "Case", "Model", "by_nodes"]
 def by_nodes(
     mission: Mission, cases: int, geometry: BistaticGeometry
 ) -> Iterator[tuple[int, NDArray[np.intp], Mission, BistaticGeometry]]:
-    """Cases of a mission that need the same number of nodes: the number, their indices, mission and geometry."""
+    """Group the cases of a mission that need the same number of nodes.
+
+    Yields the number of nodes, the indices of the cases, and their mission and geometry.
+    """
     T = np.broadcast_to(mission.collection.aperture_time, (cases,))
     counts = np.broadcast_to(nodes_for(geometry, T, has_direct_path=mission.has_direct_path), (cases,))
     for nodes in np.unique(counts).tolist():
@@ -51,7 +55,7 @@ def by_nodes(
 
 
 class Analysis:
-    """Cases of one mission, analysed once; a mission as it is loaded is one case.
+    """Analysis of the cases of one mission. A mission as loaded from its file is one case.
 
     Parameters
     ----------
@@ -66,10 +70,10 @@ class Analysis:
     shown : mapping of str to Subject, optional
         Ids of rows whose allowable is needed although the file declares no error; omitted: all rows.
     is_complete : bool
-        Compute all numbers of each row, not only the deciding numbers. A case then does not depend on the number of
-        cases.
+        Compute all numbers of each row, not only those that decide. The results of a case then do not depend on the
+        number of cases.
     is_of_sums : bool
-        Compute only the sums of errors: an error that counts in a sum needs no allowable of its own.
+        Compute only the sums of errors. An error that counts in a sum then needs no allowable of its own.
     """
 
     def __init__(
@@ -96,17 +100,20 @@ class Analysis:
 
     @cached_property
     def resolution(self) -> Resolution:
-        """Widths of the response without errors, (cases,)."""
+        """Widths of the impulse response without errors, (cases,)."""
         return resolution(self.exact, self.geometry, self.mission.radar, self.mission.collection.aperture_time)
 
     @cached_property
     def peak_loss_db(self) -> Floats:
-        """Loss of the peak by all declared errors, (cases,). [dB]"""
+        """Loss of the image peak due to all declared errors, (cases,). [dB]"""
         return peak_loss_db(self)
 
     @cached_property
     def errors(self) -> DeclaredErrors:
-        """Every error that the cases can have, declared or not, or the errors that are shown."""
+        """Errors of the cases.
+
+        These are all errors that the cases can have, or the declared errors and those in `shown` if it is given.
+        """
         return DeclaredErrors(
             self.mission,
             self.cases,
@@ -119,7 +126,7 @@ class Analysis:
 
     @cached_property
     def sources(self) -> list[ErrorSource]:
-        """The errors of one case in plain numbers, in the order of the contract."""
+        """Errors of a single case in plain numbers, in the order that the contract defines."""
         return [error.in_one_case() for error in self.errors.listed]
 
     @cached_property
@@ -136,7 +143,7 @@ class Analysis:
 
     @cached_property
     def slow_tones(self) -> dict[str, SlowTone]:
-        """Declared vibrations below three cycles per aperture, by the ids of their rows."""
+        """Declared vibrations below three cycles per aperture, as a mapping from the ids of their rows."""
         return slow_tones(self.mission, self.geometry, self.cases)
 
     @cached_property
@@ -146,11 +153,11 @@ class Analysis:
 
     @cached_property
     def displacing_tones(self) -> list[ToneDisplacement]:
-        """Displacement by each vibration and each tone of an oscillator, slow or fast."""
+        """Displacement of the image by each vibration and each tone of an oscillator, slow or fast."""
         return tone_displacements(self.mission, self.geometry, self.exact)
 
     def together(self, model: str) -> Together:
-        """The combined declared errors, by a model."""
+        """Declared errors combined in a model."""
         if model not in self._together:
             self._together[model] = Together(
                 self.errors, model, self.slow, self.displacing_tones, self.random, self.groups
@@ -164,7 +171,7 @@ class Analysis:
 
     @cached_property
     def published(self) -> Model:
-        """Tables I and II, and (25), which do not know a direct path."""
+        """The published model: Tables I and II, and (25). It does not include a direct path."""
         return Model(self.errors, "published")
 
     @cached_property
@@ -179,21 +186,28 @@ class Analysis:
 
     @property
     def gates(self) -> list[str]:
-        """Names of the models whose limits the mission must meet: one, or both if the stricter model decides."""
+        """Names of the models whose limits the mission must meet.
+
+        There is one name, or both if the stricter model decides.
+        """
         return [name for name in ("published", "full") if self.mission.gating_model in (name, "strictest")]
 
     def models(self, gating: str) -> tuple[Model, Model]:
-        """The model that gates, `published` or `full`, and then the second model."""
+        """The model that gates, `published` or `full`, followed by the other model."""
         return (self.full, self.published) if gating == "full" else (self.published, self.full)
 
     @cached_property
     def allocation(self) -> Allocation:
-        """Divided budgets; `balanced` weighs phases by the gating model, under `strictest` the larger of both."""
+        """Divided budgets.
+
+        A `balanced` division weighs the phases of the gating model, and under `strictest` the larger phases of both
+        models.
+        """
         return allocate(self.mission, (self.together(model) for model in self.gates))
 
 
 class Case:
-    """One of the cases that were analysed together.
+    """One case out of those that were analysed together.
 
     Parameters
     ----------
@@ -209,7 +223,7 @@ class Case:
         self.analysis, self.mission, self.place = analysis, mission or analysis.mission, place
 
     def number(self, column: PerCase | PerCaseFlag) -> float:
-        """The number of this case in a column (cases,). A single number counts for every case."""
+        """Number of this case in a column (cases,). A single number holds for every case."""
         return plain(column, self.place)
 
     @cached_property
@@ -219,12 +233,12 @@ class Case:
 
     @cached_property
     def resolution(self) -> Resolution:
-        """Widths of this case's response without errors."""
+        """Widths of the impulse response without errors in this case."""
         return Resolution._make(map(self.number, self.analysis.resolution))
 
     @cached_property
     def peak_loss_db(self) -> float | None:
-        """Loss of this case's peak by all declared errors; None without an image or a declared error. [dB]"""
+        """Loss of this case's peak due to all declared errors; None without an image or declared error. [dB]"""
         loss = self.number(self.analysis.peak_loss_db)
         return loss if math.isfinite(loss) else None
 
@@ -236,17 +250,20 @@ class Case:
 
     @cached_property
     def random(self) -> list[RandomError]:
-        """Errors of sensors and clocks of this case, in the order of the analysis."""
+        """Random errors of sensors, clocks and the air in this case, in the order of the analysis."""
         if self.analysis.is_by_itself:
             return self.analysis.random
         return [in_one_case(self.mission, error, self.place) for error in self.analysis.random]
 
     def does(self, model: Model, source: ErrorSource) -> Declared:
-        """Effect of a declared error by a model."""
+        """Effect of a declared error in a model."""
         return self.analysis.errors.does(model.name, source).in_one_case(self.place)
 
     def moved_by_tone(self, row_subject: Subject, model: str) -> GroundVector | None:
-        """Displacement by the tone of a row in the worst phases, by a model; None for a row without a tone. [m]"""
+        """Displacement by the tone of a row in its worst phases, in a model, east and north. [m]
+
+        None for a row without a tone, or without a displacement.
+        """
         for tone in self.analysis.displacing_tones:
             if tone.subject.id == row_subject.id:
                 east, north = map(self.number, tone.by(model))
@@ -254,5 +271,5 @@ class Case:
         return None
 
     def degeneracy(self, model: str) -> Note:
-        """Why a model has no displacement in this case; empty where it has a displacement."""
+        """Note on why a model has no displacement in this case; empty if it has one."""
         return self.analysis.errors.degeneracy(model, self.place)

@@ -1,10 +1,10 @@
-"""Loss of the peak of the image by all declared errors, in many cases at once.
+"""Loss of the image peak due to all declared errors, in many cases at once.
 
 At the image point an error of motion or of a clock leaves a range error ρ over the aperture. The peak keeps
-|⟨exp(ikρf/f₀)⟩|² of its power, with ⟨ ⟩ the mean over aperture and band: a direct sum. A random error keeps exp(-σ²)
-of the power, with σ² the variance of its phase; so does a tone of any phase. Losses of independent errors add in
-decibels, as the variances of their phases do to second order. Derived here. Images formed by direct sums check it in
-`tests/theory/test_image_point.py`.
+|⟨exp(ikρf/f₀)⟩|² of its power, computed as a direct sum, where ⟨ ⟩ is the mean over aperture and band. A random error
+whose phase has the variance σ² keeps exp(-σ²) of the power; so does a tone of any phase. Losses of independent errors
+add in decibels, as the variances of their phases do to second order. Derived here. Images formed by direct sums check
+it in `tests/theory/test_image_point.py`.
 """
 
 import math
@@ -29,10 +29,11 @@ _DB_OF_VARIANCE = 10 / math.log(10)
 
 @np.errstate(invalid="ignore")
 def peak_loss_db(analysis: "Analysis") -> Floats:
-    """Loss of the peak, (cases,). [dB]
+    """Loss of the image peak due to all declared errors, (cases,). [dB]
 
-    The mission's rule combines the losses of the errors: root-sum-square adds their decibels, a sum adds their roots,
-    and `each` takes the largest loss. NaN where an error leaves no image, or no error is declared.
+    The mission's rule combines the losses of the errors. Under root-sum-square the decibels add, under a sum their
+    square roots add, and under `each` the largest loss counts. NaN where an error leaves no image, or where no error
+    is declared.
     """
     errors, together = analysis.errors, analysis.together("full")
     losses = list(_losses_of_motion(analysis, together.motion))
@@ -56,9 +57,9 @@ def peak_loss_db(analysis: "Analysis") -> Floats:
 
 
 def _losses_of_motion(analysis: "Analysis", motion: Sequence[ErrorSource]) -> list[Floats]:
-    """Losses by errors of motion and of clocks, each by its worse sign. [dB]
+    """Losses due to errors of motion and of clocks, for the worse sign of each error. [dB]
 
-    The six errors of a covariance count as the independent errors that compose them.
+    The six errors of a covariance are replaced by the independent errors that compose them.
     """
     errors, together = analysis.errors, analysis.together("full")
     if not motion:
@@ -74,7 +75,7 @@ def _losses_of_motion(analysis: "Analysis", motion: Sequence[ErrorSource]) -> li
 
 
 def _range_errors_left(errors: DeclaredErrors, motion: Sequence[ErrorSource]) -> Floats:
-    """Range errors left by declared errors at their image points, (errors, signs, nodes, cases). [m]"""
+    """Range errors that declared errors leave at their image points, (errors, signs, nodes, cases). [m]"""
     does = [errors.does("full", error) for error in motion]
     east, north = np.moveaxis(np.array([(effect.displacement, effect.opposite) for effect in does]), 2, 0)
     size = np.array([errors.array(error.declared) for error in motion])
@@ -86,7 +87,10 @@ def _range_errors_left(errors: DeclaredErrors, motion: Sequence[ErrorSource]) ->
 
 
 def peak_losses(exact: ExactRanges, remaining: Floats) -> Floats:
-    """Losses of the peak by range errors left at the nodes, (..., nodes, cases) [m]; (..., cases). [dB]"""
+    """Losses of the peak due to range errors, (..., cases). [dB]
+
+    `remaining` are the range errors left at the nodes, (..., nodes, cases). [m]
+    """
     sampling = exact.sampling
     if (
         sampling.places.size <= SIGHT_POLYNOMIAL_COUNT

@@ -1,16 +1,17 @@
-"""The scene's edge: how far a quadratic phase error there differs from the one at the centre, in many cases at once.
+"""Change of the quadratic phase error from the scene centre to the scene's edge, for many cases at once.
 
-The paper's errors are spatially invariant; in the full model they are not. At a point p of the scene both platforms
-have other lines of sight: exact ranges are taken there, with p in place of the
-centre. One autofocus correction is one phase for the whole image, so that it leaves the difference behind. Against
-exact ranges and against images at 250 m and 1 km: `tests/simulate/test_scene_edge.py`. Derived here.
+The paper's errors are spatially invariant. In the full model they are not: at a point p of the scene both platforms
+have other lines of sight. The exact ranges are therefore computed with p in place of the scene centre. An autofocus
+correction is one phase for the whole image, so it does not remove the difference between p and the centre. Derived
+here. `tests/simulate/test_scene_edge.py` checks it against exact ranges and against images at 250 m and 1 km.
 
-What gates is the difference against the total budget, without the gain of autofocus: that is what must be left of any
-error after a correction. Without autofocus it is what the edge has more than the centre, where the rows stand; then,
-and with a correction that has its own bound, an edge whose phase itself exceeds a limit is a warning.
+The requirement is that this difference stays within the total budget, without the gain of autofocus, because it
+remains after an autofocus correction of any error. Without autofocus, the difference is the phase that the edge adds
+to that at the centre, to which the rows of the report refer. Without autofocus, and also with a correction that has a
+bound of its own, the report warns if the phase at the edge itself exceeds a limit.
 
-A place is a point of the ground of one of the cases; `of` says of which. Rows of arrays are errors, and below them
-the parts of those at random (`scene_random`).
+A place is a ground point of one of the cases. The argument `of` gives the index of the case of each place. The rows
+of arrays are the errors, followed by the parts of the random errors (`scene_random`).
 """
 
 import math
@@ -39,44 +40,45 @@ from bisar_budget.units import format_quantity
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """Tunings of the searches around the scene centre.
+    """Settings of the searches around the scene centre.
 
     Attributes
     ----------
     rim_points : int
-        Number of even points of a circle.
+        Number of evenly spaced points on a circle.
     wide_fraction : float
         Radius, as a fraction of the nearest slant range, above which a circle has twice as many points.
     nearest_m : float
         Distance between a platform and a ground point below which there is no image. [m]
     crest_fraction : float
-        Difference between a height and the predicted crest of a cosine that ends a climb, as a fraction of the crest.
-        The azimuth is then right to a degree.
+        A climb ends when a height differs from the predicted crest of the cosine by less than this fraction of the
+        crest. The azimuth is then accurate to a degree.
     crest_error_fraction : float
-        Error of a crest that is predicted from points of a rim, as a fraction of the crest.
+        Assumed error of a crest that is predicted from points of a rim, as a fraction of the crest.
     max_climb_rounds : int
-        Largest number of rounds of a climb, each in a quarter of the arc before.
+        Largest number of rounds of a climb. Each round searches a quarter of the previous arc.
     narrow_clearance_ratio : float
-        Clearance below which the points around it are searched, whatever their difference.
+        Clearance below which the surroundings of a point are searched, whatever its difference.
     max_radius_fraction : float
         Radius at which the search for a radius ends, as a fraction of the nearest slant range.
     radius_fraction : float
-        Error of a radius, as a fraction of it.
+        Tolerance of a radius, as a fraction of the radius.
     similar_size_fraction : float
         Difference between a size and the total below which large errors need no search, as a fraction of the total.
     max_azimuth_rounds : int
-        Number of worst azimuths along which a radius is searched before the whole circle is.
+        Number of worst azimuths along which a radius is searched before the whole circle is searched.
     probe_count : int
         Number of azimuths at which a large error is compared with a small one.
     small_phase_rad, small_phase_fraction : float
         Difference of one error that is taken as small: up to this phase [rad], or this fraction of the largest
         difference.
     azimuth_rad : float
-        Error of the azimuth of a largest difference; a cosine loses half its square. [rad]
+        Tolerance of the azimuth of a largest difference. A cosine loses half the square of this angle. [rad]
     folding_fraction : float
-        Area that gradients span, as a fraction of their area without an error, below which a point may have no image.
+        Area that the gradients span, as a fraction of their area without an error, below which a point may have no
+        image.
     cases_per_block, lanes_per_block : int
-        Number of cases, and of large errors at ground points, whose arrays stay in a cache.
+        Numbers of cases, and of large errors at ground points, whose arrays stay in a cache.
     """
 
     rim_points: int = 16
@@ -110,10 +112,14 @@ SizeAt = Callable[[Floats, Indices], Floats]  # sizes at radii, of some cases
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenePlaces:
-    """Quadratic phase of each error or part at places, (errors, places); how far they are from the centre's. [rad]
+    """Quadratic phase of each error or part at places, and its difference from the scene centre.
 
-    There is an image where the `clearance`, (places,), is above 1: the sine of the angle between the directions that
-    band and aperture resolve, over the least. It has the centre's sign: below zero they are parallel on the way.
+    `phases` (errors, places) are the quadratic phases. `size` (places,) is the combined size of the differences from
+    the phases at the centre. [rad]
+
+    `clearance` (places,) is the sine of the angle between the directions that band and aperture resolve, divided by
+    the smallest sine that gives an image. A place has an image if its clearance is above 1. The clearance is positive
+    at the centre. It is negative if the two directions become parallel between the centre and the place.
     """
 
     phases: Floats
@@ -122,21 +128,21 @@ class ScenePlaces:
 
     @property
     def has_image(self) -> Booleans:
-        """Whether an image can be formed there."""
+        """Whether an image can be formed at each place, (places,)."""
         return np.asarray(self.clearance > 1)
 
     @property
     def heights(self) -> Floats:
-        """Heights that a search along circles climbs, (2, places): the clearance, negative, and the size."""
+        """Heights for the search along circles, (2, places): the negative of the clearance, and the size."""
         return np.array((-self.clearance, self.size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rims:
-    """Circles about centres: where the largest difference is, that difference, and the phases around it. [rad]
+    """Circles around scene centres: largest difference from the centre, its azimuth, and phases on the circle. [rad]
 
-    Small errors are looked at, `phases` (errors, points, circles). Where a part has no image the difference is
-    infinite.
+    The differences assume that all errors are small. `phases` is (errors or parts, points, circles). The difference
+    is infinite where a part of the circle has no image.
     """
 
     azimuth: Floats
@@ -144,7 +150,7 @@ class Rims:
     phases: Floats
 
     def of(self, indices: Indices) -> "Rims":
-        """Circles of some indices."""
+        """Select the circles with the given indices."""
         return Rims(self.azimuth[indices], self.difference[indices], self.phases[..., indices])
 
 
@@ -152,38 +158,39 @@ Selection = int | Booleans | Indices | tuple[Indices, ...]  # of the cases
 
 
 class Heights(NamedTuple):
-    """Heights and their azimuths; of heights alike the larger azimuth is the higher."""
+    """Heights and their azimuths. Of two equal heights, the one with the larger azimuth counts as higher."""
 
     height: Floats
     azimuth: Floats
 
     @property
     def highest(self) -> "Heights":
-        """The highest along the first axis."""
+        """The highest entries along the first axis, with their azimuths."""
         height = self.height.max(axis=0)
         return Heights(height, np.where(self.height == height, self.azimuth, -math.inf).max(axis=0))
 
     def with_others(self, *candidates: "Heights") -> "Heights":
-        """The highest of these and the candidates, element by element."""
+        """The higher of these heights and the candidates, element by element."""
         return Heights(*map(np.array, zip(self, *candidates, strict=True))).highest
 
     def of(self, indices: Selection) -> "Heights":
-        """Heights of some indices."""
+        """Select the heights with the given indices."""
         return Heights(self.height[indices], self.azimuth[indices])
 
     def where(self, is_kept: Booleans, replacements: "Heights") -> "Heights":
-        """These where they are kept, elsewhere the replacements."""
+        """These heights where `is_kept` is true, and the replacements elsewhere."""
         return Heights(*(np.where(is_kept, *both) for both in zip(self, replacements, strict=True)))
 
     def put(self, indices: Selection, heights: "Heights") -> None:
-        """Put heights at indices."""
+        """Replace the heights at the given indices."""
         self.height[indices], self.azimuth[indices] = heights
 
 
 class ScenePhases:
     """Quadratic phases of the declared errors at any places of the scenes.
 
-    An error at random has a phase for each of its parts (`scene_random`): they follow those of the others, `members`.
+    Arrays have one row for each error of motion or of a clock (`members`). After them follow the rows of the random
+    errors, one row for each of their parts (`scene_random`).
     """
 
     def __init__(self, errors: DeclaredErrors, random: Sequence[RandomError] = ()) -> None:
@@ -207,15 +214,15 @@ class ScenePhases:
         self.nearest = errors.array(np.minimum(transmitter.slant_range, receiver.slant_range))
 
     def ranges_at(self, radius: Floats, azimuth: Floats, of: Indices) -> ExactRanges:
-        """Exact ranges of places."""
+        """Exact ranges at places given by radius [m] and azimuth [rad]."""
         return self.exact.at(*at(radius, azimuth), of)
 
     def places(self, radius: Floats, azimuth: Floats, of: Indices) -> ScenePlaces:
-        """Phases of the errors at ground points, combined size of their differences from the centre, clearances."""
+        """Phases of the errors at ground points, combined differences from the centre, and clearances."""
         return self.there(self.ranges_at(radius, azimuth, of), of)
 
     def there(self, there: ExactRanges, of: Indices) -> ScenePlaces:
-        """The same where exact ranges are taken."""
+        """Return the same as `places`, for places whose exact ranges are known."""
         centre = self.centre.take(of, axis=1)
         phases = self.random.there(there, of)
         if self.members:
@@ -229,7 +236,10 @@ class ScenePhases:
         return ScenePlaces(phases, self.together(phases - centre, of), clearance)
 
     def together(self, phases: Floats, of: Indices, indices: Sequence[int] | None = None) -> Floats:
-        """Phases of the errors, or of some of them, combined; those of a covariance with their correlations. [rad]"""
+        """Combine the phases of all errors, or of the errors with the given indices. [rad]
+
+        The phases of a covariance are combined with their correlations.
+        """
         phases_of_errors = self.of_errors(phases)
         if indices is None and not self.groups:
             return np.asarray(combined(list(phases_of_errors), self.combine))
@@ -239,19 +249,26 @@ class ScenePhases:
         return np.asarray(np.broadcast_to(total, phases.shape[1:]))
 
     def of_errors(self, phases: Floats) -> Floats:
-        """Phases of the errors, (errors, ...), of one at random the sigma, by those of their parts. [rad]"""
+        """Phase of each error, (errors, ...), from the phases of errors and parts. [rad]
+
+        The phase of a random error is its sigma, computed from its parts.
+        """
         count = len(self.members)
         return np.concatenate((phases[:count], self.random.of_errors(phases[count:])))
 
     def differences(self, radius: Floats, azimuth: Floats, of: Indices) -> Floats:
-        """Phase of each error there less that at the centre; by the worse sign of the large ones. [rad]"""
+        """Phase of each error at places less its phase at the centre. Large errors have their worse sign. [rad]"""
         return self.around(radius, azimuth, of, self.is_large.take(of, axis=1))[1]
 
     def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Booleans) -> tuple[Floats, Floats, Floats]:
-        """The same were all errors small; with some taken exactly, (errors, places); and how gradients turn.
+        """Differences of the phases from the centre, to first order and by exact ranges, and the least area ratio.
 
-        That is the least of what range and Doppler gradients span where each of these leads, over what they span
-        without it: 0 where there is no image.
+        Returns three arrays. The first, (errors, places), holds the differences if all errors were small. [rad] The
+        second is the same, with exact ranges for the errors marked in `exact`. [rad]
+
+        The third, (places,), is the smallest ratio, over the errors marked in `exact`, of two areas that the range
+        and Doppler gradients span: the area at the point to which the error moves the image, and the area without the
+        error. It is 0 where there is no image.
         """
         there = self.ranges_at(radius, azimuth, of)
         small = self.there(there, of).phases - self.centre.take(of, axis=1)
@@ -265,7 +282,7 @@ class ScenePhases:
     def _exactly(
         self, there: ExactRanges, of: Indices, error: Indices, point: Indices, kept: tuple[Floats, Floats]
     ) -> None:
-        """Put what exact ranges say into the differences and turns of some errors at places."""
+        """Replace the differences and area ratios of some errors at places by the results of exact ranges."""
         (differences, turns), case, count = kept, of[point], error.size
         lanes = self._lanes.of((self._rows[:, error] * self.errors.cases + case).reshape(-1))
         lanes = replace(lanes, case=np.tile(point, 2))
@@ -282,19 +299,19 @@ class ScenePhases:
 
     @cached_property
     def _rows(self) -> Indices:
-        """Places of the errors of each sign among `_lanes`, in lanes of all cases, (2, errors)."""
+        """Position of each large error in the lanes of `_lanes`, for each sign, (2, errors)."""
         lane = np.cumsum(self.is_large.any(axis=1)) - 1
         return np.array((2 * lane, 2 * lane + 1))
 
     @cached_property
     def _lanes(self) -> Lanes:
-        """Lanes of the errors that are large in any case, in all of them, of each sign."""
+        """Lanes, in all cases and for both signs, of the errors that are large in any case."""
         large = np.flatnonzero(self.is_large.any(axis=1))
         return self.errors.lanes(*(self.members[i] for i in large), signs=(1.0, -1.0))
 
     @cached_property
     def _by_sign(self) -> Floats:
-        """Quadratic phases of large errors at the centre, of each sign, (2, errors, cases). [rad]"""
+        """Quadratic phases of the large errors at the centre for each sign, (2, errors, cases). [rad]"""
         phases = np.full((2, *self.is_large.shape), math.nan)
         for i in np.flatnonzero(self.is_large.any(axis=1)):
             phases[:, i] = self.errors.quadratic_by_sign(self.members[i])
@@ -302,7 +319,10 @@ class ScenePhases:
 
     @cached_property
     def more(self) -> Floats:
-        """Quadratic phase at the centre beyond that of a small error, by the worse sign, (errors, cases). [rad]"""
+        """Quadratic phase at the centre by exact ranges less the first-order phase, (errors, cases). [rad]
+
+        The sign of the error is its worse sign. The value is 0 for errors that are not large.
+        """
         exactly = self.centre.copy()
         for index, error in enumerate(self.members):
             exactly[index] = self.errors.does("full", error).qpe
@@ -310,14 +330,15 @@ class ScenePhases:
 
     # ------------------------------------------------------------------ circles
     def points(self, radius: Floats, of: Indices) -> Indices:
-        """Number of even points that circles need."""
+        """Number of evenly spaced points that each circle needs."""
         return np.where(radius <= _SCENE.wide_fraction * self.nearest[of], _SCENE.rim_points, 2 * _SCENE.rim_points)
 
     def rims(self, radius: Floats, of: Indices) -> Rims:
-        """Evaluate circles that need the same number of points, evenly and around their worst point.
+        """Evaluate circles that need the same number of points, at even points and around the worst point of each.
 
-        That is where the difference is largest; and where a clearance is least, if it comes near to 1: a difference
-        grows there as its inverse, in an arc that points of a circle may miss.
+        The worst point is the point with the largest difference. The surroundings of the smallest clearance are
+        searched too if that clearance comes close to 1. There the difference grows as the inverse of the clearance,
+        within an arc that the even points may miss.
         """
         count, circles = int(self.points(radius, of)[0]), np.arange(of.size)
 
@@ -349,18 +370,22 @@ def at(radius: float, azimuth: float) -> tuple[float, float]: ...
 @overload
 def at(radius: Floats, azimuth: Floats) -> tuple[Floats, Floats]: ...
 def at(radius: PerCase, azimuth: PerCase) -> tuple[PerCase, PerCase]:
-    """Place on the ground, east and north. [m]"""
+    """Ground point at a radius [m] and azimuth [rad] from the scene centre, east and north. [m]"""
     return radius * np.cos(azimuth), radius * np.sin(azimuth)
 
 
 # ---------------------------------------------------------------------- climbs
 def _tops(heights: Floats, look: Callable[[Floats, Indices], Floats]) -> tuple[Heights, Heights]:
-    """Climb from each of the even points of circles, (2, points, circles), that is above its neighbours.
+    """Climb to the local maxima of heights on circles, from the even points that are above their neighbours.
 
-    Heights are clearances, less than nothing, and sizes, as `look` has them at azimuths of circles. Arrived at are
-    tops of the clearances and of the sizes, (points, circles) each; minus infinity where none climbed. Left out are
-    clearances that do not seem to come below `narrow_clearance_ratio`, and sizes that seem to stay below the
-    highest by more than a crest may be off; a valley that is milder at the points may be the deeper between them.
+    `heights` (2, points, circles) are the negative clearances and the sizes. `look` returns both at given azimuths of
+    given circles. The result is the maxima of the negative clearances and the maxima of the sizes, (points, circles)
+    each. It is minus infinity where no climb started.
+
+    Two kinds of starting points are left out: clearances that are not expected to fall below
+    `narrow_clearance_ratio`, and sizes that are expected to stay below the highest size by more than the error of a
+    predicted crest. All other minima of the clearance are searched, not only the lowest, because the true minimum
+    between the even points may be beside a higher one.
     """
     arc = 2 * math.pi / heights.shape[1]
     before, after = np.roll(heights, 1, axis=1), np.roll(heights, -1, axis=1)
@@ -388,10 +413,10 @@ def _tops(heights: Floats, look: Callable[[Floats, Indices], Floats]) -> tuple[H
 
 
 def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, arc: float) -> Heights:
-    """Climb to the highest near places of circles whose sides, an arc away, are no higher.
+    """Climb to the maximum near each starting point, whose neighbours at a distance `arc` are not higher.
 
-    Linear in the radius, a height is a constant and a cosine of the azimuth. Where its crest does not tell the height
-    there, it is looked for again in a quarter of the arc.
+    To first order in the radius, a height is a constant plus a cosine of the azimuth. If the predicted crest of this
+    cosine differs from the height computed there, the search is repeated in a quarter of the arc.
     """
     best, here, climbers = Heights(*map(np.array, start)), start, np.arange(start.height.size)
     for _ in range(_SCENE.max_climb_rounds):
@@ -413,7 +438,7 @@ def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, 
 
 
 def _crest(before: Floats, after: Floats, middle: Floats, arc: float) -> tuple[Floats, Floats]:
-    """Offset from the middle of three points an arc apart to the crest of the cosine through them, and its height."""
+    """Offset from the middle of three points, `arc` apart, to the crest of their cosine, and the crest's height."""
     sine = (after - before) / (2 * math.sin(arc))
     cosine = (middle - (after + before) / 2) / (1 - math.cos(arc))
     offset = np.minimum(np.maximum(np.arctan2(sine, cosine), -arc), arc)
@@ -421,9 +446,10 @@ def _crest(before: Floats, after: Floats, middle: Floats, arc: float) -> tuple[F
 
 
 class _Climb:
-    """The largest differences on circles, errors of any size counted.
+    """Search for the largest differences on circles, for errors of any size.
 
-    They are climbed from the highest of some places of each circle, and of where it is largest of small errors.
+    The search starts from the highest of several places on each circle. One of these places is the azimuth where the
+    difference is largest for small errors.
     """
 
     def __init__(self, phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> None:
@@ -433,7 +459,7 @@ class _Climb:
         self.lowest = Heights(np.full(of.size, -math.inf), np.zeros(of.size))  # turns and azimuths, negative
 
     def largest(self) -> Heights:
-        """The largest differences [rad]; where there is no image somewhere they are infinite."""
+        """The largest differences [rad] with their azimuths; infinite if a part of the circle has no image."""
         azimuth, bent_circles = self.rims.azimuth.copy(), np.flatnonzero(self.bent.any(axis=0))
         if bent_circles.size:
             azimuth[bent_circles] = self._azimuths(bent_circles) % (2 * math.pi)
@@ -441,7 +467,10 @@ class _Climb:
         return Heights(self.phases.together(differences, self.of), azimuth)
 
     def _bent(self) -> Booleans:
-        """Which of the large errors differ otherwise than small ones do: seen at three places, two harmonics show."""
+        """Mark the large errors whose differences vary around the circle in another way than for small errors.
+
+        The differences are compared at three azimuths, which reveal two harmonics.
+        """
         thirds = self.rims.azimuth + 2 * math.pi * np.arange(_SCENE.probe_count)[:, None] / _SCENE.probe_count
         radius, of, large = (
             np.tile(self.radius, _SCENE.probe_count),
@@ -456,7 +485,10 @@ class _Climb:
         return np.asarray(is_bent.reshape(len(large), _SCENE.probe_count, -1).any(axis=1))
 
     def _look(self, circles: Indices, azimuths: Floats) -> Heights:
-        """The largest of differences at azimuths (n, circles); the least turns are kept in mind."""
+        """The largest of the differences at azimuths (n, circles). [rad]
+
+        The smallest area ratios of `ScenePhases.around` found so far are kept in `lowest`.
+        """
         count = len(azimuths)
         of, bent = np.tile(self.of[circles], count), np.tile(self.bent[:, circles], count)
         _, differences, turns = self.phases.around(
@@ -467,10 +499,11 @@ class _Climb:
         return Heights(self.phases.together(differences, of).reshape(count, -1), azimuths).highest
 
     def _azimuths(self, circles: Indices) -> Floats:
-        """Azimuths of the largest differences, or of places without an image, the bent errors taken exactly. [rad]
+        """Azimuths of the largest differences, or of places without an image. [rad]
 
-        Where gradients become parallel the image ends, on an arc that may lie between the places that are looked at:
-        it is also sought where they are nearest to parallel.
+        The errors marked in `bent` are computed by exact ranges. The image ends where the gradients become parallel.
+        This may happen on an arc between the azimuths examined, so the search also runs towards the azimuth where the
+        gradients are nearest to parallel.
         """
         even = np.broadcast_to(2 * _ARC * np.arange(_SCENE.rim_points)[:, None], (_SCENE.rim_points, circles.size))
         top = self._look(circles, np.concatenate((self.rims.azimuth[circles][None], even)))
@@ -502,9 +535,9 @@ class _Climb:
 def differences_at(
     errors: DeclaredErrors, radius: float, azimuth: float, random: Sequence[RandomError] = ()
 ) -> list[tuple[str, float]]:
-    """Phase of each error of one case at a place less that at the centre, by row id, in the file's order. [rad]
+    """Phase of each error at a place of one case less its phase at the centre, as pairs of row id and phase. [rad]
 
-    Of one at random it is the sigma, coverage factor included.
+    The errors are in the order of the file. The value of a random error is its sigma, coverage factor included.
     """
     phases = ScenePhases(errors, random)
     differences = phases.of_errors(
@@ -516,11 +549,12 @@ def differences_at(
 # ---------------------------------------------------------------------- edges
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneEdges:
-    """Differences that the edges of the scenes of many cases add.
+    """Changes of the phases from the centre to the edges of the scenes, for many cases. [rad]
 
-    `rim` is where small errors differ most from the centre, `largest` where errors of their size do, combined as the
-    mission says [rad]; infinite where there is no image. `over` are the phases [rad], (names, cases), of the errors
-    that are inside their `limit` at the centre and over it at the edge; else 0.
+    `rim` has the largest combined difference from the centre and its azimuth if all errors were small. `largest` has
+    the same for the declared sizes. Both combine the errors by the mission's rule, and are infinite where there is no
+    image. `over` (names, cases) are the phases at the edge of the errors or sums that meet their `limit` at the
+    centre but exceed it at the edge. For all others `over` is 0.
     """
 
     phases: ScenePhases
@@ -533,30 +567,32 @@ class SceneEdges:
 
     @property
     def difference(self) -> Floats:
-        """The largest of the phases between edge and centre. [rad]"""
+        """The largest combined difference of the phases between edge and centre, (cases,). [rad]"""
         return self.largest.height
 
     @property
     def has_doubt(self) -> Booleans:
-        """Whether an error is over its limit at the edge alone."""
+        """Cases in which an error exceeds its limit at the edge, but not at the centre."""
         return np.asarray((self.over > 0).any(axis=0))
 
 
 def scene_edges(
     errors: DeclaredErrors, random: Sequence[RandomError], limits: Mapping[str, Floats], split: Shares
 ) -> SceneEdges | None:
-    """Evaluate the errors of many cases at the edges of their scenes; None without a declared error.
+    """Evaluate the errors of many cases at the edges of their scenes.
+
+    Returns None if no error is declared.
 
     Parameters
     ----------
     errors : DeclaredErrors
-        Of missions with `scene.radius`.
+        Errors of missions that state `scene.radius`.
     random : sequence of RandomError
-        Of the same, declared or not.
+        Random errors of the same missions, declared or not.
     limits : mapping of str to (cases,)
-        What each owner's phases are held to, autofocus gain included. [rad]
+        Limit of the phase of each owner, autofocus gain included. [rad]
     split : Shares
-        Whose errors count against whose limit.
+        Division of the budget, which determines the errors that count against each limit.
     """
     phases = ScenePhases(errors, random)
     if not phases.ids:
@@ -600,7 +636,7 @@ def _evaluate(edges: SceneEdges, members: Sequence[Sequence[int]], of: Indices) 
 
 
 def _largest(phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> Heights:
-    """Largest differences on circles, errors of any size counted. [rad]"""
+    """Largest differences on circles with their azimuths, for errors of any size. [rad]"""
     largest = Heights(rims.difference.copy(), rims.azimuth.copy())
     large_circles = np.flatnonzero(np.isfinite(rims.difference) & phases.is_large[:, of].any(axis=0))
     if large_circles.size:
@@ -611,12 +647,15 @@ def _largest(phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> He
 
 
 def _over_at_the_edge(edges: SceneEdges, members: Sequence[Sequence[int]], of: Indices, rims: Rims) -> Floats:
-    """Combined phases above their limits at the edge but not at the centre, (names, of); 0 for all others. [rad]"""
+    """Combined phases that exceed their limits at the edge but not at the centre, (names, of). [rad]
+
+    The value is 0 for all others.
+    """
     phases, limit = edges.phases, edges.limit[:, of] * _LIMIT_FACTOR
     more = phases.more[:, of]
 
     def combined_phases(at_points: Floats) -> Floats:
-        """Phases as they are held to limits, (names, ..., of)."""
+        """Phases as they are compared with the limits, (names, ..., of). [rad]"""
         if phases.combine == "each":
             return np.abs(phases.of_errors(at_points))
         return np.array([phases.together(at_points, of, indices) for indices in members])
@@ -633,12 +672,14 @@ def _over_at_the_edge(edges: SceneEdges, members: Sequence[Sequence[int]], of: I
 
 # ---------------------------------------------------------------------- one correction
 class Corrections:
-    """How far from the centre one autofocus correction serves: where differences stay inside a total. [rad]
+    """Distance from the scene centre within which one autofocus correction is sufficient.
+
+    Within this distance the differences of the phases from the centre stay within a total. [rad]
 
     Attributes
     ----------
     farthest : (cases,)
-        How far it is searched for. [m]
+        Largest radius that the search examines. [m]
     """
 
     def __init__(self, edges: SceneEdges, total: PerCase) -> None:
@@ -647,9 +688,9 @@ class Corrections:
 
     @cached_property
     def served(self) -> Floats:
-        """Radius at which the largest difference reaches the total, (cases,); infinite where it does not by then.
+        """Radius at which the largest difference reaches the total, (cases,). [m]
 
-        Not a number where an edge has no image. [m]
+        Infinite if the difference stays within the total up to `farthest`. NaN if the edge has no image.
         """
         radii = np.full(self.total.shape, math.nan)
         cases = np.flatnonzero(np.isfinite(self.edges.rim.height) & np.isfinite(self.edges.difference))
@@ -679,9 +720,9 @@ class Corrections:
         return radii
 
     def _served_of_small(self, of: Indices) -> Floats:
-        """The same, were effects of all errors proportional to them.
+        """Return the radii of `served` if the effects of all errors were proportional to their sizes. [m]
 
-        Along the worst azimuth, and again where the rim at the radius found has a worse one.
+        The search runs along the worst azimuth. It is repeated if the rim at the radius found has a worse azimuth.
         """
         total, high, radii = self.total[of], self.edges.radius[of], np.full(of.size, math.inf)
         size, azimuth = self.edges.rim.of(of)
@@ -715,7 +756,7 @@ class Corrections:
     def _grow(
         self, size_at: SizeAt, of: Indices, searched: Indices, low: Floats, below: Floats, high: Floats, size: Floats
     ) -> None:
-        """Look farther out until a size passes the total, or as far as it is searched for."""
+        """Increase the radii until the size exceeds the total, or until `farthest` is reached."""
         total, farthest = self.total[of], self.farthest[of]
         while True:
             searched = searched[(size[searched] <= total[searched]) & (high[searched] < farthest[searched])]
@@ -727,7 +768,10 @@ class Corrections:
             size[searched] = size_at(high[searched], searched)
 
     def _crests(self, radius: Floats, of: Indices, *, of_small: bool = True) -> Heights:
-        """Largest differences on circles; of errors of any size, or were all of them small. [rad]"""
+        """Largest differences on circles with their azimuths. [rad]
+
+        With `of_small`, all errors are taken as small; otherwise they have their declared sizes.
+        """
         largest, counts = Heights(np.empty(of.size), np.empty(of.size)), self.phases.points(radius, of)
         for count in np.unique(counts):
             circles = np.flatnonzero(counts == count)
@@ -744,18 +788,18 @@ def where(
     inside: tuple[Floats, Floats],
     outside: tuple[Floats, Floats],
 ) -> Floats:
-    """Radii, to a thousandth, up to which sizes are inside a total: by secants, drawn near (Illinois).
+    """Find the radii up to which sizes stay within a total, to a thousandth, by the Illinois secant method.
 
     Parameters
     ----------
     size_at : callable
-        Sizes at radii (searched,), of cases (searched,).
+        Function of radii (searched,) and the indices of their cases (searched,) that returns sizes.
     total : (n,)
-        What the sizes are held to.
+        Limit of the sizes.
     searched : (searched,)
-        Indices, of n, that are searched.
+        Indices, out of n, of the cases to search.
     inside, outside : (radius, size) of (n,)
-        Between these.
+        Radii with their sizes inside and outside the total, between which the solution lies.
     """
     (low, below), (high, above) = ([values[searched].copy() for values in pair] for pair in (inside, outside))
     slack = total[searched] * _SCENE.radius_fraction / 2
@@ -787,9 +831,9 @@ class SceneEdge(NamedTuple):
     """Largest change of the quadratic phase from the scene centre to the edge of one mission's scene, with notes.
 
     `difference` is this change [rad], combined by the mission's rule, at `azimuth` on the rim. `autofocus_radius` is
-    the radius within which the change stays inside the total budget [m], or None if it does so as far as `searched`
-    [m]. `degeneracy` says why a part of the edge has no image. `doubt` names an error that is over its limit at the
-    edge, but not at the centre.
+    the radius within which the change stays within the total budget. [m] It is None if the change stays within the
+    budget up to the radius `searched`. [m] `degeneracy` is the reason why a part of the edge has no image. `doubt`
+    names an error that exceeds its limit at the edge, but not at the centre.
     """
 
     radius: float
@@ -802,7 +846,7 @@ class SceneEdge(NamedTuple):
 
     @classmethod
     def of(cls, corrections: Corrections, mission: Mission, case: int = 0) -> "SceneEdge":
-        """That of one case, with its mission."""
+        """Create the scene edge of one case, given the mission of that case."""
         edges = corrections.edges
         (size, rim), (difference, azimuth) = (map(float, heights.of(case)) for heights in (edges.rim, edges.largest))
         radius, nowhere = float(edges.radius[case]), (math.nan, 0.0, None)
@@ -824,7 +868,7 @@ class SceneEdge(NamedTuple):
         return cls(radius, difference, azimuth, within, searched, NOTHING, doubt)
 
     def notes(self, total: float) -> tuple[Note, ...]:
-        """Where the difference is largest, and how far one autofocus correction serves."""
+        """Notes on the azimuth of the largest difference and the radius that one autofocus correction covers."""
         if not self.difference:
             return (phrases.note("same-at-the-edge"),)
         largest = phrases.note("largest-at-the-edge", azimuth_deg=math.degrees(self.azimuth), radius=self.radius)
@@ -832,14 +876,14 @@ class SceneEdge(NamedTuple):
 
     @property
     def served(self) -> str:
-        """How far one correction serves, in words."""
+        """Text that gives the radius within which one autofocus correction is sufficient."""
         if self.autofocus_radius is None:
             return f"beyond the scene ({format_quantity(self.searched, 'm', 3, 'down')})"
         return f"up to {format_quantity(self.autofocus_radius, 'm', 3, 'down')} from the centre"
 
 
 def _degeneracy(mission: Mission, ground_point: GroundVector) -> str:
-    """Why a place of the ground has no image."""
+    """Reason why a ground point has no image."""
     (east, north), geometry = ground_point, mission.geometry
     transmitter, receiver = (
         replace(state, position=(state.position[0] - east, state.position[1] - north, state.position[2]))

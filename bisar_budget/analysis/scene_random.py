@@ -1,22 +1,23 @@
-"""Quadratic phases of errors without a sign, at places of a scene: of sensors, clocks, the air, and slow vibrations.
+"""Quadratic phases of errors without a sign at places of a scene: sensors, clocks, air and slow vibrations.
 
-An error at random is a sum of independent parts, each with a course over the aperture that is known but for its size:
-an axis of a bias, an axis and an order of noise. One flight has one size of each for the whole scene. So what two
-places differ by is the difference of each part, and of the error the root-sum-square of these; the difference of two
-root-sum-squares is less.
+A random error is a sum of independent parts. The variation of each part over the aperture is known except for its
+size. A part is, for example, one axis of a bias, or one axis and one order of noise. In one flight each part has one
+size for the whole scene. The difference of the error between two places is therefore the root-sum-square of the
+differences of its parts. The difference of two root-sum-squares would be smaller.
 
-- What moves a platform is seen from each place along its line of sight.
-- A clock moves nothing: a place has the phase of the centre, and what the constant and the linear term add where the
-  displacement they make is another one. These terms are those of the displacement at the centre. What the file leaves
-  open of them, as of a free oscillator, is not counted, and the report says so.
-- A delay of the zenith is that of the whole scene; each place sees its leg at another elevation. One that changes
-  within the aperture is as many independent courses as its correlation takes.
-- The phase of a slow vibration is not known: cosine and sine are parts of one size, and the worst phase has the root
-  of the sum of their squares. Its axes may have any phases, so that they add up. One along the line of sight moves
-  along that of the centre.
+- An error that moves a platform is projected on the line of sight from each place.
+- A clock error moves no platform. A place has the phase of the centre, plus the phase that the constant and the
+  linear term add because their displacement differs at this place. These terms are the terms of the displacement at
+  the centre. Terms that the file leaves open, as for a free oscillator, are not counted, and the report contains a
+  note on that.
+- A zenith delay is the same for the whole scene, and each place has its own elevation of the leg. A delay that
+  changes within the aperture consists of as many independent parts as its correlation requires.
+- A slow vibration has an unknown phase. Its cosine and sine are parts of the same size, and the worst phase is the
+  root-sum-square of both. The axes may vibrate in any phase, so their effects add. A vibration stated along the line
+  of sight moves along the line of sight of the centre.
 
-What is stated by its effect alone is that all over the scene. Against exact ranges:
-`tests/simulate/test_random_at_scene_edge.py`. Derived here.
+An error that is stated only by its effect has this effect at every place of the scene. Derived here.
+`tests/simulate/test_random_at_scene_edge.py` checks it against exact ranges.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -53,14 +54,14 @@ _CLOCKS = ("oscillator", "synchronization")  # kinds of errors that move nothing
 
 
 class RandomPhases:
-    """Declared errors without a sign of many cases, at any places of their scenes.
+    """Declared errors without a sign, for many cases, at any places of their scenes.
 
     Attributes
     ----------
     subjects : list of Subject
-        What they are.
+        Subjects of the errors.
     centre : (parts, cases)
-        Quadratic phases of their parts at the centre. [rad]
+        Quadratic phases of the parts of all errors at the scene centre. [rad]
     """
 
     def __init__(self, errors: DeclaredErrors, random: Sequence[RandomError]) -> None:
@@ -74,11 +75,11 @@ class RandomPhases:
         self._first_rows, self._groups = (np.cumsum([0, *counts])[:-1].astype(int) for counts in (sizes, groups))
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phases of the parts where exact ranges are taken, (parts, places). [rad]"""
+        """Quadratic phases of the parts at the places of exact ranges, (parts, places). [rad]"""
         return np.concatenate([np.zeros((0, of.size)), *(error.there(there, of) for error in self._errors)])
 
     def of_errors(self, phases: Floats) -> Floats:
-        """Phases of the errors, (errors, ...), by those of their parts, (parts, ...). [rad]"""
+        """Phase of each error, (errors, ...), from the phases of its parts, (parts, ...). [rad]"""
         if not self._errors:
             return phases
         of_groups = np.sqrt(np.add.reduceat(np.square(phases), self._first_rows, axis=0))
@@ -87,14 +88,17 @@ class RandomPhases:
 
 # ---------------------------------------------------------------------- one error at places
 class _Moving(NamedTuple):
-    """An error of the paths of platforms; its parts are in groups, each a root-sum-square, which add up."""
+    """A random error of the motion of platforms.
+
+    Its parts form `groups`. Each group is combined as a root-sum-square, and the results of the groups add.
+    """
 
     moves: Sequence[Moves]
     size: Floats
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phase of each way and course, (parts, places). [rad]"""
+        """Quadratic phase of each direction and variation of the motion, (parts, places). [rad]"""
         weights, (total, seen) = there.phase_weights[0], np.zeros((2, 1, 1, 1))
         for motion in self.moves:
             ways, courses = _of(motion.ways, of), _of(motion.courses, of)
@@ -107,9 +111,11 @@ class _Moving(NamedTuple):
 
 
 class _Clock(NamedTuple):
-    """An error of a clock by its parts, (parts, cases): quadratic phase at the centre [rad], terms. [m], [m/s]
+    """A clock error as independent parts, (parts, cases) each.
 
-    And what a metre, and a metre per second, of these add to the phase at the centre, (2, cases). [rad]
+    `quadratic` is the quadratic phase at the scene centre [rad]; `constant` [m] and `linear` [m/s] are the terms of
+    the range error. `at_centre` (2, cases) is the phase at the centre that one metre and one metre per second of
+    these terms add. [rad]
     """
 
     quadratic: Floats
@@ -120,7 +126,11 @@ class _Clock(NamedTuple):
 
     @classmethod
     def of(cls, exact: ExactRanges, covariance: Floats, size: Floats) -> "_Clock":
-        """That of a covariance of phases and displacement at the centre by a unit, (4, 4, cases)."""
+        """Create the clock error from its covariance at the scene centre, (4, 4, cases), and its size in units.
+
+        The covariance is that of `RandomEffect`, for one unit of the error: quadratic phase, cubic phase, and
+        displacement east and north.
+        """
         joint = covariance.reshape(4, 4, -1)[np.ix_((0, 2, 3), (0, 2, 3))]
         quadratic, east, north = np.moveaxis(factor(np.moveaxis(joint, 2, 0)), 0, 2) * size
         (a, b), (c, d) = _terms(exact.place_weights, exact)  # what a unit of each term displaces
@@ -137,15 +147,18 @@ class _Clock(NamedTuple):
 
 
 def _terms(weights: Iterable[Floats], exact: ExactRanges) -> Floats:
-    """Effects of a metre, and of a metre per second, of range error by weights at the nodes, (effects, 2, cases)."""
+    """Effects of a range error of one metre, and of one metre per second, (effects, 2, cases).
+
+    Each row of `weights` gives one effect per metre of range error at each node.
+    """
     return np.array([[row.sum(axis=0), (row * exact.times).sum(axis=0)] for row in weights])
 
 
 class _Delay(NamedTuple):
-    """A delay of the air, so many metres of the zenith, on the legs of platforms, by their places.
+    """A delay of the air on the legs of one or both platforms, stated in metres at the zenith.
 
-    The centre sees each of these at the place in `middles` at mid-aperture. `courses` (courses, nodes, cases) are
-    independent, and together the delay of the zenith over the aperture, of variance 1.
+    `middles` are the positions of the platforms at mid-aperture relative to the scene centre. `courses` (courses,
+    nodes, cases) are independent variations over the aperture. Together they make up a zenith delay of variance 1.
     """
 
     platform_indices: tuple[int, ...]
@@ -156,7 +169,7 @@ class _Delay(NamedTuple):
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phase by each independent course of the delay at ground points, (courses, points). [rad]"""
+        """Quadratic phase by each independent variation of the delay at ground points, (courses, points). [rad]"""
         along = np.zeros(())
         for platform_index, middle in zip(self.platform_indices, self.middles, strict=True):
             x, y, z = (component[of] for component in middle)
@@ -199,7 +212,7 @@ def _vibrating(errors: DeclaredErrors) -> Iterator[tuple[Subject, _Moving]]:
 
 
 def _at_nodes_of(errors: DeclaredErrors, moves: Sequence[Moves]) -> list[Moves]:
-    """The same at the nodes of declared errors."""
+    """Resample motions of platforms at the nodes of the declared errors."""
     resampled = []
     for motion in moves:
         between = _between(motion.courses.shape[1], errors.exact.fit.shape[1])
@@ -210,7 +223,10 @@ def _at_nodes_of(errors: DeclaredErrors, moves: Sequence[Moves]) -> list[Moves]:
 
 @cache
 def _between(sensed: int, count: int) -> Floats:
-    """Takes courses at the nodes of sensors to other nodes, by the Legendre orders that both tell apart."""
+    """Matrix that takes variations from the nodes of the sensors to `count` other nodes.
+
+    It uses the Legendre orders that both sets of nodes resolve.
+    """
     node_times, weights = np.polynomial.legendre.leggauss(sensed)
     order = np.arange(min(sensed, count))
     fit = (order + 0.5)[:, None] * np.polynomial.legendre.legvander(node_times, order[-1]).T * weights
@@ -218,5 +234,5 @@ def _between(sensed: int, count: int) -> Floats:
 
 
 def _of(array: Floats, cases: Indices) -> Floats:
-    """Some cases of an array (…, cases); what all share is there once."""
+    """Select some cases of an array (…, cases). A last axis of length 1, shared by all cases, stays as it is."""
     return array if array.shape[-1] == 1 else array.take(cases, axis=-1)

@@ -1,12 +1,13 @@
-"""Phases that make echoes and phases that spread: tones, noise, and the cubic phase without a requirement of its own.
+"""Phases that make echoes and phases that spread: tones, noise, and cubic phase without its own requirement.
 
-Independent powers add, also where `allocation.combine` sets another rule for phases. Each effect is judged once. A
-tone counts against PSLR, or without that requirement with its power φ²/2 against ISLR. A cubic phase counts against
-its own requirement, or without it with its power against ISLR, since the cubic phase is in the image's sidelobes.
+Independent powers add, also if `allocation.combine` sets another rule for phases. Each effect is judged once. A tone
+counts against PSLR, or, without that requirement, with its power φ²/2 against ISLR. A cubic phase counts against its
+own requirement. Without that requirement its power counts against ISLR, since the cubic phase is part of the image's
+sidelobes.
 
 Noise of a phase variance σ² leaves exp(-σ²) of the energy in the response and spreads the rest over the image. A
-share E of the response lies within the first nulls, which an image counts as its mainlobe. So noise adds to the ISLR
-(exp(σ²) - 1)/E. The paper's rule takes σ² instead.
+share E of the response lies within the first nulls, which an image counts as its mainlobe. Noise therefore adds
+(exp(σ²) - 1)/E to the ISLR. The paper's rule adds σ² instead.
 """
 
 import math
@@ -35,9 +36,10 @@ SMALLEST_REST_RAD = 1e-3  # rms, a power of -60 dB
 
 
 class Tone(NamedTuple):
-    """A vibration, a spur of an oscillator, or its own vibration: peak phase [rad] and cycles per aperture.
+    """Tone of a platform's vibration, of an oscillator's spur, or of an oscillator's vibration.
 
-    `in_quadrature` is the row of a tone whose phase is a quarter of a turn away from this tone's; None: any phase.
+    `phase` is the peak phase [rad], and `cycles` the number of cycles per aperture. `in_quadrature` is the row of
+    another tone whose phase is a quarter cycle away from this tone's. If it is None, the tone may have any phase.
     """
 
     subject: Subject
@@ -48,7 +50,7 @@ class Tone(NamedTuple):
 
 
 class SpreadPhase(NamedTuple):
-    """A row, the owner of the share that it counts against, and the variance of its spread phase. [rad²]"""
+    """Variance of a spread phase [rad²], with the id of its row and the owner of the share it counts against."""
 
     row_id: str
     owner: str
@@ -56,28 +58,31 @@ class SpreadPhase(NamedTuple):
 
 
 class StatedPower(NamedTuple):
-    """An error from elsewhere, and the ISLR that it adds according to the file. [dB]"""
+    """Error from elsewhere that is stated by the ISLR it adds. [dB]"""
 
     subject: Subject
     islr: Any
 
     def rms(self, model: str, energy: float) -> Any:
-        """Rms phase that spreads the same power by a model; see `spread_phase`. [rad]"""
+        """Rms phase that spreads the same power in a model, see `spread_phase`. [rad]"""
         return spread_phase(10 ** (np.asarray(self.islr) / 10), model, energy)
 
 
 def mainlobe_energy(mission: Mission) -> float:
-    """Share E of the error-free response's energy within its first nulls, under the window of the images."""
+    """Share E of the response's energy that lies within its first nulls.
+
+    The response is that without errors, under the window of the images.
+    """
     return MAINLOBE_ENERGY[(mission.simulation or Simulation()).window]
 
 
 def spread_phase(ratio: PerCase, model: str, energy: float) -> Any:
-    """Rms phase of noise that adds an ISLR, inverse of `islr_db`. [rad]
+    """Rms phase of noise that adds a given ISLR, the inverse of `islr_db`. [rad]
 
     Parameters
     ----------
     ratio : float or array
-        ISLR, a power ratio.
+        ISLR as a power ratio.
     model : str
         `published` for the paper's rule; any other name for the ISLR of an image.
     energy : float
@@ -87,9 +92,10 @@ def spread_phase(ratio: PerCase, model: str, energy: float) -> Any:
 
 
 def islr_db(variance: PerCase, model: str, energy: float) -> Any:
-    """ISLR that noise of a phase variance [rad²] above 0 adds: by the paper's rule σ², else as in an image. [dB]
+    """ISLR that noise with a phase variance [rad²] above 0 adds. [dB]
 
-    `spread_phase` documents the parameters.
+    In the published model it is σ², by the paper's rule; otherwise it is the ISLR of an image. `spread_phase`
+    documents the parameters.
     """
     if model == "published":
         return 10 * np.log10(variance)
@@ -98,13 +104,16 @@ def islr_db(variance: PerCase, model: str, energy: float) -> Any:
 
 
 def islr_of(mission: Mission, variance: PerCase) -> Floats:
-    """ISLR that noise of a phase variance [rad²] adds to an image; NaN without noise. [dB]"""
+    """ISLR that noise with a phase variance [rad²] adds to an image; NaN without noise. [dB]"""
     with np.errstate(all="ignore"):
         return np.where(variance > 0, islr_db(variance, "full", mainlobe_energy(mission)), math.nan)
 
 
 def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> Any:
-    """Rms phase that an owner may spread, by the paper's rule or as in an image. [rad]"""
+    """Largest rms phase that an owner may spread, by the paper's rule or as in an image. [rad]
+
+    None without a requirement on ISLR.
+    """
     if mission.requirements.islr is None:
         return None
     rms_of_mission = spread_phase(10 ** (np.asarray(mission.requirements.islr) / 10), model, mainlobe_energy(mission))
@@ -112,9 +121,10 @@ def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: st
 
 
 def tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Tone]:
-    """List the tones that make paired echoes: vibrations from one cycle per aperture on, tones of oscillators, spurs.
+    """List the tones that make paired echoes.
 
-    `geometry` holds many cases where numbers of the mission are arrays.
+    These are vibrations with at least one cycle per aperture, tones of vibrating oscillators, and spurs. `geometry`
+    holds many cases if numbers of the mission are arrays.
     """
     T, echoes = mission.collection.aperture_time, []
     for name in PLATFORMS:
@@ -142,7 +152,11 @@ def tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[To
 
 
 def _echoes(alone: Tone, free: PerCase, remaining: LeftTone, mission: Mission) -> list[Tone]:
-    """Echoes of an oscillator's tone: for a folded tone one per frequency, or all power at the largest echo."""
+    """Tones that represent the echoes of an oscillator's tone.
+
+    A folded tone gives one tone per frequency. Without a PSLR requirement it gives one tone with all of the power, at
+    the frequency of the largest echo.
+    """
     if not remaining.is_folded:
         return [alone]
     T = mission.collection.aperture_time
@@ -157,7 +171,11 @@ def _echoes(alone: Tone, free: PerCase, remaining: LeftTone, mission: Mission) -
 
 
 def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List the phases that spread beyond the cubic: wideband vibration, sensor noise, phase noise, links, powers."""
+    """List the phases of noise, which spread beyond the cubic.
+
+    They come from wideband vibration, sensor noise, phase noise, synchronization links, and powers that the file
+    states.
+    """
     mission, spreads = analysis.mission, []
     for name in PLATFORMS:
         wideband = getattr(mission.platforms, name).motion_error.vibration.wideband
@@ -175,10 +193,11 @@ def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
 
 
 def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List the phases beyond the cubic by errors of motion, clocks, sensors and slow vibrations, where they show.
+    """List the phases beyond the cubic of errors of motion, clocks, sensors and slow vibrations.
 
-    They are at one sigma. Short apertures leave next to nothing; a quarter of a circle leaves more. The published
-    model has no such phase. Where a line of sight turns by more than a radian, the phase of equal loss holds it.
+    They are at one sigma, and left out where they are negligible. They are very small for short apertures, and larger
+    for a quarter of a circle. The published model has no such phases. Where a line of sight turns by more than a
+    radian, they are contained in the phase of equal loss.
     """
     if model == "published":
         return []
@@ -206,7 +225,7 @@ def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
 
 
 def stated_powers(mission: Mission) -> list[StatedPower]:
-    """List the errors from elsewhere whose ISLR the file states."""
+    """List the errors from elsewhere that the file states by their ISLR."""
     return [
         StatedPower(subject("mission", "other", f"{stated.name}.islr", entry=index), stated.islr)
         for index, stated in enumerate(mission.other_errors)
@@ -215,12 +234,12 @@ def stated_powers(mission: Mission) -> list[StatedPower]:
 
 
 def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str) -> list[list[SpreadPhase]]:
-    """List the phases that count against ISLR, for each owner; all phases count against the mission's.
+    """List the phases that count against ISLR, for each owner.
 
-    They are noise, the rests of errors beyond the cubic, the tones that no other requirement takes, and the power of
-    the cubic phase if no requirement of its own holds it. The cubic phase of an owner is at one sigma. It is left out
-    where it is too small to show, or where an error has no image. A variance is NaN where a case does not have the
-    phase.
+    All phases count against the mission's requirement. The phases are noise, the phases of errors beyond the cubic,
+    the tones without another requirement, and the cubic phase if it has no requirement of its own. The cubic phase of
+    an owner is at one sigma. It is left out where it is negligible, or where an error has no image. A variance is NaN
+    in cases that do not have the phase.
     """
     mission, split, together = analysis.mission, analysis.allocation.islr, analysis.together(model)
     spreads = noise(analysis, model) + rests(analysis, model)
@@ -242,6 +261,6 @@ def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str)
 
 
 def declared_powers(analysis: "Analysis", owner: str, model: str) -> list[SpreadPhase]:
-    """List the phases of an owner that count against ISLR, of one case, in plain numbers."""
+    """List the phases of an owner that count against ISLR, for a single case, in plain numbers."""
     (powers,) = powers_held_by_islr(analysis, [owner], model)
     return [power._replace(variance=float(np.ravel(power.variance)[0])) for power in powers]

@@ -1,4 +1,7 @@
-"""Declared errors of many cases together: their phases and displacements, and the owners whose share they use."""
+"""Combination of the declared errors of many cases.
+
+It covers their phases and displacements, and the owners whose shares they use.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -27,7 +30,7 @@ from bisar_budget.mission.model import Shares
 
 
 class Together:
-    """Declared errors of many cases by one model, along the axes in which the file states them.
+    """Declared errors of many cases in one model, along the axes in which the file states them.
 
     Parameters
     ----------
@@ -40,7 +43,7 @@ class Together:
     tones : sequence of ToneDisplacement
         Displacements by vibrations and by tones of oscillators.
     random : sequence of RandomError
-        Errors of sensors and clocks, declared or not.
+        Errors of sensors, clocks and the air, declared or not.
     groups : sequence of Correlated
         Covariances of the mission.
     """
@@ -61,12 +64,18 @@ class Together:
 
     @property
     def rule_of_all(self) -> str:
-        """Rule that adds up all declared errors: the mission's rule, and root-sum-square instead of `each`."""
+        """Rule by which all declared errors are added up.
+
+        It is the mission's rule, or root-sum-square if the mission's rule is `each`.
+        """
         return "rss" if self.rule == "each" else self.rule
 
     @cached_property
     def own(self) -> list[DeclaredPhase]:
-        """Phases of errors without a displacement of their own: slow vibrations, declared sensor and clock errors."""
+        """Phases of slow vibrations, and of declared errors of sensors, clocks and the air.
+
+        These errors have no signed displacement of their own.
+        """
         array = self.errors.array
         phases = [
             vibration._replace(
@@ -89,7 +98,7 @@ class Together:
 
     @cached_property
     def phases(self) -> list[DeclaredPhase]:
-        """Phases of every declared error: of motion, of the clock, of pure phase errors, and `own`."""
+        """Phases of all declared errors: of motion, of the clock, of pure phase errors, and those in `own`."""
         phases_of_motion, factor = [], self.errors.mission.allocation.coverage_factor
         for error in self.errors.stated:
             does, coverage = self.errors.does(self.model, error), factor if error.is_covered else 1.0
@@ -99,13 +108,14 @@ class Together:
         return [*phases_of_motion, *self.own]
 
     def owed(self, split: Shares, owner: str) -> list[DeclaredPhase]:
-        """Phases that count against the share of an owner; all phases count against the mission's."""
+        """Phases that count against the share of an owner. All phases count against the mission's."""
         return [phase for phase in self.phases if split.includes(phase.owner, owner)]
 
     def judged_parts(self, members: Sequence[DeclaredPhase], rule: str = "", gain: PerCase | None = None) -> Phases:
-        """List the judged phases that a rule combines, with the mission's gain or the given gain. [rad]
+        """List the judged phases that a rule combines, as pairs of id and phase. [rad]
 
-        Under root-sum-square the six phases of a covariance are one phase, by their correlations.
+        `rule` and `gain` are those of the mission unless given. Under root-sum-square the six phases of a covariance
+        are combined into one, according to their correlations.
         """
         gain, groups = self.errors.gain if gain is None else gain, self.groups
         row_ids = [member.row_id for member in members]
@@ -123,19 +133,19 @@ class Together:
         return list(judged.items())
 
     def judged(self, members: Sequence[DeclaredPhase], rule: str = "", gain: PerCase | None = None) -> Floats:
-        """Combine the judged phases of errors by the mission's rule, or by the given rule. [rad]"""
+        """Judged phases of errors, combined by the mission's rule or by the given rule. [rad]"""
         return self.errors.array(combined_phase(self.judged_parts(members, rule, gain), rule or self.rule))
 
     @cached_property
     def _hidden_of_groups(self) -> dict[str, Any]:
-        """Hidden phase of the six errors of each covariance; 0 in the published model. [rad]"""
+        """Combined hidden phase of each covariance's six errors, by id; 0 in the published model. [rad]"""
         if self.model == "published":
             return {group.id: 0.0 for group in self.groups}
         stated = {error.subject.id for error in self.motion}
         return {group.id: self._hidden_of(group) for group in self.groups if stated >= set(group.ids)}
 
     def _hidden_of(self, group: Correlated) -> Floats:
-        """Hidden phase of the six errors of a covariance: the squares of independent errors add up. [rad]"""
+        """Combined hidden phase of a covariance's six errors, as the rss of independent errors. [rad]"""
         errors = {error.subject.id: error for error in self.motion}
         remaining = []
         for row_id in group.ids:
@@ -145,36 +155,40 @@ class Together:
         return np.asarray(np.sqrt(np.square(hidden).sum(axis=0)))
 
     def independent(self, group: Correlated, remaining: Floats) -> Floats:
-        """Range errors at the nodes of independent errors that together have a covariance. [m]
+        """Range errors at the nodes of six independent errors that together have a given covariance. [m]
 
-        `remaining` are the range errors of the covariance's six errors, (6, nodes, cases). A root of their
-        correlations turns them.
+        `remaining` are the range errors of the covariance's six errors, (6, nodes, cases). They are transformed by a
+        matrix root of the correlations.
         """
         correlation = np.array([[self.errors.array(rho) for rho in row] for row in group.correlation])
         return np.asarray(np.einsum("cij,inc->jnc", factor(np.moveaxis(correlation, 2, 0)), remaining))
 
     def combined(self, phases: Phases, rule: str = "") -> Floats:
-        """Combine phases by the mission's rule, or by the given rule. [rad]"""
+        """Phases combined by the mission's rule or by the given rule. [rad]"""
         return self.errors.array(combined_phase(phases, rule or self.rule, self.groups))
 
     def cubics_without_coverage(self, split: Shares, owner: str) -> Phases:
-        """Cubic phase of each error that counts against an owner's share, at the declared sigma, signed. [rad]"""
+        """Cubic phase of each error that counts against an owner's share, signed. [rad]
+
+        The coverage factor is removed.
+        """
         members = self.owed(split, owner)
         return [(phase.row_id, phase.cubic_rad / phase.coverage) for phase in members if phase.cubic_rad is not None]
 
     def cubic_without_coverage(self, split: Shares, owner: str) -> Floats:
-        """Combined cubic phase of an owner at the declared sigmas: a sum with `combine: sum`, else the rss. [rad]
+        """Combined cubic phase of the errors that count against an owner's share. [rad]
 
-        Root-sum-square, since powers add.
+        The coverage factor is removed. The phases are added under `combine: sum`, and otherwise combined as
+        root-sum-square, since powers add.
         """
         return self.combined(self.cubics_without_coverage(split, owner), self.rule_of_all)
 
     def moves(self, rule: str) -> Moves:
-        """Displacement by each error of motion, in the form in which the rule combines displacements. [m]
+        """Displacement by each error of motion, prepared for the rule that combines displacements. [m]
 
-        Under the rule `sum`, which combines all signs, each error has half the difference between the displacements
-        by its two signs. The mean of the two displacements does not depend on the sign: a further entry holds its sum
-        over all errors. Under all further rules, each error has the sign that moves the image farther.
+        The rule `sum` combines all signs. Each error then has half the difference between the displacements of its
+        two signs. The mean of these two displacements does not depend on the sign, and one more entry holds its sum
+        over all errors. Under the other rules, each error has the sign that moves the image farther.
         """
         does = {error.subject.id: self.errors.does(self.model, error) for error in self.motion}
         if rule != "sum":
@@ -189,9 +203,10 @@ class Together:
 
     @cached_property
     def undirected_moves(self) -> Moves:
-        """Displacement by errors without a sign: sigmas of sensors and clocks, and tones in their worst phases. [m]
+        """Displacement by errors without a sign. [m]
 
-        A clock whose displacement the file leaves open has 0.
+        They are the sigmas of random errors, and tones in their worst phases. The displacement is 0 for a clock whose
+        displacement the file does not determine.
         """
         moves = []
         for error in self.random:
@@ -212,10 +227,10 @@ class Together:
         return bool(self.motion or self.undirected_moves)
 
     def moved(self, rule: str) -> Floats:
-        """Displacements combined by a rule; NaN where an error has no image to place. [m]
+        """Displacement of all errors combined by a rule; NaN where an error leaves no image. [m]
 
-        A random error or a tone has no direction. To a sum over all signs it adds its length, independent of all
-        other errors.
+        A random error or a tone has no direction. Under `sum` its length is added to the largest sum of the other
+        errors.
         """
         if rule != "sum":
             moves = [*self.moves(rule), *self.undirected_moves]
@@ -225,22 +240,28 @@ class Together:
 
     # ---------------------------------------------------------------- one case
     def phase_parts(self, phases: Phases, rule: str = "", case: int = 0) -> list[tuple[str, float]]:
-        """List the parts of phases that the mission's rule, or the given rule, combines, signed. [rad]"""
+        """List the signed phases that the mission's rule, or the given rule, combines in one case. [rad]
+
+        Each item is a pair of id and phase.
+        """
         combined_parts = phase_parts(phases, rule or self.rule, self.groups)
         return [(row_id, plain(phase, case)) for row_id, phase in combined_parts]
 
     def displacement_parts(self, case: int = 0) -> list[tuple[str, GroundVector]]:
-        """List the parts of displacements that the mission's rule combines; empty if an error has no image. [m]"""
+        """List the displacements that the mission's rule combines in one case. [m]
+
+        Each item is a pair of id and (east, north). The list is empty if an error leaves no image.
+        """
         named_moves = displacement_parts([*self.moves(self.rule), *self.undirected_moves], self.rule, self.groups)
         combined_parts = [(row_id, (plain(east, case), plain(north, case))) for row_id, (east, north) in named_moves]
         return [] if any(math.isnan(east) for _, (east, _) in combined_parts) else combined_parts
 
 
 def quadratics(members: Iterable[DeclaredPhase]) -> Phases:
-    """Quadratic phase of each member, signed. [rad]"""
+    """List the signed quadratic phase of each member with its row id. [rad]"""
     return [(phase.row_id, phase.qpe_rad) for phase in members]
 
 
 def cubics(members: Iterable[DeclaredPhase]) -> Phases:
-    """Cubic phase of each member that has a cubic phase, signed. [rad]"""
+    """List the signed cubic phase, with its row id, of each member that has a cubic phase. [rad]"""
     return [(phase.row_id, phase.cubic_rad) for phase in members if phase.cubic_rad is not None]

@@ -1,13 +1,15 @@
 """Displacement of the image by tones: vibrations of platforms, and tones of their oscillators.
 
-Over an aperture a tone of amplitude A and x = πfT has the mean A·j₀(x) and, at the edge, the linear part 3A·j₁(x).
-They displace like the parts of any range error: by (25), or, as a line of sight turns, by orders 0 to 3 over exact
-ranges. Orders 0 and 2 are largest together, orders 1 and 3 a quarter of a cycle later, so that with the phase of the
-tone the image runs on an ellipse. East and north each count in their worst phase. Their root-sum-square is √2 times
-the rms displacement over all phases. It lies between the largest displacement and √2 times the largest. Derived here,
-to first order in the amplitude. Exact ranges in all phases check it (`tests/analysis/test_tone_displacement.py`).
+Over an aperture, a tone of amplitude A has the mean A·j₀(x) and, at the edge, the linear part 3A·j₁(x), with x = πfT.
+They displace the image like the parts of any range error: according to (25), or, along a turning line of sight, by
+orders 0 to 3 with exact ranges. Orders 0 and 2 have their maximum at the same phase of the tone, and orders 1 and 3 a
+quarter cycle later. The image therefore moves on an ellipse as the phase of the tone varies.
 
-The axes of a vibration may be in any phase: their displacements add. A faster tone displaces less, as 1/(fT).
+East and north each count in their worst phase. Their root-sum-square is √2 times the rms displacement over all
+phases. It lies between the largest displacement and √2 times the largest. Derived here, to first order in the
+amplitude. Exact ranges in all phases check it (`tests/analysis/test_tone_displacement.py`).
+
+The axes of a vibration may be in any phase, so their displacements add. A faster tone displaces less, as 1/(fT).
 """
 
 import math
@@ -32,9 +34,10 @@ from bisar_budget.ranges.exact_ranges import ExactRanges
 
 
 class TonePart(NamedTuple):
-    """A tone along one way: amplitudes of its orders 0 to 3 at the aperture edge, displacement by a metre of each.
+    """Part of a tone along one direction.
 
-    Signed, (4, n) [m] and (4, 2, n), east and north [m/m].
+    `orders` (4, n) are the signed amplitudes of its orders 0 to 3 at the aperture edge. [m] `per_metre` (4, 2, n) is
+    the displacement per metre of each order, east and north. [m/m]
     """
 
     orders: Floats
@@ -48,26 +51,29 @@ class TonePart(NamedTuple):
 
 
 class ToneDisplacement(NamedTuple):
-    """The row of a tone, and by each model its parts, which may be in any phase."""
+    """Displacement by a tone: the subject of its row, and its parts in each model.
+
+    The parts may be in any phase relative to each other.
+    """
 
     subject: Subject
     published: Sequence[TonePart]
     full: Sequence[TonePart]
 
     def parts(self, model: str) -> Sequence[TonePart]:
-        """The parts of a model."""
+        """Parts of the tone in a model."""
         return self.full if model == "full" else self.published
 
     def by(self, model: str) -> Floats:
-        """Displacement east and north by a model, each in its worst phase, (2, n). [m]"""
+        """Displacement east and north in a model, each in its worst phase, (2, n). [m]"""
         return np.asarray(sum(tone_part.displacement for tone_part in self.parts(model)))
 
 
 def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: ExactRanges) -> list[ToneDisplacement]:
-    """Displacement by every vibration of a platform, and by every tone of an oscillator, with or without echoes.
+    """Displacement by every vibration of a platform and every tone of an oscillator, with or without echoes.
 
-    A tone that exchanges fold has a part at each frequency. Below one cycle per aperture, a vibration that an
-    oscillator feels counts in the row of the acceleration, and a folded tone in the row of the oscillator.
+    A tone that exchanges fold has a part at each frequency. Below one cycle per aperture, the vibration of an
+    oscillator counts in the row of the oscillator's acceleration, and a folded tone in the row of the oscillator.
     """
     T, plane, displacements = mission.collection.aperture_time, _by_plane(geometry, exact), list[ToneDisplacement]()
     for platform_index, name in enumerate(PLATFORMS):
@@ -121,13 +127,13 @@ def _tones_of_oscillators(
 
 
 def _orders(cycles: PerCase, size: PerCase) -> Floats:
-    """Orders 0 to 3 of a tone with `cycles` per aperture and an amplitude [m], (4, n). [m]"""
+    """Amplitudes of orders 0 to 3 of a tone with the given cycles per aperture and amplitude [m], (4, n). [m]"""
     quadratic, cubic, _, constant, linear = size * tone(math.pi * np.atleast_1d(cycles))
     return np.array([constant, linear, quadratic, cubic])
 
 
 def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
-    """Displacement by a metre of each order by (25), (4, 2, n); NaN where Q has no inverse. [m/m]"""
+    """Displacement per metre of each order according to (25), (4, 2, n); NaN where Q has no inverse. [m/m]"""
     plane, _ = published_planes(geometry)
     displacement = np.zeros((4, *np.shape(exact.place_weights)[::2]))
     scale = 1 / np.where(plane.is_singular, math.nan, plane.determinant)
@@ -137,6 +143,9 @@ def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
 
 
 def _by_ranges(exact: ExactRanges, along: Floats) -> Floats:
-    """Displacement by a metre of each order by exact ranges, if the range has `along` of it, (nodes, n). [m/m]"""
+    """Displacement per metre of each order by exact ranges, (4, 2, n). [m/m]
+
+    `along` (nodes, n) is the range error per metre of the tone.
+    """
     seen = np.where(np.abs(along) > VECTOR_ROUNDING_FRACTION, along, 0.0)
     return np.asarray(np.einsum("wnc,nc,no->owc", exact.place_weights, seen, orders_at(exact.sampling.places)))

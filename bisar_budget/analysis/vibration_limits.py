@@ -1,17 +1,17 @@
-"""Vibration: effects of a platform's motion along the line of sight, by the paper's rule and from first principles.
+"""Limits of vibration: effects of a platform's motion along the line of sight, compared with the requirements.
 
-A motion of amplitude A along the line of sight is a phase of peak φ = 2πA/λ. A sinusoid makes paired echoes with
-J₁(φ)/J₀(φ) of the amplitude of the response, about φ/2. Gaussian noise of rms σ leaves exp(-σ²) of the power in the
-response and spreads the rest, so that an image shows an ISLR of (exp(σ²) - 1)/E, see `spread`. Derived here, checked
-against the transform of the phase.
+The limits follow from the paper's rule and from first principles. A motion of amplitude A along the line of sight is
+a phase of peak φ = 2πA/λ. A sinusoid makes paired echoes with J₁(φ)/J₀(φ) of the amplitude of the response, about
+φ/2. Gaussian noise of rms σ leaves exp(-σ²) of the power in the response and spreads the rest, so that an image shows
+an ISLR of (exp(σ²) - 1)/E, see `spread`. Derived here, checked against the transform of the phase.
 
-Both platforms within their shares must meet the requirement together. If both vibrate at one frequency, their echoes
-add in amplitude in the worst phase. So amplitudes are divided, in the ratio that the shares of power set. If the
-motions are noise, which is independent from platform to platform, variances add and powers are divided. The paper's
-rule, φ² ≤ PSLR·share and σ² ≤ ISLR·share, stays 3 dB inside the first limit at equal shares. It exceeds the second
-limit by 1/E, 0.44 dB with a uniform window; the same noise on both platforms would add 3 dB.
+If both platforms stay within their shares, they must meet the requirement together. If both vibrate at one frequency,
+their echoes add in amplitude in the worst phase. The allowable amplitude is therefore divided, in the ratio of the
+roots of the shares of power. Noise is independent from platform to platform, so variances add and the allowable power
+is divided. The paper's rule, φ² ≤ PSLR·share and σ² ≤ ISLR·share, is 3 dB below the first limit at equal shares. It
+exceeds the second limit by 1/E, 0.44 dB with a uniform window; the same noise on both platforms would add 3 dB.
 
-Between one and three cycles per aperture a vibration is a quadratic phase as well, and counts as echoes. A slower
+Between one and three cycles per aperture a vibration also causes a quadratic phase, and counts as echoes. A slower
 vibration makes no echoes, see `effects.vibration`.
 """
 
@@ -39,29 +39,35 @@ _motion_of_phase: Callable[..., PerCase] = evaluators.motion_of_phase
 
 
 class VibrationLimits(NamedTuple):
-    """Largest vibration of one platform, by the paper's rule and from first principles, 0 to peak or rms. [m]"""
+    """Largest allowed vibration of one platform along the line of sight, 0 to peak or rms. [m]
+
+    `published` follows the paper's rule, `full` follows from first principles.
+    """
 
     published: Any
     full: Any
 
     def by(self, model: str) -> Any:
-        """The limit that gates."""
+        """Limit in the model that gates. Under `strictest` it is the smaller of both limits."""
         return np.minimum(*self) if model == "strictest" else self.full if model == "full" else self.published
 
     @property
     def margin_db(self) -> Any:
-        """Margin of the published rule below the limit from first principles. [dB]"""
+        """Ratio of the limit from first principles to that of the paper's rule. [dB]"""
         return 20 * np.log10(self.full / self.published)
 
 
 def echo_level(phase: PerCase) -> PerCase:
-    """Amplitude of a paired echo over the response's, J₁(φ)/J₀(φ), for a sinusoid of peak φ up to 2 rad."""
+    """Amplitude of a paired echo relative to the response, J₁(φ)/J₀(φ).
+
+    The peak phase φ of the sinusoid may be up to 2 rad.
+    """
     j0, j1 = bessel(phase)
     return j1 / j0
 
 
 def bessel(phase: PerCase) -> tuple[PerCase, PerCase]:
-    """J₀(φ) and J₁(φ) of a phase φ up to 2 rad."""
+    """Bessel functions J₀(φ) and J₁(φ) of a phase φ of up to 2 rad."""
     term: PerCase = 1.0
     j0: PerCase = 0.0
     j1: PerCase = 0.0
@@ -74,11 +80,11 @@ def bessel(phase: PerCase) -> tuple[PerCase, PerCase]:
 
 
 class Echo(NamedTuple):
-    """Paired echo of a tone, or of tones near each other in the worst of their phases.
+    """Paired echo of one tone, or of neighbouring tones in their worst phases.
 
-    One tone of the peak phase `phase` [rad] has an echo as high. `cycles` is the position of the echo, in cells from
-    the response, and `level` its amplitude over the amplitude of the response. `is_of` marks the tones that make the
-    echo, (tones, ...).
+    `phase` is the peak phase of a single tone with an equally high echo. [rad] `cycles` is the position of the echo,
+    in cells from the response. `level` is its amplitude relative to the response. `is_of` (tones, ...) marks the
+    tones that make the echo.
     """
 
     phase: Any
@@ -88,12 +94,12 @@ class Echo(NamedTuple):
 
 
 def level_of(phase: PerCase) -> PerCase:
-    """Amplitude of a paired echo over the amplitude of the response; half the phase beyond 2 rad."""
+    """Amplitude of a paired echo relative to the response. For peak phases above 2 rad it is half the phase."""
     return np.where(phase <= MAX_ECHO_PHASE_RAD, echo_level(np.minimum(phase, MAX_ECHO_PHASE_RAD)), phase / 2)[()]
 
 
 def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:
-    """Index of each tone that is in quadrature to a second tone, with the index of the second tone."""
+    """Pairs of indices of tones in quadrature: that of the tone, and that of the tone it refers to."""
     index_by_id = {tone.subject.id: index for index, tone in enumerate(tones)}
     return [
         (here, index_by_id[tone.in_quadrature])
@@ -103,9 +109,10 @@ def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:
 
 
 def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | None:
-    """Highest echo of all tones: of each tone alone, and of tones near each other together; None without tones.
+    """Highest echo of all tones, each alone or together with neighbouring tones.
 
-    `shape` is the shape of numbers of many cases, (cases,). A case without a tone has level 0.
+    None without tones. `shape` is the shape of the numbers of many cases, (cases,). A case without a tone has level
+    0.
     """
     if not tones:
         return None
@@ -142,7 +149,10 @@ def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | N
 
 
 def echo_phase(level: PerCase) -> PerCase:
-    """Peak phase of a sinusoid whose echoes have an amplitude of up to 1 times the response's. [rad]"""
+    """Peak phase of a sinusoid whose echoes have a given amplitude relative to the response. [rad]
+
+    The amplitude may be up to 1.
+    """
     # J₁/J₀ is above φ/2, convex, and 1 at 1.43: from here Newton's steps go down to it.
     phase = np.minimum(2 * level, 1.5)
     for _ in range(8):
@@ -152,7 +162,7 @@ def echo_phase(level: PerCase) -> PerCase:
 
 
 def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> dict[str, VibrationLimits]:
-    """Limits of each platform for `pslr` or `islr`; empty without a requirement."""
+    """Limits of each platform's vibration for `pslr` or `islr`; empty without that requirement."""
     requirement_db, split = getattr(mission.requirements, metric), getattr(allocation, metric)
     if requirement_db is None:
         return {}
@@ -171,9 +181,9 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
 
 
 def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str, VibrationLimits]]:
-    """Requirement that limits tones, and the limits of each platform by it; empty without a requirement.
+    """Name of the requirement that limits tones, and the limit of each platform; empty without a requirement.
 
-    Without a PSLR requirement it is ISLR: a tone of peak phase φ spreads φ²/2.
+    Without a PSLR requirement it is ISLR, where a tone of peak phase φ spreads φ²/2.
     """
     needs = mission.requirements
     if needs.pslr is not None or needs.islr is None:
@@ -186,15 +196,19 @@ def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str
 
 
 def amplitude_share(split: Shares, name: str) -> PerCase:
-    """Share of a platform in the summed amplitude: both shares sum to 1, in the ratio of the roots of power."""
+    """Share of a platform in the sum of amplitudes.
+
+    The shares of both platforms sum to 1. Their ratio is that of the roots of the shares of power.
+    """
     share, share_of_other = split.of(name), split.of(next(platform for platform in PLATFORMS if platform != name))
     return evaluators.amplitude_share(share, share_of_other)
 
 
 class SlowLimits(NamedTuple):
-    """Amplitudes along the line of sight that reach a platform's quadratic and the required cubic phase. [m]
+    """Amplitudes along the line of sight at which a vibration reaches its limits of phase. [m]
 
-    `use` is the fraction of the smaller limit that the declared vibration uses, `quadratic_use` the fraction of the
+    `quadratic` belongs to the platform's limit of the quadratic phase, and `cubic` to the requirement on the cubic
+    phase. `use` is the utilization of the stricter limit by the declared vibration, and `quadratic_use` that of the
     quadratic limit.
     """
 
@@ -205,7 +219,7 @@ class SlowLimits(NamedTuple):
 
     @property
     def smallest(self) -> Floats:
-        """The limit that gates."""
+        """The stricter of both limits. [m]"""
         return self.quadratic if self.cubic is None else np.minimum(self.quadratic, self.cubic)
 
     @property
@@ -215,7 +229,7 @@ class SlowLimits(NamedTuple):
 
 
 def slow_limits(mission: Mission, allocation: Allocation, tone: SlowTone) -> SlowLimits:
-    """Largest vibration below one cycle per aperture, in its worst phase; see `effects.slow_tones`.
+    """Largest vibration below one cycle per aperture, for its worst phase; see `effects.slow_tones`.
 
     The limit of the quadratic phase is the platform's share, autofocus gain included. The limit of the cubic phase,
     if one is required, is the whole requirement without gain.

@@ -1,4 +1,4 @@
-"""From an analysis to findings: limits on each error and on sums of errors, waivers, checks of many files."""
+"""Turns an analysis into findings: limits on single errors and on sums of errors, waivers, checks of many files."""
 
 # Modules that other rooms may use.
 __all__ = [

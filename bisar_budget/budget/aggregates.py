@@ -1,4 +1,4 @@
-"""Rows of sums of errors: phases of platforms and mission, cubic phase, location, autofocus pull-in, scene edge."""
+"""Rows for sums of errors: quadratic and cubic phase, location, autofocus pull-in range, edge of the scene."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -39,7 +39,7 @@ PULL_IN = "autofocus_pull_in"
 
 
 class Aggregates:
-    """Rows of sums of errors in many cases."""
+    """Builds the rows for sums of errors, for many cases at once."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         self.judging, self.together, self.array = judging, analysis.together, judging.array
@@ -47,7 +47,10 @@ class Aggregates:
         self.needs, self.combine = self.errors.mission.requirements, self.errors.mission.allocation.combine
 
     def rows(self, model: str) -> Iterator["Aggregate"]:
-        """All rows by one model, in the order of the contract; the other model may turn a pass into a warning."""
+        """Yield all rows judged by one model, in the order of the contract.
+
+        The other model may turn a pass into a warning.
+        """
         mine, theirs = self.together(model), self.together(OTHER_MODEL[model])
         if self.combine == "each":
             yield self._largest_quadratic(mine, theirs)
@@ -85,7 +88,10 @@ class Aggregates:
         return aggregate.of_equal_loss(equal_loss, equal_loss if is_full else theirs.judged(full, gain=1.0))
 
     def _largest_quadratic(self, mine: Together, theirs: Together) -> "Aggregate":
-        """A warning if errors are judged alone and their root-sum-square exceeds the total; otherwise no row."""
+        """The row of the mission's quadratic phase if each error is judged alone.
+
+        The row exists only as a warning, in the cases where the root-sum-square of all errors exceeds the total.
+        """
         row_subject, phases = subject("mission", QUADRATIC), mine.judged_parts(mine.phases)
         size, of_all = mine.judged(mine.phases), mine.judged(mine.phases, "rss")
         limit = self.allocation.qpe_total * self.allocation.autofocus_gain
@@ -142,11 +148,11 @@ class Aggregates:
         )
 
     def _of_owners(self, split: Shares, owner: str) -> Sequence[RandomError]:
-        """Errors of sensors, clocks and the air that count against the share of an owner."""
+        """Errors of sensors, clocks and the air that count against an owner's share."""
         return [error for error in self.together("full").random if split.includes(error.owner, owner)]
 
     def _is_declared(self, members: Iterable[DeclaredPhase]) -> Booleans:
-        """Cases in which any of the phases is declared."""
+        """Mark the cases in which at least one of the phases is declared."""
         is_declared = np.zeros(self.judging.cases, dtype=bool)
         for member in members:
             is_declared |= member.is_there
@@ -169,11 +175,11 @@ class Aggregates:
         continued: tuple[str, Sequence[RandomError]] = ("quadratic", ()),
         **fields: Any,
     ) -> "Aggregate":
-        """Judge the sum of errors; a sum without a finite value fails: an error in it has no image.
+        """Judge a sum of errors. A sum without a finite value fails, because one of its errors has no image.
 
-        `without_value` is the status of such a sum, if it is not a fail. `continued` names the effect of random
-        errors that the row adds up, and these errors. A pass that depends on noise below the first points of masks
-        becomes a warning; a pass that depends on noise in doubt is not evaluated.
+        `without_value` replaces the status `fail` of such a sum. `continued` holds the kind of effect that the row
+        sums over random errors, and these errors. A pass becomes a warning if it depends on noise below the first
+        points of masks. A pass that depends on doubted noise is not evaluated.
         """
         rests_on: PerCaseFlag = False
         is_in_doubt: PerCaseFlag = False
@@ -212,11 +218,11 @@ class Aggregates:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Aggregate(FamilyRow):
-    """One row of the sum of errors, by a model, in many cases.
+    """One row for a sum of errors, judged by one model in many cases.
 
-    `rule` combines the `phases`; a row of displacements has no phases. `by_other` is the sum by the model that does
-    not gate. `of_all` is the root-sum-square of all errors if the row has the largest error instead of a sum. A pass
-    becomes a warning if `by_other` or `of_all` breaks the limit.
+    `rule` is the rule that combines the `phases`; a row of displacements has no phases. `by_other` is the sum by the
+    model that does not gate. If the row holds the largest error instead of a sum, `of_all` is the root-sum-square of
+    all errors. A pass becomes a warning if `by_other` or `of_all` exceeds the limit.
     """
 
     rule: str
@@ -231,10 +237,11 @@ class Aggregate(FamilyRow):
     is_in_doubt: PerCaseFlag = False  # the noise that the row depends on is in doubt
 
     def of_equal_loss(self, equal_loss: Floats, of_full: Floats) -> "Aggregate":
-        """The row with the phase of equal loss as the declared value.
+        """Return the row with the phase of equal loss as its declared value.
 
-        The phase of equal loss may be smaller because of the phase that autofocus does not correct. The allowable is
-        scaled by the same factor, so that the utilization remains; without a declared phase it is unchanged.
+        The phase of equal loss may be smaller than the judged phase, because autofocus does not correct part of the
+        phase. The allowable is scaled by the same factor, so that the utilization does not change. Without a declared
+        phase the allowable stays the same.
         """
         judged = self.judged
         with np.errstate(all="ignore"):
@@ -248,7 +255,7 @@ class Aggregate(FamilyRow):
         return replace(self, judged=judged)
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Row of a case in words, by the model that judges it."""
+        """Describe the row of one case in words; `model` is the model that judges it."""
         mission, row_subject = case.mission, self.judged.subject
         groups, combine, owner = case.analysis.groups, mission.allocation.combine, row_subject.owner
         numbers = map(case.number, (self.judged.declared, self.judged.allowable))
@@ -286,7 +293,7 @@ class Aggregate(FamilyRow):
         )
 
     def _passes_with(self, case: Case, model: str) -> Note:
-        """Note on the N_pull from which on the sum would pass, or that no autofocus corrects the sum."""
+        """Note with the smallest N_pull for which the sum would pass, or that no autofocus can correct the sum."""
         together, owner = case.analysis.together(model), self.judged.subject.owner
         members = together.owed(case.allocation.qpe, owner)
         quadratic = case.number(together.combined(quadratics(members)))
@@ -296,7 +303,10 @@ class Aggregate(FamilyRow):
 
 # ---------------------------------------------------------------------- totals of effects
 def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
-    """Cubic phase, rms phase that spreads and peak phase of tones of each declared error by a model. [rad]"""
+    """Phases of each declared error by a model, in three groups. [rad]
+
+    The groups are: `cubic` phase, rms phase that spreads power (`spread`), and peak phase of tones (`tone`).
+    """
     array, together = analysis.errors.array, analysis.together(model)
     return {
         "cubic": cubics(together.phases),
@@ -309,10 +319,10 @@ def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
 
 
 def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> list[UntakenEffect]:
-    """Find the effects that no requirement covers, and the rows that make up each effect that is not negligible.
+    """Find the effects that no requirement covers, and the rows that cause each of them.
 
-    With several gating models the largest value of each effect counts. `instead` are errors that replace the errors
-    with the same ids.
+    Rows are named only for effects that are not negligible. With several gating models, the largest value of each
+    effect counts. `instead` are errors that replace the errors with the same ids.
     """
     needs = analysis.mission.requirements
     level = negligible_rad(analysis.mission)
@@ -345,7 +355,7 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
 
 
 def _exchanged(phases_by_kind: Mapping[str, Phases], errors: Sequence[RandomError], model: str) -> dict[str, Phases]:
-    """Parts of effects, with the parts of `errors` in place of the parts with the same ids. [rad]"""
+    """Replace the phases of the errors that have the same ids as `errors` by the phases of `errors`. [rad]"""
     ids = {error.id for error in errors}
     exchanged = {kind: [phase for phase in phases if phase[0] not in ids] for kind, phases in phases_by_kind.items()}
     for error in errors:
@@ -356,13 +366,16 @@ def _exchanged(phases_by_kind: Mapping[str, Phases], errors: Sequence[RandomErro
 
 # ---------------------------------------------------------------------- displacements that no row holds
 def unplaced(together: Together) -> dict[str, Booleans]:
-    """Find the clocks that displace the image by an amount that the file does not state, with the cases."""
+    """Find the clocks that displace the image by an amount that the file does not state.
+
+    The result maps the row id of each random error to the cases in which it does so.
+    """
     return {error.subject.id: together.errors.array(error.displaces_unknown) > 0 for error in together.random}
 
 
 # ---------------------------------------------------------------------- in words
 class _Words(NamedTuple):
-    """Words of a row: the effect that adds up, its unit, the place of its limit in the file, and the equations."""
+    """Texts for a row: name of the summed effect, its unit, the key of its limit in the file, and the equations."""
 
     what: str
     unit: str
@@ -387,7 +400,7 @@ def _wording_of(row_subject: Subject, rule: str) -> _Words:
 
 
 def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, Note]:
-    """Id of the largest part, its size, and a note on data that it uses beyond the file."""
+    """Id and size of the largest error in a sum, and a note if the size relies on data from outside the file."""
     together, kind = case.analysis.together(model), aggregate.judged.subject.kind
     if kind == LOCATION:
         sizes = [(row_id, math.hypot(*move)) for row_id, move in together.displacement_parts(case.place)]
@@ -401,7 +414,10 @@ def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, 
 
 
 def _folded_spur(case: Case, row_id: str, size: float, kind: str) -> Note:
-    """Name the folded spur that makes most of an oscillator's phase after exchanges; empty if noise makes most."""
+    """Name the folded spur that causes most of an oscillator's phase after pulses are exchanged.
+
+    The note is empty if noise causes most of the phase.
+    """
     T, factor = case.mission.collection.aperture_time, case.mission.allocation.coverage_factor
     for spur in spurs_of(case.mission):
         slow = spur.slow_parts(T) if f"{spur.name}.oscillator" == row_id else None
@@ -411,7 +427,11 @@ def _folded_spur(case: Case, row_id: str, size: float, kind: str) -> Note:
 
 
 def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit: float | None) -> Note:
-    """Reason for a warning instead of a pass: all errors together, the model that does not gate, or a mask."""
+    """Reason why a pass becomes a warning.
+
+    The reason is one of: all errors together exceed the limit, the model that does not gate exceeds it, or the row
+    depends on noise below the first point of a mask.
+    """
     if limit is None:
         return NOTHING
     if case.number(aggregate.is_over_of_all):
@@ -434,22 +454,28 @@ def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit:
 # ---------------------------------------------------------------------- the scene's edge
 @dataclass(frozen=True, eq=False)
 class JudgedScene:
-    """The edges of scenes in many cases: the differences of phase at the edge; None without a declared error."""
+    """Differences of phase that errors cause at the edge of the scene, in many cases.
+
+    `edges` is None if no error is declared.
+    """
 
     analysis: Analysis
     edges: SceneEdges | None
 
     @cached_property
     def corrections(self) -> Corrections | None:
-        """Range over which one autofocus correction is valid; used in words only, because the search is slow."""
+        """Range over which one autofocus correction is valid.
+
+        Only the wording of rows uses it, because the search is slow.
+        """
         return None if self.edges is None else Corrections(self.edges, self.analysis.allocation.qpe_total)
 
     def edge(self, case: Case) -> SceneEdge | None:
-        """The edge of one case, with the range over which one autofocus correction is valid."""
+        """The edge of the scene in one case, with the range over which one autofocus correction is valid."""
         return None if self.corrections is None else SceneEdge.of(self.corrections, case.mission, case.place)
 
     def row(self, judging: Judging, model: str) -> "SceneRow":
-        """Judge the edges by a model; by the published model an error is the same all over the scene."""
+        """Judge the edges by a model. In the published model an error is the same everywhere in the scene."""
         row_subject, edges = subject("mission", "spatial_variance"), self.edges
         total = judging.array(self.analysis.allocation.qpe_total)
         allowable = None if model == "published" else total
@@ -468,12 +494,12 @@ class JudgedScene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneRow(FamilyRow):
-    """The row of the scene's edge in many cases."""
+    """The row for the edge of the scene, in many cases."""
 
     scene: JudgedScene
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Row of a case in words, by the model that judges it."""
+        """Describe the row of one case in words; `model` is the model that judges it."""
         edge, total = self.scene.edge(case), case.allocation.qpe_total
         doubt, degeneracy, notes = NOTHING, NOTHING, tuple[Note, ...]()
         if edge is not None:

@@ -1,8 +1,9 @@
-"""Check missions: compare declared errors with the allocated budget, one row per error and per sum.
+"""Check missions: compare declared errors with the allocated budget, with one row for each error and for each sum.
 
 `check_mission` checks one mission. `check_missions` checks missions of one shape together. `check_files` checks many
-files on all cores. The findings of a mission are some hundred objects. A caller that needs only a report passes
-`keep`: it reduces the findings in the process that made them, and saves a quarter of the time of a thousand missions.
+files on all cores. The findings of one mission consist of several hundred objects. A caller that needs only a report
+passes `keep`, a function that reduces the findings in the process that made them. This saves a quarter of the time
+for a thousand missions.
 """
 
 import gc
@@ -43,7 +44,7 @@ _CASES_AT_ONCE = 256  # arrays of more cases leave the cache
 
 
 def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_OUTSIDE) -> MissionFindings:
-    """Check one mission: judge it as a single case, and write the findings in words.
+    """Check one mission as a single case, and describe the findings in words.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_O
     today : date
         Day on which waivers are judged, UTC.
     outside : Outside
-        Options, settings and environment variables that bear on the verdict.
+        Options, settings and environment variables that affect the verdict.
 
     Returns
     -------
@@ -66,10 +67,10 @@ def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_O
 def check_missions(
     missions: Sequence[Mission], today: date, *, outside: Outside = NOTHING_OUTSIDE
 ) -> Iterator[tuple[int, MissionFindings]]:
-    """Check missions, and yield the index and the findings of each, in any order.
+    """Check missions, and yield the index and the findings of each mission, in any order.
 
-    Gives the same findings as `check_mission`. Missions of one shape are checked together. Checking missions together
-    never changes a status or a sentence; numbers may differ within the tolerance of the search.
+    The findings are the same as those of `check_mission`. Missions of one shape are checked together. This never
+    changes a status or a sentence, but numbers may differ within the tolerance of the search.
     """
     if len(missions) == 1:
         yield 0, check_mission(missions[0], today, outside=outside)
@@ -93,7 +94,7 @@ def check_missions(
 
 
 def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) -> MissionFindings:
-    """Write the findings of one judged case in words."""
+    """Describe the findings of one judged case in words."""
     mission, geometry = case.mission, case.geometry
     waived = apply_waivers(list(rows_in_words(judged, case)), mission, today)
     rows, requirements = waived.rows, requirements_in_words(judged, case, waived)
@@ -150,7 +151,7 @@ def _flown_paths(mission: Mission) -> tuple[tuple[str, FlownPath], ...]:
 
 
 def _overridden(mission: Mission) -> Iterator[Note]:
-    """Name the figures of parts that the file replaces."""
+    """Yield a note for each value of a catalogue part that the file overrides."""
     for name in PLATFORMS:
         platform = getattr(mission.platforms, name)
         for section in filter(None, (platform.motion_error, platform.oscillator)):
@@ -158,7 +159,7 @@ def _overridden(mission: Mission) -> Iterator[Note]:
 
 
 def _unused_keys(mission: Mission) -> Iterator[Note]:
-    """Name the keys of the file that this check does not use."""
+    """Yield a note for each key of the file that this check does not use."""
     keys = {
         "collection.pulses": mission.collection.pulses is not None,
         "simulation": mission.simulation is not None,
@@ -177,7 +178,7 @@ FILES_AT_ONCE = 500  # checked together at most
 
 
 class Draws(NamedTuple):
-    """Arguments of `monte_carlo`: number of draws, seed, and `share`, which works in one process only."""
+    """Arguments of `monte_carlo`: number of draws, seed, and `share`, which works in a single process only."""
 
     number: int
     seed: int | None
@@ -185,12 +186,12 @@ class Draws(NamedTuple):
 
 
 def without_analysis(findings: CheckedMission) -> CheckedMission:
-    """Keep the findings without the analysis: a thousand analyses fill the memory."""
+    """Return the findings without the analysis, because a thousand analyses would fill the memory."""
     return findings if isinstance(findings, UnusableMission) else findings._replace(analysis=None)
 
 
 def whole(findings: CheckedMission) -> CheckedMission:
-    """Keep the findings with the analysis. An analysis is too large to send between processes."""
+    """Return the findings together with the analysis, which is too large to send between processes."""
     return findings
 
 
@@ -204,7 +205,7 @@ def check_files(
     changes: Sequence[SetValue] = (),
     outside: Outside = NOTHING_OUTSIDE,
 ) -> list[Kept]:
-    """Check files, and return the results in the order of the files; many files are checked on all cores.
+    """Check files, and return the results in the order of the files. Many files are checked on all cores.
 
     Parameters
     ----------
@@ -213,7 +214,7 @@ def check_files(
     today : date
         Day on which waivers are judged, UTC.
     model : str or None
-        Gating model in place of each file's own.
+        Gating model that replaces the model of each file; None: each file's own model.
     keep : callable
         Function that reduces the findings of a file to the result, in the process that made the findings.
     drawn : Draws, optional
@@ -221,7 +222,7 @@ def check_files(
     changes : sequence of SetValue
         Values that replace values of each file.
     outside : Outside
-        Options, settings and environment variables that bear on the verdicts.
+        Options, settings and environment variables that affect the verdicts.
 
     Returns
     -------
@@ -247,9 +248,9 @@ def check_files(
 
 
 def _chunks(files: Sequence[str]) -> list[Sequence[str]]:
-    """Divide files into chunks that are checked together, an even number of chunks for many files.
+    """Divide files into chunks that are checked together. Many files give an even number of chunks.
 
-    The chunks do not depend on the number of cores: the last digits of a result depend on its chunk.
+    The chunks do not depend on the number of cores, because the last digits of a result depend on its chunk.
     """
     count = 1 if len(files) < FILES_FOR_TWO_PROCESSES else 2 * math.ceil(len(files) / (2 * FILES_AT_ONCE))
     ends = [chunk * len(files) // count for chunk in range(count + 1)]

@@ -1,4 +1,4 @@
-"""The confidence with which requirements are met: the sigma or the bounds of the declared errors."""
+"""The confidence level at which requirements are met, from the sigmas or bounds of the declared errors."""
 
 import math
 from collections.abc import Iterator
@@ -10,10 +10,10 @@ from bisar_budget.phrases import Note
 
 
 def confidence_of(case: Case) -> Note:
-    """Confidence of the verdict on one case, as the end of a sentence: `at 1 sigma`, `for the stated bounds`.
+    """Confidence level of the verdict on one case, as the end of a sentence: `at 1 sigma`, `for the stated bounds`.
 
-    Errors with a size and no distribution in the file (amplitudes of vibration, errors from elsewhere, the terrain)
-    do not count. An error of 0 counts only if all errors are 0.
+    Errors for which the file gives a size but no distribution do not count: amplitudes of vibration, errors from
+    elsewhere, the terrain. An error of 0 counts only if all errors are 0.
     """
     stated = list(_stated(case))
     distributions = {name for name, is_nonzero in stated if is_nonzero} or {name for name, _ in stated}
@@ -22,7 +22,7 @@ def confidence_of(case: Case) -> Note:
 
 
 def _stated(case: Case) -> Iterator[tuple[str, bool]]:
-    """Distribution of each declared error with a distribution, and whether its size is known and not 0."""
+    """Yield the distribution of each declared error that has one, and whether its size is known and nonzero."""
     for source in case.analysis.errors.stated:
         if source.is_covered:
             yield distribution_of(case.mission, source), _is_nonzero(case.number(source.declared))

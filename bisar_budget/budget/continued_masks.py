@@ -1,7 +1,8 @@
-"""Rows that depend on phase noise below the first point of an oscillator's mask: no data sheet states this noise.
+"""Warnings for rows that depend on phase noise below the first point of a mask, which no data sheet specifies.
 
-A mask continues below its first point as f⁻³. A pass becomes a warning if more than half of a row's power lies there
-and the row uses more than a tenth of its limit. The warning gives the frequency down to which the mask should reach.
+Below its first point the mask of an oscillator is extrapolated as f⁻³. A pass becomes a warning if more than half of
+a row's power lies in this extrapolated part and the row uses more than a tenth of its limit. The warning gives the
+frequency down to which the mask should reach.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,12 +24,15 @@ Part = str  # quadratic, cubic, spread or displacement
 
 
 def part_of(effect: RandomEffect, effect_kind: Part) -> Any:
-    """The size of an effect per unit that `effect_kind` names: a phase, an rms phase or a displacement."""
+    """Size of one kind of effect per unit of the error: a phase, an rms phase or a displacement."""
     return getattr(effect, effect_kind)
 
 
 def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> PerCase:
-    """Power of an effect of declared errors by noise below the first points of masks; 0 without such noise."""
+    """Power of the part of an effect that noise below the first points of masks causes; 0 without such noise.
+
+    `effect_kind` names the effect. All declared `errors` are summed.
+    """
     power: PerCase = 0.0
     for error in errors:
         if error.continued is not None and error.declared is not None:
@@ -37,14 +41,17 @@ def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> PerCase
 
 
 def rests_on_masks(errors: Iterable[RandomError], effect_kind: Part, size: PerCase, limit: PerCase) -> PerCaseFlag:
-    """Whether a size, with its limit, depends on noise below the first points of masks, in each case."""
+    """Whether a row depends on noise below the first points of masks, in each case, given its size and its limit."""
     power = continued_power(errors, effect_kind)
     with np.errstate(all="ignore"):
         return (power > MOST_OF_POWER * np.square(size)) & (size > MIN_USE_FRACTION * np.asarray(limit))
 
 
 def continuation_note(case: Case, errors: Sequence[RandomError], effect_kind: Part, size: float) -> Note:
-    """Give the share of a row's power below the first points of masks, and how far down a mask should reach."""
+    """Note with the share of a row's power below the first points of masks, and with the frequency to cover.
+
+    The note is empty if no declared error has such noise or if `size` is 0.
+    """
     makers = [error for error in errors if error.continued is not None and error.declared is not None]
     if not makers or not size:
         return NOTHING

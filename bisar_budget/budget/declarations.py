@@ -1,8 +1,8 @@
-"""Kinds of error that a mission can declare: declared kinds, missing kinds, and the kinds in `requirements.declare`.
+"""Kinds of error that a mission can declare: declared kinds, missing kinds, kinds that `requirements.declare` names.
 
-A figure of a kind declares the kind, also a figure of zero. An empty section declares no kind. Half of a cause does
-not declare its kind: a lever arm without an attitude error that swings it, an oscillator with a sensitivity to an
-acceleration which the file does not state.
+A kind is declared by any value of it in the file, including zero. An empty section declares no kind. A cause of which
+only one half is given does not declare its kind. Examples are a lever arm without an attitude error that rotates it,
+and an oscillator with a sensitivity to acceleration but without a stated acceleration.
 """
 
 from collections.abc import Callable, Container, Iterator, Mapping
@@ -24,9 +24,10 @@ DECLARATIONS = subject("mission", DECLARE)  # the row of all required declaratio
 
 
 class Missing(NamedTuple):
-    """An error that the file should declare and does not: owner and kind of its rows, and its key in the file.
+    """A required error that the file does not declare: the owner and kind of its rows, and its key in the file.
 
-    If the file states half of the error, `lacks` names the absent key: half of the error has no effect alone.
+    If the file gives only half of the error, `lacks` names the missing key. Half of an error has no effect on its
+    own.
     """
 
     owner: str
@@ -37,7 +38,7 @@ class Missing(NamedTuple):
 
 # ---------------------------------------------------------------------- half of a cause
 def swings_nothing(platform: Platform) -> bool:
-    """Whether the file states a lever arm of a platform, but no attitude error that swings the arm."""
+    """Whether the file gives a platform a lever arm but no attitude error that would rotate the arm."""
     lever, imu = platform.motion_error.lever_arm, platform.motion_error.imu
     if lever is None or lever.arm is None or not any(map(np.any, lever.arm)):
         return False
@@ -45,14 +46,20 @@ def swings_nothing(platform: Platform) -> bool:
 
 
 def _lacks_an_attitude(mission: Mission, name: str) -> str:
-    """Keys that the file lacks for a lever arm: attitude errors swing the full arm, not only its uncertainty."""
+    """Keys that are missing for a lever arm, joined in one text.
+
+    Attitude errors rotate the full arm. The uncertainty of the arm alone is not enough.
+    """
     if not swings_nothing(getattr(mission.platforms, name)):
         return ""
     return "imu.attitude, gyro_bias or angle_random_walk, which swings the arm"
 
 
 def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
-    """Keys that the file lacks for an oscillator: vibration and sensitivity have an effect only together."""
+    """Keys that are missing for an oscillator.
+
+    Vibration and acceleration sensitivity have an effect only together.
+    """
     platform: Platform = getattr(mission.platforms, name)
     if platform.oscillator is not None and platform.oscillator.acceleration_sensitivity is None:
         vibration = platform.motion_error.vibration
@@ -70,16 +77,16 @@ def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
 
 # ---------------------------------------------------------------------- the table of kinds
 def _whole(mission: Mission, name: str) -> str:
-    """Empty: a kind of error without halves lacks no key."""
+    """Return an empty text: a kind of error without halves has no missing key."""
     return ""
 
 
 @dataclass(frozen=True)
 class _OfPlatform:
-    """A kind of error that each platform has: its key below the platform, and tests of a platform's statements.
+    """A kind of error that each platform can have: its key below the platform, and tests of what the file states.
 
-    `lacks` names the missing key without which a platform's statement has no effect; empty if the statement is
-    complete. A kind that is not `is_owed` is listed only if the file states something about it.
+    `lacks` returns the missing key without which the platform's statement has no effect, or an empty text if the
+    statement is complete. A kind that is not `is_owed` is listed only if the file states something about it.
     """
 
     key: str
@@ -170,7 +177,10 @@ _KINDS_OF_PLATFORMS: Mapping[str, _OfPlatform] = {
 
 @dataclass(frozen=True)
 class _OfMission:
-    """A kind of error of the clocks, of the air, of both platforms or of no owner, with tests of a mission for it."""
+    """A kind of error that no single platform owns, with functions that test whether a mission declares it.
+
+    The owner is the clocks, the air, both platforms together, or none.
+    """
 
     owner: str
     is_stated: Callable[[Mission], bool]
@@ -180,7 +190,7 @@ class _OfMission:
 
 
 def _states_clock(mission: Mission) -> bool:
-    """Whether the file states an error of the clock: any of its terms, or an error that remains after setting."""
+    """Whether the file states a clock error: one of its terms, or an error that remains after the clock is set."""
     sync = mission.synchronization
     setting = () if sync is None else (sync.time_error, sync.frequency_error)
     return any(term is not None for term in (*mission.timing_error, *setting))
@@ -192,12 +202,15 @@ def _key_of_clock(mission: Mission) -> list[str]:
 
 
 def _runs_two_clocks(mission: Mission) -> bool:
-    """Whether both oscillators count: with a direct path the receiver takes the transmitter's signal as its clock."""
+    """Whether both oscillators matter. With a direct path the receiver uses the transmitter's signal as its clock."""
     return not mission.has_direct_path
 
 
 def _lacking_of_setting(mission: Mission) -> list[str]:
-    """Missing keys of the synchronisation; clocks in holdover need both errors that remain after setting."""
+    """Missing keys of the synchronisation.
+
+    Clocks in holdover need both errors that remain after the clocks are set.
+    """
     sync = mission.synchronization
     if sync is None:
         return ["synchronization"]
@@ -206,7 +219,10 @@ def _lacking_of_setting(mission: Mission) -> list[str]:
 
 
 def _legs_without_delay(mission: Mission) -> list[str]:
-    """Missing keys of the air: `propagation`, or each leg without a delay whose elevation is high enough for it."""
+    """Missing keys of the air: `propagation`, or the keys of legs without a delay.
+
+    A leg counts only if its elevation is high enough for a zenith delay to apply.
+    """
     if mission.propagation is None:
         return ["propagation"]
     T, lacking = mission.collection.aperture_time, []
@@ -264,10 +280,10 @@ _OF_HALVES = ("propagation", "synchronization")  # kinds that the file may state
 
 # ---------------------------------------------------------------------- declarations of a mission
 def declared_kinds(mission: Mission) -> DeclaredKinds:
-    """List the kinds of error, by owner, that a mission declares, that it should declare, and that lack a source.
+    """List the kinds of error by owner: those that a mission declares, should declare, or gives without a source.
 
-    A covariance counts as position and velocity. With a direct path as clock there are no timing errors and no
-    oscillators.
+    A covariance counts as position and velocity. If a direct path provides the clock, there are no timing errors and
+    no oscillators.
     """
     declared, missing, without_source = list[str](), list[str](), list[str]()
     still = still_platforms(mission)
@@ -294,7 +310,7 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
 
 
 def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
-    """Phase noise and vibration spectra that the file shifts by a level from the values of their source."""
+    """Yield each phase noise or vibration spectrum that the file shifts by a level from the values of its source."""
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         oscillator, vibration = platform.oscillator, platform.motion_error.vibration
@@ -317,12 +333,18 @@ def still_platforms(mission: Mission) -> list[str]:
 
 # ---------------------------------------------------------------------- required declarations
 def missing_declarations(mission: Mission, still: Container[str] | None = None) -> list[Missing]:
-    """List all errors that `requirements.declare` requires and the file does not declare, each once.
+    """List the errors that `requirements.declare` requires and the file does not declare, each once.
 
-    A covariance declares position and velocity. Any term of its error declares the clock, lines or noise declare a
-    vibration, any figure declares an inertial sensor, the delays of each leg declare the air. A platform that does
-    not move needs its position only, and an oscillator if the requirement names the platform. An error that is common
-    to both platforms does not declare their own errors.
+    A kind of error is declared as follows:
+
+    - position and velocity: also by a covariance;
+    - the clock: by any term of its error;
+    - a vibration: by lines or by noise;
+    - an inertial sensor: by any of its values;
+    - the air: by the delays of each leg.
+
+    A platform that does not move needs only its position, and an oscillator if the requirement names the platform. An
+    error that both platforms share does not declare the errors of the single platforms.
 
     Parameters
     ----------
@@ -359,5 +381,5 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
 
 
 def is_asked_for(row_subject: Subject, missing: Missing) -> bool:
-    """Whether a row is about a required error that is missing."""
+    """Whether a row belongs to a required error that the file does not declare."""
     return row_subject.owner == missing.owner and (row_subject.kind == missing.kind or missing.kind == "timing")

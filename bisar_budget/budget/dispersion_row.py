@@ -1,7 +1,7 @@
-"""The row of dispersion in the air: free electrons bend the phase over the band, which blurs an image in range.
+"""The row for dispersion: free electrons curve the phase over the band, which blurs the image in range.
 
-The quadratic requirement limits dispersion alone: dispersion is a phase over frequency, which does not add to phases
-over slow time. It may use the full requirement, because no owner has a share for the air. Autofocus does not correct
+The quadratic requirement limits dispersion alone, because a phase over frequency does not add to phases over slow
+time. Dispersion may use the full requirement, because no owner has a share for the air. Autofocus does not correct
 it.
 """
 
@@ -24,7 +24,10 @@ DISPERSION = subject("mission", "dispersion")
 
 
 def dispersion_rows(judging: Judging, analysis: Analysis) -> Iterator["DispersionRow"]:
-    """Judge the quadratic phase at the edges of the band; no row without a declared electron content."""
+    """Yield the row that judges the quadratic phase at the edges of the band.
+
+    There is no row if no electron content is declared.
+    """
     propagation = analysis.mission.propagation
     if propagation is None or all(propagation.content(name) is None for name in PLATFORMS):
         return
@@ -37,10 +40,10 @@ def dispersion_rows(judging: Judging, analysis: Analysis) -> Iterator["Dispersio
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DispersionRow(FamilyRow):
-    """The row that judges the quadratic phase by dispersion in the air, in many cases. [rad]"""
+    """The row for the quadratic phase that dispersion in the air causes, in many cases. [rad]"""
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Row of a case in words; it is the same for both models."""
+        """Describe the row of one case in words, which are the same for both models."""
         propagation = case.mission.propagation
         assert propagation is not None  # else there is no row
         contents: dict[str, Any] = {name: propagation.content(name) for name in PLATFORMS}

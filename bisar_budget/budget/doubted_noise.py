@@ -1,9 +1,9 @@
-"""Rows that depend on an oscillator with doubted noise: they are not evaluated.
+"""Rows that depend on doubtful noise of an oscillator. Such rows are not evaluated.
 
-A mask without its frequency, in a file that also names a part, is taken at the frequency of the part: at a different
-frequency the same decibels are different noise. A power law that fits an Allan deviation badly does not describe the
-oscillator. If such noise uses more than a tenth of a limit, the row with this limit is not evaluated, unless it fails
-anyway.
+There are two reasons for doubt. The file may give a mask without its frequency and also name a part. The mask is then
+taken at the frequency of the part, but at a different frequency the same decibels mean different noise. Or a power
+law may fit an Allan deviation badly, so that it does not describe the oscillator. If such noise uses more than a
+tenth of a limit, the row with this limit is not evaluated, unless it fails anyway.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -23,9 +23,10 @@ from bisar_budget.phrases import NOTHING, Note
 def rests_on_doubted_noise(
     errors: Iterable[RandomError], effect_kind: Part, model: str, limit: PerCase
 ) -> PerCaseFlag:
-    """Whether the doubted noise of oscillators causes an effect above a tenth of its limit, in each case.
+    """Whether doubtful noise of oscillators causes more than a tenth of a limit, in each case.
 
-    The effect is the quadrature sum over the oscillators in doubt. `effect_kind` names it, and `limit` has its unit.
+    The effect is the root-sum-square over the oscillators in doubt. `effect_kind` names the effect. `limit` is in the
+    unit of the effect.
     """
     power: PerCase = 0.0
     for error in errors:
@@ -37,19 +38,19 @@ def rests_on_doubted_noise(
 
 
 def has_doubted_frequency(mission: Mission, platform: str) -> bool:
-    """Whether the tones of an oscillator are taken at the frequency of a part that the file replaces."""
+    """Whether the spurs of an oscillator are taken at the frequency of a catalogue part that the file overrides."""
     oscillator = getattr(mission.platforms, platform).oscillator
     return oscillator is not None and bool(oscillator.spurs) and oscillator.mask_at_frequency_of_part is not None
 
 
 def doubted_noise_note(mission: Mission, platforms: Sequence[str] = PLATFORMS) -> Note:
-    """Name the keys that leave the noise of oscillators in doubt, and the statements to write instead."""
+    """Note with the keys that make the noise of oscillators doubtful, and with the entries to write instead."""
     notes = [note for name in platforms for _, note in noise_doubts(mission, name)]
     return notes[0].then(*notes[1:]) if notes else NOTHING
 
 
 def noise_doubts(mission: Mission, platform: str) -> Iterator[tuple[str, Note]]:
-    """Keys of an oscillator that leave its noise in doubt, each with a sentence."""
+    """Yield each key that makes the noise of an oscillator doubtful, with a sentence that explains it."""
     oscillator = getattr(mission.platforms, platform).oscillator
     if oscillator is None:
         return

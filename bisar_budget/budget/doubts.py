@@ -1,8 +1,9 @@
-"""Doubts about the input of a check: paths that may stray from the truth, a model or a collection at its edge.
+"""Doubts about the input of a check: paths that may be inaccurate, and models or collections at their limits.
 
-The truth may differ from a path by an orbit or a log by a known distance: by the age of the elements, the
-interpolation of the ephemeris, the residual of the smoothed log. A smaller declared position error cannot be true of
-this path. A declared error cannot be true either if the source of the path states a larger error.
+A path from an orbit or a log may differ from the true path by a known distance. The causes are the age of the
+elements, the interpolation of the ephemeris, and the residual of the smoothed log. A declared position error smaller
+than this distance cannot be right. A declared error also cannot be right if the source of the path states a larger
+error.
 
 A log has two further errors: the residual, which is the difference between its fixes and its smooth path, and the
 step to which the fixes are rounded. A processor that uses the smooth path has neither error. A processor that uses
@@ -43,13 +44,15 @@ _EQUAL_VARIANCE_FRACTION = 1e-6  # relative, of variances: an equal variance is 
 
 @dataclass(frozen=True)
 class InputDoubt:
-    """A platform whose path is in doubt by more than the file declares.
+    """A platform whose path may be less accurate than the file declares.
 
-    `doubt` is the distance by which the truth may differ from the path, or the error that the path's source states,
-    along the axis on which it exceeds the declared error most. `declared` is the declared error without the coverage
-    factor, 0 if the file declares no error. Both are root-sum-squares if the doubt has no direction. [m] or [m/s], by
-    the `kind`. `note` gives both values. With `is_of_log`, `doubt` is the residual of a log [rad], and `declared` the
-    largest residual that needs no statement; or `doubt` is a step of the log's fixes.
+    `doubt` is the distance between the path and the possible true path, or the error that the source of the path
+    states. It is given along the axis on which it exceeds the declared error most. `declared` is the declared error
+    without the coverage factor; it is 0 if the file declares no error. Both values are root-sum-squares if the doubt
+    has no direction. The unit is [m] or [m/s], depending on `kind`. `note` gives both values in words.
+
+    If `is_of_log` is set, the doubt comes from a log. `doubt` is then either the residual of the log [rad], with the
+    largest acceptable residual as `declared`, or the step to which the fixes are rounded. [m]
     """
 
     owner: str
@@ -62,7 +65,7 @@ class InputDoubt:
 
 
 def input_doubts(mission: Mission) -> list[InputDoubt]:
-    """Platforms whose paths are in doubt by more than the file declares."""
+    """List the platforms whose paths may be less accurate than the file declares."""
     doubts = []
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
@@ -89,7 +92,7 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
 
 
 def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Booleans]:
-    """Cases in which a platform's path is in doubt by more than the file declares, by platform and kind of error."""
+    """Mark the cases in which a path may be less accurate than the file declares, by platform and kind of error."""
     doubted = {}
     for name in PLATFORMS:
         path: FlownPath | None = getattr(mission.platforms, name).path
@@ -104,10 +107,10 @@ def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Boo
 
 # ---------------------------------------------------------------------- how far the truth may be from a path
 def strays(mission: Mission, name: str) -> PerCaseFlag:
-    """Whether the truth may be farther from a platform's path than the file declares, in each case.
+    """Whether the true path may differ from a platform's path by more than the declared position error, in each case.
 
-    If no error is declared, age, interpolation and residual count if they are unusual, or if such an error would use
-    more than a negligible part of a requirement.
+    If no error is declared, the possible difference counts if age, interpolation or residual are unusual, or if the
+    difference would use more than a negligible part of a requirement.
     """
     platform: Platform = getattr(mission.platforms, name)
     path, declared = platform.path, declared_position_error(platform.motion_error)
@@ -125,7 +128,7 @@ def strays(mission: Mission, name: str) -> PerCaseFlag:
 def declared_position_error(error: MotionError) -> Any:
     """Root-sum-square of a platform's position errors, constant and random (GNSS); None without such an error. [m]
 
-    The result is an array (cases,) if numbers of the mission are.
+    The result is an array (cases,) if the mission has arrays in place of numbers.
     """
     stated = error.stated("position")
     sizes = [*(stated or ()), *(sigma for process in error.random for sigma in process.sigma)]
@@ -133,9 +136,10 @@ def declared_position_error(error: MotionError) -> Any:
 
 
 def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, kind: str = "position") -> bool:
-    """Whether a row is about a kind of error of a platform, along the axes in which the file states the error.
+    """Whether a row judges a kind of error of a platform, in the frame in which the file states the error.
 
-    The residual of a log spreads: it concerns its own row, and the rows of the sums of spread power.
+    The residual of a log spreads power. It therefore affects its own row, and the rows that sum spread power for the
+    platform and for the mission.
     """
     if kind == RESIDUAL:
         return row_subject == residual_subject(owner) or (
@@ -150,10 +154,11 @@ def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, kind: str = 
 def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) -> PerCaseFlag:
     """Whether the source of a path states a larger error than the file declares, in each case.
 
-    An error is larger if it has more variance in any direction. For a source without directions the root-sum-squares
-    are compared. A velocity error counts only if it would use more than a negligible part of a requirement: an
-    ephemeris may have good positions and bad velocities, and the path follows the positions. The same holds for a
-    usual position error if the file declares no position error.
+    An error is larger if its variance is larger in any direction. For a source without directions, the
+    root-sum-squares are compared. A velocity error counts only if it would use more than a negligible part of a
+    requirement: an ephemeris may have good positions and bad velocities, and the path follows the positions. If the
+    file declares no position error, the same condition applies to a position error that is only typical of the
+    source.
     """
     platform: Platform = getattr(mission.platforms, name)
     stated_covariance = _stated_covariance(stated, kind, platform)
@@ -179,7 +184,8 @@ def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) 
 def _stated_covariance(stated: StatedAccuracy, kind: str, platform: Platform) -> Floats | None:
     """Covariance (..., 3, 3) of a kind of error along the scene's axes; None if the source does not state it.
 
-    A velocity of a platform in free fall is against the stars where the file states its errors in `ric`.
+    For a platform in free fall whose errors the file states in the frame `ric`, the velocity is relative to the
+    stars.
     """
     covariance, row, fall = stated.covariance, 3 * MOTION_KINDS.index(kind), platform.state.fall
     if covariance is None or len(covariance) <= row:
@@ -198,7 +204,7 @@ def _stated_covariance(stated: StatedAccuracy, kind: str, platform: Platform) ->
 
 
 def _declared_covariance(platform: Platform, kind: str) -> Floats:
-    """Covariance (..., 3, 3) of the errors of a kind that the file declares, along the scene's axes."""
+    """Covariance (..., 3, 3) of the declared errors of one kind, along the scene's axes."""
     error = platform.motion_error
     sizes = error.stated(kind) or (0.0, 0.0, 0.0)
     correlation = np.eye(3).tolist() if error.covariance is None else error.covariance.block(kind)
@@ -212,13 +218,16 @@ def _declared_covariance(platform: Platform, kind: str) -> Floats:
 
 
 def _stack(rows: Sequence[Sequence[PerCase]]) -> Floats:
-    """A matrix (..., 3, 3) from its elements, numbers or arrays (cases,)."""
+    """Stack nine elements, numbers or arrays (cases,), into a matrix (..., 3, 3)."""
     elements = np.broadcast_arrays(*(np.asarray(element, dtype=float) for row in rows for element in row))
     return np.moveaxis(np.array(elements).reshape(3, 3, *elements[0].shape), (0, 1), (-2, -1))
 
 
 def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccuracy) -> InputDoubt:
-    """The doubt by the errors that a source states and that the file declares, on the axis of largest difference."""
+    """Describe the doubt about a path whose source states a larger error than the file declares.
+
+    The values are given on the axis with the largest difference.
+    """
     error = platform.motion_error
     key = f"platforms.{name}.motion_error.{kind if error.covariance is None else 'covariance'}"
     stated_covariance, declared = _stated_covariance(stated, kind, platform), _declared_covariance(platform, kind)
@@ -252,13 +261,13 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
 
 # ---------------------------------------------------------------------- the residual of a log
 def leaves_unsaid(mission: Mission, name: str) -> PerCaseFlag:
-    """Whether a log has too large a residual, and the file does not state whether the processor uses its fixes."""
+    """Whether the residual of a log is too large and the file does not state whether the processor uses the fixes."""
     log = _unsaid_log(mission, name)
     return False if log is None else np.asarray(residual_phase(mission, name)) > MOST_RESIDUAL_RAD
 
 
 def residual_phase(mission: Mission, name: str) -> PerCase:
-    """Phase of the residual of a log's fixes along the line of sight, rms over the aperture. [rad]"""
+    """Rms phase over the aperture that the residual of a log's fixes causes along the line of sight. [rad]"""
     path: FlownPath | None = getattr(mission.platforms, name).path
     if path is None or path.log_noise is None:
         return 0.0
@@ -272,11 +281,11 @@ def residual_phase(mission: Mission, name: str) -> PerCase:
 
 
 def is_coarse(mission: Mission, name: str) -> PerCaseFlag:
-    """Whether a step of a log's fixes is too coarse, and the file does not state whether the processor uses them.
+    """Whether the rounding step of a log's fixes is too coarse, and the file does not state which path is processed.
 
     A step is too coarse if it exceeds a tenth of the declared position error along any direction. If the file
-    declares no position error, the step must also use more than a negligible part of a requirement: rounding is a
-    uniform error, whose variance is a twelfth of the square of the step.
+    declares no position error, the step must also use more than a negligible part of a requirement. Rounding is a
+    uniform error with a variance of one twelfth of the square of the step.
     """
     log = _unsaid_log(mission, name)
     if log is None:
@@ -293,14 +302,20 @@ def is_coarse(mission: Mission, name: str) -> PerCaseFlag:
 
 
 def _unsaid_log(mission: Mission, name: str) -> LogNoise | None:
-    """Noise of a platform's log if the file does not state which path the processor uses; otherwise None."""
+    """Noise of a platform's log if the file does not state which path the processor uses; otherwise None.
+
+    The result is also None for a platform without a log.
+    """
     path: FlownPath | None = getattr(mission.platforms, name).path
     log = None if path is None else path.log_noise
     return log if log is not None and log.processed is None else None
 
 
 def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
-    """The doubt by the step of a log's fixes, on the axis of the position error on which the step exceeds it most."""
+    """Describe the doubt that the rounding step of a log's fixes causes.
+
+    The values are given on the axis where the step exceeds the allowed part of the declared position error most.
+    """
     assert platform.path is not None
     assert platform.path.log_noise is not None
     error = platform.motion_error
@@ -318,7 +333,7 @@ def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
 
 # ---------------------------------------------------------------------- the effect of a doubt
 def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Booleans:
-    """Whether an error of a platform, by its covariance, uses more than a negligible part of a requirement."""
+    """Whether an error with a covariance uses more than a negligible part of a requirement, in each case."""
     needs, half = mission.requirements, np.asarray(mission.collection.aperture_time) / 2
     with np.errstate(all="ignore"):
         before, middle, after = _range_errors(mission, name, kind, half)
@@ -337,9 +352,9 @@ def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Bool
 
 
 def _range_errors(mission: Mission, name: str, kind: str, half: Floats) -> Sequence[Floats]:
-    """Range that a unit error of a platform along each axis adds at both ends of the aperture and in its middle.
+    """Range errors due to a unit error of a platform along each axis, at slow times −T/2, 0 and T/2. [m]
 
-    At −T/2, 0 and T/2, (..., 3) each. [m]
+    T is the aperture time. Each of the three arrays has the shape (..., 3).
     """
     sights = [
         np.stack(np.broadcast_arrays(*_sight(mission, name, time)), axis=-1) for time in (-half, 0.0 * half, half)
@@ -362,7 +377,10 @@ def _range_errors(mission: Mission, name: str, kind: str, half: Floats) -> Seque
 
 
 def _sight(mission: Mission, name: str, time: Any) -> Any:
-    """Range that a metre of a platform's motion along each axis adds at a slow time, less the direct path's range."""
+    """Change of range per metre of a platform's motion along each axis (x, y, z), at a slow time.
+
+    With a direct path, the change of the direct path's range is subtracted.
+    """
     platforms = mission.platforms
     path: PlatformState = getattr(platforms, name).state
     sight = unit(path.place(time))
@@ -375,7 +393,10 @@ def _sight(mission: Mission, name: str, time: Any) -> Any:
 
 
 def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floats:
-    """Displacement on the ground (..., 2, 3) per metre of an error, by range and its rate per metre, as in (25)."""
+    """Displacement on the ground (..., 2, 3) per metre of an error along each axis, as in (25).
+
+    `constant` and `linear` are the range error and its rate per metre of the error.
+    """
     (a, b), (c, d) = geometry.range_gradient, geometry.doppler_gradient
     determinant = np.asarray(a * d - b * c)[..., None]
     east = (np.asarray(d)[..., None] * constant - np.asarray(b)[..., None] * linear) / determinant
@@ -385,11 +406,12 @@ def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floa
 
 # ---------------------------------------------------------------------- errors of an orbit
 def orbit_notes(case: Case, rows: Sequence[Row]) -> Iterator[Note]:
-    """Notes on platforms in free fall whose position and velocity errors cannot be independent.
+    """Yield a note for each platform in free fall whose position and velocity errors cannot be independent.
 
-    The errors of an orbit are correlated: a position error δr goes with a velocity error of about n·δr, n the rate of
-    the orbit. Declared as independent and smaller than n·δr, they leave more phase than the orbit's covariance. The
-    note is given if the position errors use more than a negligible part of a limit.
+    The errors of an orbit are correlated: a position error δr comes with a velocity error of about n·δr, where n is
+    the angular rate of the orbit. If both are declared as independent and the velocity error is smaller than n·δr,
+    they leave more phase than the covariance of the orbit. The note is given if the position errors use more than a
+    negligible part of a limit.
     """
     for index, name in enumerate(PLATFORMS):
         state, error = case.geometry.both[index], getattr(case.mission.platforms, name).motion_error
@@ -410,9 +432,9 @@ MAX_MODEL_DIFFERENCE_FRACTION = (
 
 
 def model_doubt(case: Case, rows: Sequence[Row]) -> Note:
-    """Name a declared error for which the published model decides but does not hold; empty if there is no such error.
+    """Name a declared error that the published model judges although the model does not hold for it.
 
-    The note names the row whose two utilizations, by the two allowables, differ most.
+    The note names the row whose utilizations by the two models differ most. It is empty if there is no such error.
 
     Parameters
     ----------
@@ -439,7 +461,7 @@ def _is_apart(row: Row) -> bool:
 
 
 def _difference(row: Row) -> float:
-    """Difference of the utilizations of a row by its two allowables."""
+    """Difference between the utilizations of a row by the allowables of the two models."""
     declared, limits = row.declared or 0.0, (row.allowable_published, row.allowable_full)
     published, full = (0.0 if limit is None else declared / limit for limit in limits)
     return abs(published - full)
@@ -450,7 +472,7 @@ _TURNING_RAD = 0.1  # half the turn of a line of sight; the quartic term is 1 % 
 
 
 def missing_settings(mission: Mission) -> list[str]:
-    """List the errors that remain after setting clocks in holdover and that the file does not state."""
+    """List the missing errors of clocks in holdover: errors that remain after the clocks are set."""
     sync = mission.synchronization
     if sync is None or not sync.is_holdover:
         return []
@@ -458,7 +480,7 @@ def missing_settings(mission: Mission) -> list[str]:
 
 
 def collection_notes(case: Case) -> Iterator[Note]:
-    """Notes on collections beyond the published model, and on images that show less than the full model."""
+    """Yield notes on collections beyond the published model, and on images that show less than the full model."""
     mission = case.mission
     for name, state in zip(PLATFORMS, case.geometry.both, strict=True):
         if not state.is_straight:

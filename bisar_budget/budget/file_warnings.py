@@ -1,7 +1,8 @@
-"""Warnings about a mission file: the finders that decide when to give each; `phrases` has the sentences.
+"""Warnings about a mission file: functions that decide when to warn. The sentences are in `phrases`.
 
-Most warnings change no verdict. A warning that doubts the checked mission sets the status to `warn` at least. A
-finder gives a sentence and the key that it is about; the line of the key is looked up here, once.
+Most warnings do not change the verdict. A warning that casts doubt on the checked mission sets the status to at least
+`warn`. Each function yields a sentence and the key that it refers to. The line of the key in the file is looked up
+here, in one place.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,7 +31,7 @@ _SENSITIVITY = "acceleration_sensitivity"
 
 
 class _Warned(NamedTuple):
-    """A sentence and the key of the file that it is about; None: the sentence is about the whole file."""
+    """A sentence and the key of the file to which it refers; None if it refers to the whole file."""
 
     key: KeyPath | None
     message: Note
@@ -95,7 +96,10 @@ def _nothing_declared(rows: Sequence[Row]) -> Iterator[_Warned]:
 
 # ---------------------------------------------------------------------- how platforms fly
 def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
-    """Warn of paths in doubt that no row reports; a position doubt is separate from the residual of a log."""
+    """Warn of inaccurate paths that no row reports.
+
+    Doubts about the position and about the residual of a log are treated separately.
+    """
     owners = {doubt.owner for doubt in input_doubts(mission) if not doubt.is_stated}
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
@@ -112,7 +116,7 @@ def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
 
 
 def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
-    """Warn of logs whose noise changes the allowables, through the path that is fitted to the log."""
+    """Warn of logs whose noise changes the allowables, because the path is fitted to the log."""
     for name in PLATFORMS:
         noise = allowable_noise(mission, name)
         if noise is not None and noise.change > MAX_UNSAID_CHANGE_FRACTION:
@@ -121,10 +125,10 @@ def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
 
 
 def straight_orbits(mission: Mission) -> Iterator[_Warned]:
-    """Warn of each platform as fast as a satellite without `acceleration`; give the acceleration of its orbit.
+    """Warn of platforms that are as fast as a satellite but have no `acceleration`, and give the acceleration to use.
 
-    Over an aperture T the missing acceleration a moves the true path by aT²/8 against the straight path: 25 m in 5 s.
-    A file that states an acceleration has made the choice, also with zero.
+    Over an aperture time T, a missing acceleration a moves the true path away from the straight path by aT²/8, for
+    example 25 m in 5 s. A file that states an acceleration, including zero, has made the choice.
     """
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
@@ -142,7 +146,7 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
 
 # ---------------------------------------------------------------------- how errors are stated
 def _of_instruments(case: Case) -> Iterator[_Warned]:
-    """Warn of the ways in which sensors and clocks are stated, and of errors that are stated twice."""
+    """Warn of rare exchanges of pulses, missing errors of clocks after setting, and errors that are stated twice."""
     mission, sync = case.mission, case.mission.synchronization
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
@@ -156,7 +160,7 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
 
 
 def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
-    """Warn of lever arms without an attitude error in the file that swings them."""
+    """Warn of lever arms for which the file states no attitude error that would rotate them."""
     for name in PLATFORMS:
         if swings_nothing(getattr(mission.platforms, name)):
             key = ("platforms", name, "motion_error", "lever_arm", "arm")
@@ -164,7 +168,7 @@ def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
 
 
 def calm_oscillators(mission: Mission) -> list[str]:
-    """Platforms whose oscillators have a stated sensitivity to acceleration, but neither vibration nor turn."""
+    """List the platforms whose oscillators have an acceleration sensitivity but neither vibration nor a turn."""
     return [
         name
         for name in PLATFORMS
@@ -173,14 +177,14 @@ def calm_oscillators(mission: Mission) -> list[str]:
 
 
 def _of_calm_oscillators(mission: Mission) -> Iterator[_Warned]:
-    """Warn of stated sensitivities to acceleration of oscillators that neither vibrate nor turn."""
+    """Warn of acceleration sensitivities of oscillators that neither vibrate nor turn."""
     for name in calm_oscillators(mission):
         key = ("platforms", name, "oscillator", _SENSITIVITY)
         yield _Warned(key, phrases.note("nothing-shakes-the-oscillator", platform=name), is_doubt=True)
 
 
 def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
-    """Warn of oscillators with doubted noise that no row reports: no requirement depends on the noise."""
+    """Warn of oscillators with doubtful noise that no row reports because no requirement depends on the noise."""
     for name in PLATFORMS:
         for key, sentence in noise_doubts(mission, name):
             if not any(row.reason is not None and row.reason.includes(sentence) for row in rows):
@@ -188,7 +192,7 @@ def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned
 
 
 def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
-    """Warn of correlations that no row and no aggregate uses."""
+    """Warn of correlations that no row of a sum uses."""
     for name in PLATFORMS if mission.allocation.combine == "each" else ():
         covariance = getattr(mission.platforms, name).motion_error.covariance
         if covariance is not None and covariance.has_correlations():
@@ -200,7 +204,7 @@ def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
 
 # ---------------------------------------------------------------------- autofocus
 def _of_autofocus(mission: Mission, resolution: Resolution) -> Iterator[_Warned]:
-    """Warn of an `autofocus.n_pull` above the limit that range walk or the size of the scene sets."""
+    """Warn if `autofocus.n_pull` is larger than range walk or the size of the scene permits."""
     n_pull, algorithm, radius = mission.autofocus.n_pull, mission.autofocus.algorithm, mission.scene.radius
     if n_pull is None:
         return

@@ -1,8 +1,9 @@
-"""Changes of the allowables by the noise of a log, through the path that is fitted to it.
+"""Changes of the allowables that the noise of a log causes, because the path is fitted to the log.
 
-An allowable of a position or a velocity follows from the turn of the line of sight to the platform. A fit to a noisy
-log has an error at each time of the aperture, and so has every allowable. The error is a sum of independent modes,
-along each axis. Each mode is added to the path with one sigma of either sign, and the changes add as squares.
+The allowable of a position or velocity error depends on how the line of sight to the platform turns. A fit to a noisy
+log has an error at each time of the aperture, and therefore each allowable has an error too. The error of the fit is
+a sum of independent modes along each axis. Each mode is added to the path with one sigma of either sign, and the
+resulting changes are added as squares.
 """
 
 from dataclasses import dataclass, replace
@@ -26,10 +27,10 @@ _MOTION_KINDS = ("position", "velocity")
 
 @dataclass(frozen=True)
 class AllowableNoise:
-    """The allowable that changes most by the noise of the fit to the log of a platform.
+    """The allowable that the noise of the fit to a platform's log changes most.
 
     `acceleration` is one sigma of the error of the path's acceleration along the line of sight at mid-aperture
-    [m/s²], `change` one sigma of the relative change of the allowable of a row.
+    [m/s²]. `change` is one sigma of the relative change of the allowable. `row_id` is the row of the allowable.
     """
 
     acceleration: float
@@ -38,7 +39,7 @@ class AllowableNoise:
 
 
 def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
-    """Largest change of an allowable of both platforms by the noise of a platform's fit; None without a fit."""
+    """Find the allowable of either platform that the noise of one platform's fit changes most; None without a fit."""
     platform: Platform = getattr(mission.platforms, name)
     path = platform.path
     if path is None or path.path_noise is None or path.acceleration_noise is None:
@@ -79,10 +80,10 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
 
 
 def _changes(units: Floats) -> Floats:
-    """One sigma of the relative change of the allowable of each error, (platforms, axes), from effects per unit.
+    """One sigma of the relative change of each allowable, (platforms, axes).
 
-    `units` (platforms, axes, sides) holds the effects for the path itself, for the path plus each mode, and for the
-    path minus each mode.
+    `units` (platforms, axes, sides) holds the effects per unit of each error: for the path itself, for the path plus
+    each mode, and for the path minus each mode.
     """
     here = units[..., 0]
     with np.errstate(all="ignore"):

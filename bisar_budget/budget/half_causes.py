@@ -1,8 +1,8 @@
-"""Causes of which the file states only one half: rows that depend on such a cause are not evaluated.
+"""Causes of error of which the file states only one half. Rows that depend on such a cause are not evaluated.
 
-Deleting the worse half of a cause must not turn a failing mission into a pass. No check of the file requires the
-halves of two causes. Two clocks need both oscillators. The vibration that an oscillator feels needs tones and noise
-if the airframe has both: `oscillator.vibration` may state only tones or only noise.
+Deleting the worse half of a cause must not turn a failing mission into a pass. No check of the file requires both
+halves for two kinds of cause. Two clocks need both oscillators. The vibration that an oscillator feels needs tones
+and noise if the airframe has both, because `oscillator.vibration` may state only tones or only noise.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ _HOLD_CLOCKS = (*_HOLD_NOISE, "location_error")
 
 @dataclass(frozen=True)
 class HalfCause:
-    """A cause of which the file states only one half.
+    """A cause of error of which the file states only one half.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class HalfCause:
     requirements : tuple of str
         Keys of the requirements that limit the effects of the cause.
     note : Note
-        The key to add to the file.
+        Note with the key to add to the file.
     """
 
     platforms: tuple[str, ...]
@@ -37,14 +37,14 @@ class HalfCause:
     note: Note
 
     def holds(self, subject: Subject) -> bool:
-        """Whether a row depends on the cause: a row of a stated oscillator, or a sum of the mission."""
+        """Whether a row depends on the cause: the row of a stated oscillator, or a sum of the mission."""
         if subject.id in [f"mission.{key}" for key in self.requirements]:
             return True
         return subject.owner in self.platforms and subject.id.startswith(f"{subject.owner}.oscillator")
 
 
 def half_causes(mission: Mission) -> Iterator[HalfCause]:
-    """Find the causes of which the file states only one half."""
+    """Yield the causes of error of which the file states only one half."""
     yield from _half_clocks(mission)
     for name in PLATFORMS[mission.has_direct_path :]:
         platform = getattr(mission.platforms, name)
@@ -68,7 +68,7 @@ def half_causes(mission: Mission) -> Iterator[HalfCause]:
 
 
 def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
-    """Find clocks whose oscillators the file does not state: in holdover, or one of two that exchange pulses."""
+    """Find clocks without an oscillator in the file: clocks in holdover, or one of two that exchange pulses."""
     sync = mission.synchronization
     stated = tuple(name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is not None)
     unstated = tuple(name for name in PLATFORMS if name not in stated)
@@ -87,11 +87,11 @@ def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
 
 
 def _required(mission: Mission, keys: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the keys whose requirements the file states."""
+    """Return those keys whose requirements the file states."""
     return tuple(key for key in keys if getattr(mission.requirements, key) is not None)
 
 
 def half_cause_of(mission: Mission, key: str) -> Note:
-    """Note with the key to add to the file if a requirement depends on half a cause; otherwise empty."""
+    """Note with the key to add if a requirement depends on a cause that is only half stated; otherwise empty."""
     notes = [half.note for half in half_causes(mission) if key in half.requirements]
     return notes[0].then(*notes[1:]) if notes else NOTHING

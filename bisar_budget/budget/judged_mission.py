@@ -1,8 +1,8 @@
-"""All rows and requirements of a mission, judged in many cases at once; a check is one case.
+"""All rows and requirements of a mission, judged in many cases at once. A check is a single case.
 
-Each family makes its rows by every gating model. With two models the stricter verdict holds. Then follow the
-judgements that need more than one row: required declarations, paths in doubt, effects that no requirement covers,
-waivers.
+Each family of rows is judged by every gating model. With two models the stricter verdict counts. Then follow the
+judgements that need more than one row: required declarations, inaccurate paths, effects that no requirement covers,
+and waivers.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -54,10 +54,11 @@ _OWNERS = (*PLATFORMS, "clock", "mission")
 
 @dataclass(frozen=True, eq=False)
 class JudgedMission:
-    """A mission as judged in many cases.
+    """A mission that is judged in many cases.
 
-    `rows` are the rows after waivers, in the order of the contract. `before` are the same rows before waivers; their
-    `why` gives the reason if the row's numbers do not decide. `families` has each family's rows by gating model.
+    `rows` are the rows after waivers, in the order of the contract. `before` are the same rows before waivers. Their
+    field `why` gives the reason if the numbers of a row do not decide its status. `families` holds the rows of each
+    family by gating model.
     """
 
     analysis: Analysis
@@ -75,7 +76,7 @@ class JudgedMission:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no case declares an error: nothing was judged."""
+        """Whether no case declares an error, so that nothing was judged."""
         nothing = (
             row.metric in (DECLARE, SPECIFICATION)
             or np.all((row.status == CODE["not_declared"]) | (row.why == Why.NOT_DECLARED_AS_REQUIRED))
@@ -84,7 +85,10 @@ class JudgedMission:
         return all(nothing)
 
     def covering(self, row_id: str | None = None) -> Iterator[tuple[str, Booleans]]:
-        """Ids of the waivers, in the order of the file, each with the cases in which it covers anything, or a row."""
+        """Yield the ids of the waivers in the order of the file, each with the cases in which it covers something.
+
+        With `row_id`, only cases count in which the waiver covers this row.
+        """
         rows = [row_id is None or row.subject.id == row_id for row in self.rows]
         requirements = self.waived_requirements if row_id is None else ()
         for waiver_index, waiver in enumerate(self.analysis.mission.waivers):
@@ -93,14 +97,14 @@ class JudgedMission:
 
     @cached_property
     def status(self) -> Codes:
-        """Status of the mission in each case: the worst status that gates, and no better than the floor."""
+        """Status of the mission in each case: the worst status that gates, or the floor if that is worse."""
         codes = np.array([row.status for row in self.rows])
         worst = np.where(_GATES[codes], codes, CODE["pass"]).min(axis=0)
         return np.asarray(np.minimum(worst, self.floor), dtype=np.int8)
 
 
 def judged_mission(analysis: Analysis, today: date) -> JudgedMission:
-    """Judge every row and every requirement.
+    """Judge every row and every requirement of the analysed cases.
 
     Parameters
     ----------
@@ -182,7 +186,7 @@ class _Judgement:
 
     # ---------------------------------------------------------------- rows of the families
     def _families(self, model: str) -> Iterator[FamilyRow]:
-        """All rows by a model, in the order of the contract."""
+        """Yield all rows judged by a model, in the order of the contract."""
         needs = self.mission.requirements
         yield from self._errors.rows(model)
         if self._vibrates or self._shows_vibration:
@@ -203,7 +207,10 @@ class _Judgement:
         yield from specification_rows(self.judging, self.analysis)
 
     def _rows(self, model: str, families: Sequence[FamilyRow]) -> dict[str, Judged]:
-        """Rows by their ids; a row may come from different families in different cases, and exists in some case."""
+        """Collect the rows by id.
+
+        A row may come from different families in different cases. It exists in at least one case.
+        """
         rows: dict[str, Judged] = {}
         by_model = np.full(self.cases, MODELS.index(model), np.int8)
         for row in families:
@@ -225,7 +232,7 @@ class _Judgement:
 
     @cached_property
     def _limits(self) -> Mapping[str, Floats]:
-        """Limit on the quadratic phase of each owner, gain of autofocus included. [rad]"""
+        """Limit on the quadratic phase of each owner, including the gain of autofocus. [rad]"""
         allocation = self.analysis.allocation
         return {owner: self.judging.array(allocation.qpe_allowed(owner)) for owner in _OWNERS}
 
@@ -259,11 +266,11 @@ class _Judgement:
     # ---------------------------------------------------------------- judgements beyond single rows
     @cached_property
     def _in_doubt(self) -> dict[tuple[str, str], Booleans]:
-        """Cases in which a platform's path is in doubt by more than is declared, by platform and kind of error."""
+        """Mark the cases in which a path may be less accurate than is declared, by platform and kind of error."""
         return doubted_platforms(self.mission, self.cases)
 
     def _undeclared(self, judged_rows: Mapping[str, Judged]) -> Iterator[Judged]:
-        """Rows that no case declares: rows to show, and rows of errors of paths in doubt."""
+        """Yield rows that no case declares: rows that are always shown, and rows of errors of inaccurate paths."""
         subjects = dict(self.shown or {})
         for (name, kind), is_doubtful in self._in_doubt.items():
             is_shown = is_doubtful.any() and kind != RESIDUAL  # the residual has a family of its own
@@ -281,9 +288,9 @@ class _Judgement:
         )
 
     def _has_noise(self) -> Booleans:
-        """Cases that declare an error that spreads, or a tone that ISLR limits.
+        """Mark the cases that declare an error that spreads power, or a tone that ISLR limits.
 
-        The phase of a motion error beyond the cubic spreads if it is not negligible.
+        The phase of a motion error beyond the cubic term spreads power if it is not negligible.
         """
         array, gates = self.judging.array, self.analysis.gates
         level = negligible_rad(self.mission)
@@ -296,7 +303,7 @@ class _Judgement:
         return np.asarray(np.any([np.zeros(self.cases, bool), *has_any], axis=0))
 
     def _doubted_rows(self, rows: Sequence[Judged]) -> Booleans:
-        """Rows of oscillators with doubted noise, (rows, cases)."""
+        """Mark the rows of oscillators with doubtful noise, (rows, cases)."""
         doubted = {error.id: error.is_in_doubt for error in self.analysis.random if np.any(error.is_in_doubt)}
         in_doubt = np.zeros((len(rows), self.cases), dtype=bool)
         for row_index, row in enumerate(rows) if doubted else ():
@@ -304,7 +311,11 @@ class _Judgement:
         return in_doubt
 
     def _floor(self) -> Codes:
-        """Best possible status of each case: worse than `pass` if paths are in doubt or no error is declared."""
+        """Best possible status of each case.
+
+        It is `warn` if the input casts doubt on a path, an oscillator or a lever arm, `not_evaluated` if no error is
+        declared, and `pass` otherwise.
+        """
         floor, analysis = np.full(self.cases, CODE["pass"]), self.analysis
         for name, path in zip(PLATFORMS, analysis.geometry.both, strict=True):
             platform = getattr(self.mission.platforms, name)
@@ -325,9 +336,9 @@ class _Judgement:
 
 
 class RowStatuses:
-    """Statuses of rows in many cases, (rows, cases), and the reasons for changes by judgements beyond single rows.
+    """Statuses of rows in many cases, (rows, cases), with the reasons for changes that single rows cannot decide.
 
-    Each step turns rows into rows that are not evaluated; a row that fails still fails.
+    Each step sets some rows to not evaluated. A row that fails still fails.
     """
 
     def __init__(self, rows: Sequence[Judged], mission: Mission) -> None:
@@ -336,13 +347,16 @@ class RowStatuses:
         self.status, self.why = np.array([row.status for row in rows]), np.array([row.why for row in rows])
 
     def _settle(self, rows: Sequence[bool], is_so: PerCaseFlag, why: Why) -> None:
-        """Set `rows` to not evaluated in the cases where `is_so`, (rows, cases) or (cases,)."""
+        """Set `rows` to not evaluated where `is_so` is true, and record the reason `why`.
+
+        `is_so` has the shape (rows, cases) or (cases,).
+        """
         are_settled = np.array(rows, dtype=bool)[:, None] & is_so
         self.status = np.where(are_settled, CODE["not_evaluated"], self.status)
         self.why = np.where(are_settled, np.int8(why), self.why)
 
     def require_declarations(self, geometry: BistaticGeometry) -> None:
-        """Set missing required errors to not evaluated; the first row shows whether any is missing."""
+        """Set required errors that are not declared to not evaluated. The first row shows whether any is missing."""
         if not self.mission.requirements.declare:
             return
         still = np.array([np.broadcast_to(path.is_still, self.status.shape[1:]) for path in geometry.both])
@@ -356,14 +370,17 @@ class RowStatuses:
             self._settle(owed, cases & (self.status == CODE["not_declared"]), Why.NOT_DECLARED_AS_REQUIRED)
 
     def doubt_inputs(self, in_doubt: Mapping[tuple[str, str], Booleans]) -> None:
-        """Set errors of a path that is in doubt by more than the file declares to not evaluated."""
+        """Set the rows of errors to not evaluated if the path may be less accurate than the file declares."""
         for (name, kind), is_doubtful in in_doubt.items():
             if is_doubtful.any():
                 owed = [is_in_doubt(row_subject, name, self.mission, kind) for row_subject in self.subjects]
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
     def doubt_air(self, doubted: Mapping[str, Booleans]) -> None:
-        """Set rows that depend on constant air, by their ids, to not evaluated."""
+        """Set the given rows to not evaluated in the given cases, because they depend on delays taken as constant.
+
+        `doubted` maps row ids to cases.
+        """
         for row_id, is_doubted in doubted.items():
             if is_doubted.any():
                 rows = [row_subject.id == row_id for row_subject in self.subjects]
@@ -371,9 +388,9 @@ class RowStatuses:
                 self._settle(rows, is_doubted & self._is_open & is_new, Why.AIR_STAYS)
 
     def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
-        """Set rows that make up an effect that no requirement covers to not evaluated.
+        """Set rows to not evaluated if they contribute to an effect that no requirement covers.
 
-        A row without a limit and with a negligible effect judges nothing: `info`.
+        A row without a limit and with a negligible effect judges nothing. Its status becomes `info`.
         """
         for row_index, row in enumerate(self.rows):
             row_id, status = row.subject.id, self.status[row_index]
@@ -391,18 +408,18 @@ class RowStatuses:
             self.why[row_index] = np.where(makes_up, np.int8(Why.EFFECT_NOT_TAKEN), self.why[row_index])
 
     def judge_place(self, is_misplaced: Booleans) -> None:
-        """Set the location to not evaluated if an error displaces the image by an amount that no row limits."""
+        """Set the location row to not evaluated if an error displaces the image by an amount that no row limits."""
         if self.mission.requirements.location_error is not None:
             rows = [row_subject.id == f"mission.{LOCATION}" for row_subject in self.subjects]
             self._settle(rows, is_misplaced & self._is_open, Why.NO_PLACE)
 
     def judge_halves(self, halves: Sequence[HalfCause]) -> None:
-        """Set rows that depend on a half-stated cause to not evaluated."""
+        """Set rows to not evaluated if they depend on a cause of which the file states only one half."""
         for half in halves:
             self._settle([half.holds(row_subject) for row_subject in self.subjects], self._is_open, Why.HALF_A_CAUSE)
 
     def judge_spread(self, has_noise: Booleans) -> None:
-        """Set ISLR to not evaluated if only a cubic phase contributes to it."""
+        """Set the ISLR rows to not evaluated if nothing but a cubic phase contributes to them."""
         if not has_noise.all():
             rows = [row_subject.kind == "islr" for row_subject in self.subjects]
             is_new = ~np.isin(self.why, (Why.INPUT_IN_DOUBT, Why.AIR_STAYS))
@@ -413,7 +430,10 @@ class RowStatuses:
         return np.asarray((self.status != CODE["fail"]) & (self.status != CODE["not_declared"]))
 
     def waivers(self, today: date) -> NDArray[np.intp]:
-        """Index in the file of the first valid waiver that covers each broken row; -1: no such waiver."""
+        """Index in the file of the first valid waiver that covers each broken row; -1: no such waiver.
+
+        A row is broken if it fails or is not evaluated.
+        """
         indices = np.full(self.status.shape, -1)
         if not self.mission.waivers:
             return indices
@@ -426,7 +446,10 @@ class RowStatuses:
         return np.where(np.isin(self.status, _BROKEN_CODES), indices, -1)
 
     def judges(self) -> Codes:
-        """Index in `REQUIREMENT_KEYS` of the requirement that judges each row; -1: none, or not declared."""
+        """Index in `REQUIREMENT_KEYS` of the requirement that judges each row.
+
+        The index is -1 for a row that no requirement judges, and for a required error that is not declared.
+        """
         binding = np.array([row.binding for row in self.rows])
         metric = np.array(
             [[REQUIREMENT_KEYS.index(row.metric) if row.metric in REQUIREMENT_KEYS else -1] for row in self.rows]
@@ -435,7 +458,7 @@ class RowStatuses:
         return np.where(self.why == Why.NOT_DECLARED_AS_REQUIRED, -1, judges).astype(np.int8)
 
     def rows_with(self, status: Codes) -> tuple[Judged, ...]:
-        """The rows with these statuses; a row that has become `info` has no utilization."""
+        """Return the rows with the given statuses. A row that has become `info` has no utilization."""
         rows = []
         for row, code, why in zip(self.rows, status, self.why, strict=True):
             is_info = (code == CODE["info"]) & (row.status != code)
@@ -445,7 +468,10 @@ class RowStatuses:
 
 
 def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None = None) -> list[Judged]:
-    """Rows by both models merged: for each row the model with the stricter verdict, then the higher utilization."""
+    """Merge the rows of both models. For each row, the model with the stricter verdict is used.
+
+    If both verdicts are equal, the model with the higher utilization is used.
+    """
     if published is None:
         return list(full.values())
     stricter, only_published = [], dict(published)

@@ -1,12 +1,17 @@
-"""Judge every requirement: the rows that judge each, the effects that no requirement covers, the declared errors.
+"""Judge every requirement from its rows, the effects that no requirement covers, and the declared errors.
 
-Exit 0 means that every requirement was judged and is met. Each effect of each declared error is judged once. The
-quadratic requirement judges the quadratic phase. The cubic requirement, else ISLR, judges the cubic phase. ISLR
-judges power that spreads. PSLR, else ISLR, judges a tone. The location requirement judges a displacement. An effect
-that no requirement covers is negligible while its total is below a tenth of the quadratic requirement and below
-0.08 rad. Above, the rows that make it up are `not_evaluated`.
+Exit code 0 means that every requirement was judged and is met. Each effect of each declared error is judged once:
 
-Every number is an array over the cases, (n,): a check is one case.
+- quadratic phase: by the quadratic requirement;
+- cubic phase: by the cubic requirement, or by ISLR if there is none;
+- power that spreads: by ISLR;
+- a tone: by PSLR, or by ISLR if there is none;
+- displacement: by the location requirement.
+
+An effect that no requirement covers is negligible if its total is below a tenth of the quadratic requirement and
+below 0.08 rad. Otherwise the rows that cause it are `not_evaluated`.
+
+Every number is an array over the cases, (n,). A check is a single case.
 """
 
 from collections.abc import Mapping
@@ -43,9 +48,9 @@ IS_MET = np.array([*(status.complies for status in STATUS.values()), False])
 class UntakenEffect(NamedTuple):
     """An effect that no requirement covers, in many cases, and the rows that cause it.
 
-    `total` is the effect of all errors together, and `parts` has the magnitude of each error's part by row id. [rad]
-    `is_negligible` marks the cases with a small total. In cases with a large total, `makers` marks by row id the rows
-    that cause the effect: their parts are at least `least`. [rad]
+    `total` is the effect of all errors together, and `parts` gives the magnitude of each error's effect by row id.
+    [rad] `is_negligible` marks the cases with a small total. `makers` marks, by row id, the rows that cause the
+    effect in the cases with a large total. Each of these rows has an effect of at least `least`. [rad]
     """
 
     kind: str  # cubic, spread or tone
@@ -57,11 +62,12 @@ class UntakenEffect(NamedTuple):
 
 
 class RequirementState(NamedTuple):
-    """A judged requirement: its status, the index of the row that decides (or -1), and the rows that judge it.
+    """A judged requirement: its status, the rows that judge it, and the index of the row that decides it (or -1).
 
-    `utilization` is the utilization of the requirement by the row at index `user`. If the requirement is met, with or
-    without a warning, this is the row with the largest utilization: a row with a warning by the second model alone
-    may use less. `is_unjudged`: the requirement cannot be judged, waived or not.
+    `user` is the index of the row that gives the requirement's `utilization`. If the requirement is met, with or
+    without a warning, this is the row with the largest utilization. It may differ from the row that decides: a
+    warning that only the second model causes may come with a smaller utilization. `is_unjudged` marks the cases in
+    which the requirement cannot be judged, whether it is waived or not.
     """
 
     key: str
@@ -74,23 +80,26 @@ class RequirementState(NamedTuple):
 
 
 def first_highest(uses: Floats) -> NDArray[np.intp]:
-    """Index of the row with the highest use, (cases,); the first of rows with equal use, but for rounding."""
+    """Index of the row with the highest utilization in each case, (cases,).
+
+    If several rows are equal except for rounding, the first of them is returned.
+    """
     return np.asarray(is_as_high(uses, uses.max(axis=0)).argmax(axis=0))
 
 
 def is_as_high(uses: PerCase, other_uses: PerCase) -> Booleans:
-    """Whether `uses` are as high as `other_uses`, but for rounding."""
+    """Whether `uses` are at least as high as `other_uses`, except for rounding."""
     with np.errstate(invalid="ignore"):  # an infinite utilization is as high as itself
         return np.asarray((uses >= other_uses - EQUAL_USE_FRACTION * np.abs(other_uses)) | (uses == other_uses))
 
 
 def negligible_rad(mission: Mission) -> PerCase:
-    """Total below which an effect that no requirement covers is negligible. [rad]"""
+    """Total phase below which an effect that no requirement covers is negligible. [rad]"""
     return np.minimum(NEGLIGIBLE_FRACTION * np.asarray(mission.requirements.quadratic_phase_error), SMALL_RAD)
 
 
 def required_keys(mission: Mission) -> tuple[str, ...]:
-    """Keys of the requirements that a mission has, the default of the quadratic phase included."""
+    """Keys of the requirements of a mission, including the quadratic phase, which has a default."""
     needs = mission.requirements
     return tuple(
         key for key in REQUIREMENT_KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None)
@@ -111,7 +120,7 @@ def requirement_states(
     is_misplaced: PerCaseFlag,
     unjudged: Mapping[str, PerCaseFlag],
 ) -> list[RequirementState]:
-    """Judge every requirement.
+    """Judge every requirement of a mission in many cases.
 
     Parameters
     ----------
@@ -122,23 +131,23 @@ def requirement_states(
     utilization : (rows, n)
         Utilizations of the rows; NaN without a value.
     judges : (rows, n)
-        Index in `REQUIREMENT_KEYS` of the requirement that each row judges; -1: no requirement.
+        Index in `REQUIREMENT_KEYS` of the requirement that judges each row; -1: no requirement.
     quadratic_use : (rows, n)
-        Quadratic phase of each row over its limit, for any requirement that sets the allowable; NaN without a phase.
+        Quadratic phase of each row divided by its limit, for any requirement that sets the allowable; NaN without a
+        phase.
     waived : mapping of str to bool
         Keys of the requirements that a valid waiver names.
     before : (rows, n)
         Statuses of the rows before waivers.
     in_doubt : (rows, n)
-        Rows of oscillators with doubted noise: the computed noise may differ from the noise of the oscillator.
+        Rows of oscillators with doubtful noise: the computed noise may differ from the noise of the oscillator.
     has_noise : (n,) bool
-        Whether an error that spreads, or a tone that ISLR limits, is declared: without such an error ISLR is not
-        judged.
+        Whether an error that spreads power, or a tone that ISLR limits, is declared. Otherwise ISLR is not judged.
     is_misplaced : (n,) bool
         Whether a declared error displaces the image by an amount that no row limits.
     unjudged : mapping of str to bool or (n,) bool
-        Keys of the requirements that are not evaluated, with the cases: they depend on constant air in a long
-        aperture, or on half a cause.
+        Keys of the requirements that are not evaluated, with the cases: they depend on delays taken as constant in a
+        long aperture, or on a cause of which the file states only one half.
     """
     uses, states = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     is_open = before == RANK["not_evaluated"]

@@ -1,4 +1,4 @@
-"""A row of the budget in many cases at once, and the rules that judge it; a check is one case."""
+"""A row of the budget in many cases at once, and the rules that judge it. A check is a single case."""
 
 import math
 from abc import ABC, abstractmethod
@@ -57,12 +57,12 @@ IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # 
 
 
 def statuses(codes: Codes | np.int8) -> Any:
-    """Name of the status with a code, or names for an array of codes."""
+    """Convert the code of a status to its name, or an array of codes to an array of names."""
     return _STATUS_NAMES[codes]
 
 
 class Why(IntEnum):
-    """Why a row has a different status than its own numbers give it."""
+    """Reason why the status of a row differs from the status that its own numbers give."""
 
     OWN = 0  # the row's own numbers decide
     NOT_DECLARED_AS_REQUIRED = 1
@@ -75,9 +75,10 @@ class Why(IntEnum):
 
 
 class Judged(NamedTuple):
-    """One row of many cases: codes of statuses (indices in `STATUS`) and numbers; NaN where a value does not exist.
+    """One row of the budget in many cases: codes of statuses (indices in `STATUS`) and numbers.
 
-    Numbers from `allowable_published` on are computed only for complete rows (`Judging.is_complete`).
+    A number is NaN where it does not exist. Numbers from `allowable_published` on are computed only for complete rows
+    (`Judging.is_complete`).
     """
 
     subject: Subject
@@ -102,7 +103,7 @@ class Judged(NamedTuple):
 
     @classmethod
     def of_none(cls, row_subject: Subject, cases: int) -> "Judged":
-        """A row that is not declared in any case."""
+        """Return a row that is not declared in any case."""
         status = np.full(cases, RANK["not_declared"], np.int8)
         return cls._with(row_subject, status, *(np.full(cases, math.nan) for _ in range(3)))
 
@@ -118,50 +119,53 @@ class Judged(NamedTuple):
         return self._replace(**columns)
 
     def at(self, row_index: int, row_subject: Subject) -> "Judged":
-        """The row at `row_index` of several rows that were judged together, (rows, cases)."""
+        """Extract one row, at `row_index`, from several rows that were judged together as arrays (rows, cases)."""
         return self._of_columns(lambda column: column[row_index], _ARRAY_FIELDS)._replace(subject=row_subject)
 
     def where(self, takes_other: PerCaseFlag, other: "Judged") -> "Judged":
-        """This row, with the values of `other` in the cases where `takes_other` is true."""
+        """Return this row with the values of `other` in the cases where `takes_other` is true."""
         columns: dict[str, Any] = {
             name: np.where(takes_other, getattr(other, name), getattr(self, name)) for name in _ARRAY_FIELDS
         }
         return self._replace(**columns)
 
     def in_decibel(self) -> "Judged":
-        """The row with its amplitude factors in decibel; the utilization remains a ratio of amplitudes."""
+        """Return the row with its amplitude factors in decibels. The utilization remains a ratio of amplitudes."""
         return self._of_columns(decibels, IN_UNIT)
 
     def in_unit(self, factor: PerCase) -> "Judged":
-        """The row with its sizes in another unit: each size multiplied by `factor`."""
+        """Return the row with its sizes in another unit: each size is multiplied by `factor`."""
         return self._of_columns(lambda column: column * factor, IN_UNIT)
 
     def held_to(self, key: str) -> "Judged":
-        """The row with requirement `key` as its metric; this requirement then sets the allowable in every case."""
+        """Return the row with requirement `key` as its metric.
+
+        This requirement then sets the allowable in every case.
+        """
         return self._replace(metric=key, binding=np.full_like(self.binding, REQUIREMENTS.index(key)))
 
     def allowable_by(self, model: str) -> Floats:
-        """The allowable by a model, independent of the gating model."""
+        """The allowable by a model, regardless of the gating model."""
         return self.allowable_published if model == "published" else self.allowable_full
 
     def requirement(self, case: Case) -> str | None:
-        """The requirement that sets the allowable in a case; None: the row's metric sets it."""
+        """Key of the requirement that sets the allowable in a case; None if the metric of the row sets it."""
         requirement_index = self.binding[case.place]
         return None if requirement_index < 0 else REQUIREMENTS[requirement_index]
 
     def numbers(self, case: int) -> dict[str, float | None]:
-        """The row's numbers in a case, by the names of the columns; None where a value does not exist."""
+        """The numbers of the row in one case, by column name; None where a value does not exist."""
         columns = [column.item(case) for column in _columns_of_numbers(self)]
         return {name: None if math.isnan(number) else number for name, number in zip(NUMBERS, columns, strict=True)}
 
     @property
     def qpe_exact_rad(self) -> Floats:
-        """Quadratic phase by exact ranges; NaN for a row whose error is not computed by exact ranges. [rad]"""
+        """Quadratic phase by exact ranges; NaN for a row whose error is not computed from exact ranges. [rad]"""
         return self.qpe_full_rad if self.is_of_ranges else np.full(self.qpe_full_rad.shape, math.nan)
 
     @property
     def margin(self) -> Floats:
-        """Allowable over declared size, minus one; a ratio of amplitudes if the row is in decibel."""
+        """Allowable divided by declared size, minus one; for a row in decibels, the ratio of amplitudes is used."""
         with np.errstate(all="ignore"):
             margin = 1 / self.utilization - 1
         margin[~np.isfinite(margin)] = math.nan
@@ -172,7 +176,7 @@ _ARRAY_FIELDS = tuple(name for name in Judged._fields if name not in ("subject",
 
 
 def decibels(amplitude: PerCase) -> Floats:
-    """Levels of amplitude factors; NaN for a factor that is not above 0. [dB]"""
+    """Convert amplitude factors to levels; NaN for a factor that is not above 0. [dB]"""
     with np.errstate(all="ignore"):
         return np.where(amplitude > 0, 20 * np.log10(amplitude) + 0.0, math.nan)
 
@@ -180,7 +184,7 @@ def decibels(amplitude: PerCase) -> Floats:
 class Judging(NamedTuple):
     """Rules that judge rows: the number of cases, and the utilization above which a pass becomes a warning.
 
-    `is_complete`: compute all numbers of each row; otherwise only the numbers that decide.
+    If `is_complete` is set, all numbers of each row are computed, otherwise only the numbers that decide the status.
     """
 
     cases: int
@@ -188,7 +192,7 @@ class Judging(NamedTuple):
     is_complete: bool = False
 
     def array(self, value: PerCase | None) -> Floats:
-        """One number for each case, (cases,); NaN for None."""
+        """Expand a number to one value for each case, (cases,); NaN for None."""
         return np.full(self.cases, math.nan if value is None else value, dtype=float)
 
     def row(
@@ -203,9 +207,10 @@ class Judging(NamedTuple):
         is_unknown: PerCaseFlag = False,
         never_fails: bool = False,
     ) -> Judged:
-        """Judge a row: the first status that applies; where `is_unknown`, the declared value cannot be judged.
+        """Judge a row in each case. The first status that applies is used.
 
-        `declared` is NaN in the cases that do not declare the error.
+        `declared` is NaN in the cases that do not declare the error. Where `is_unknown` is true, the declared value
+        cannot be judged.
         """
         shape = (self.cases,) if declared is None else declared.shape  # several rows at once: (rows, cases)
         none = np.full(shape, math.nan)
@@ -242,14 +247,17 @@ class Judging(NamedTuple):
 # ---------------------------------------------------------------------- one case in words
 @dataclass(frozen=True, slots=True, eq=False)
 class FamilyRow(ABC):
-    """A row as its family judges it by a model, in many cases; `is_there` marks the cases that have the row."""
+    """Base class of the rows of a family, judged by one model in many cases.
+
+    `judged` holds the numbers. `is_there` marks the cases that have the row.
+    """
 
     judged: Judged
     is_there: Any = field(default=True, kw_only=True)
 
     @abstractmethod
     def in_words(self, case: Case, model: str) -> Row:
-        """Row of a case in words, by the model that judges it."""
+        """Describe the row of one case in words; `model` is the model that judges it."""
 
 
 def worded(
@@ -267,7 +275,7 @@ def worded(
     without_autofocus: float = 0.0,  # utilization without the gain of autofocus
     **more_fields: Any,  # further fields of the row
 ) -> Row:
-    """Put a judged row, in one case, into words: the words follow from the status and decide nothing."""
+    """Describe a judged row in one case in words. The words follow from the status and do not change it."""
     mission, status, numbers = case.mission, statuses(row.status[case.place]), row.numbers(case.place)
     allowable, utilization, full = numbers["allowable"], numbers["utilization"], numbers["qpe_full_rad"]
     reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...](more_fields.pop("remarks", ()))

@@ -1,9 +1,9 @@
-"""The row of the residual of a log, if the file does not state which path the processor uses.
+"""The row for the residual of a log, if the file does not state which path the processor uses.
 
 The residual is the difference between the fixes of the log and the smooth path through them. A processor that uses
-the fixes has the residual as a random error, with a row of its own (`effects.navigation_errors`). A processor that
-uses the smooth path has no residual. Without this choice the residual cannot be judged: this row is not evaluated,
-for any set of requirements.
+the fixes has the residual as a random error, which has a row of its own (`effects.navigation_errors`). A processor
+that uses the smooth path has no residual. If the file does not state the choice, the residual cannot be judged. This
+row is then not evaluated, whatever the requirements are.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ from bisar_budget.mission.model import Mission
 
 
 def log_rows(judging: Judging, mission: Mission) -> Iterator["UnsaidResidual"]:
-    """One row for each platform whose log has too large a residual, in the cases in which it is too large."""
+    """Yield a row for each platform whose log has too large a residual. The row exists in those cases only."""
     for name in PLATFORMS:
         is_there = np.broadcast_to(leaves_unsaid(mission, name), (judging.cases,))
         if is_there.any():
@@ -36,9 +36,9 @@ def log_rows(judging: Judging, mission: Mission) -> Iterator["UnsaidResidual"]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UnsaidResidual(FamilyRow):
-    """The residual of a log in many cases; the reason is the note of the input doubt."""
+    """The row for the residual of a log, in many cases. Its reason is the note of the doubt about the input."""
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Row of a case in words; it is the same for both models."""
+        """Describe the row of one case in words, which are the same for both models."""
         path = ("platforms", self.judged.subject.owner, "trajectory", "processed")
         return worded(case, self.judged, unit="m", path=path, equation="residual of the smoothed log")

@@ -1,8 +1,8 @@
-"""Phases of tones between one and three cycles per aperture: limits on the phases, beside the limit on the echoes.
+"""Phase limits of tones between one and three cycles per aperture, which apply besides the limit on their echoes.
 
-Such a tone makes echoes and, in its worst phase, a quadratic and a cubic phase error. No sum counts these phases,
-because PSLR or ISLR already limits the motion. So the row of the tone limits them: the quadratic phase by the
-platform's share, autofocus included, the cubic phase by the full requirement.
+Such a tone makes echoes and, in its worst phase, a quadratic and a cubic phase error. No sum includes these phases,
+because PSLR or ISLR already limits the motion. Therefore the row of the tone limits them. The limit on the quadratic
+phase is the platform's share, with the gain of autofocus. The limit on the cubic phase is the full requirement.
 """
 
 import math
@@ -22,10 +22,10 @@ from bisar_budget.phrases import NOTHING, Note
 
 
 class NearPhases(NamedTuple):
-    """Phases of a declared tone in its worst phase, in many cases; NaN for a faster tone. [rad]
+    """Phases of a declared tone at its worst phase, in many cases; NaN for a faster tone. [rad]
 
-    `use` is the utilization of the stricter limit, `quadratic_use` the utilization of the quadratic limit, and
-    `without_autofocus` the utilization of the quadratic limit without the gain of autofocus.
+    `use` is the utilization of the stricter limit. `quadratic_use` is the utilization of the quadratic limit, and
+    `without_autofocus` is the same without the gain of autofocus.
     """
 
     use: Floats
@@ -44,7 +44,11 @@ class NearPhases(NamedTuple):
         is_near: Booleans,
         phases: tuple[PerCase, PerCase, PerCase, PerCase],
     ) -> "NearPhases":
-        """Phases of an owner's tone: quadratic, cubic, equal-loss and judged phase. [rad]"""
+        """Compute the utilizations from the phases of an owner's tone.
+
+        `phases` are the quadratic, cubic, equal-loss and judged phase. [rad] `is_near` marks the cases in which the
+        tone is slow enough to have them.
+        """
         quadratic, cubic, equal_loss, judged = (np.where(is_near, phase, math.nan) for phase in phases)
         use = quadratic_use = judged / allocation.qpe_allowed(owner)
         allowed = mission.requirements.cubic_phase_error
@@ -55,11 +59,11 @@ class NearPhases(NamedTuple):
 
     @property
     def is_over(self) -> Booleans:
-        """Whether the phases break a requirement."""
+        """Whether the phases exceed a requirement, in each case."""
         return np.asarray(self.use > LIMIT_RATIO)
 
     def limit(self, declared: Floats) -> Floats:
-        """Size of the tone that reaches the stricter limit; infinite without a limit."""
+        """Size of the tone at which it reaches the stricter limit; infinite if its phase is zero or not limited."""
         with np.errstate(all="ignore"):
             return np.where(self.use > 0, declared / self.use, math.inf)
 
@@ -74,10 +78,10 @@ class NearPhases(NamedTuple):
         doubt: PerCaseFlag = False,
         is_unknown: PerCaseFlag = False,
     ) -> Judged:
-        """Judge the tone by its echoes and by its phases.
+        """Judge a tone by both its echoes and its phases.
 
-        `by_echoes` is the allowable size by the echoes; None if no requirement limits them. If the level of the
-        echoes `is_unknown`, a tone whose phases break a requirement still fails.
+        `by_echoes` is the allowable size by the echoes; None if no requirement limits them. Where `is_unknown` is
+        true, the level of the echoes is unknown. A tone whose phases exceed a requirement fails there too.
         """
         limit = self.limit(declared)
         echoes = np.full(declared.shape, math.inf) if by_echoes is None else by_echoes
@@ -104,7 +108,7 @@ class NearPhases(NamedTuple):
 
 
 def phase_over(case: Case, judged: Judged) -> Note:
-    """Reason with the excess of a tone over the requirement on a phase; empty if another requirement limits it."""
+    """Reason why the phase of a tone exceeds a requirement; empty if no requirement on a phase limits the tone."""
     mission, allocation, owner = case.mission, case.allocation, judged.subject.owner
     binding = phase_requirement(case, judged)
     if binding is None:
@@ -118,6 +122,6 @@ def phase_over(case: Case, judged: Judged) -> Note:
 
 
 def phase_requirement(case: Case, judged: Judged) -> str | None:
-    """The requirement on a phase that sets the allowable of a tone; None if its echoes set the allowable."""
+    """Key of the phase requirement that sets the allowable of a tone; None if the echoes set the allowable."""
     binding = judged.requirement(case)
     return binding if binding in (QUADRATIC, CUBIC) else None

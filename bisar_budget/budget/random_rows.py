@@ -1,7 +1,8 @@
-"""Rows of sensors, clocks and the air: the allowable size of a figure, by its phases, displacement and spread power.
+"""Rows of sensors, clocks and the air: allowable sizes from their phases, displacements and spread power.
 
-Independent processes add their powers; the rule `allocation.combine` for phases does not apply to the powers. Each
-platform's share of ISLR limits the sum of the powers that wideband vibration, sensor noise and phase noise spread.
+Independent processes add their powers. The rule `allocation.combine` is for phases and does not apply to powers. The
+share of ISLR of each platform limits the sum of the powers that wideband vibration, sensor noise and phase noise
+spread.
 """
 
 import math
@@ -60,7 +61,7 @@ _GOOD_FIT_FRACTION = 0.005  # misfit to an Allan deviation, up to which a power 
 
 
 class Limits(NamedTuple):
-    """Limits on each single error of an owner: phases and the rms phase that spreads [rad], displacement [m]."""
+    """Limits on a single error of an owner: phases, rms phase that spreads power [rad], and displacement [m]."""
 
     quadratic: Any
     cubic: Any
@@ -69,17 +70,21 @@ class Limits(NamedTuple):
 
 
 def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: PerCase = 1.0) -> Limits:
-    """Limits on the errors of an owner by a model; `gain` is the gain of autofocus."""
+    """Limits on the errors of an owner by a model.
+
+    `gain` is the gain of autofocus. It multiplies the limit on the quadratic phase.
+    """
     spread = spread_limit(mission, allocation, owner, model)
     needs = mission.requirements
     return Limits(allocation.qpe_limit(owner) * gain, needs.cubic_phase_error, spread, needs.location_error)
 
 
 def held_effect(mission: Mission, effect: RandomEffect, coverage: PerCase, gain: PerCase = 1.0) -> RandomEffect:
-    """An effect as requirements limit it: without a cubic requirement, the cubic phase adds to ISLR, at one sigma.
+    """Convert an effect to the form that the requirements limit.
 
-    The quadratic phase of the result is the judged phase, with the `gain` of autofocus. `coverage` is the coverage
-    factor that `effect` includes.
+    The quadratic phase of the result is the judged phase, with the `gain` of autofocus. Without a cubic requirement,
+    the cubic phase at one sigma is added to the phase that spreads power. `coverage` is the coverage factor that
+    `effect` includes.
     """
     effect = effect._replace(quadratic=effect.judged(gain))
     if mission.requirements.cubic_phase_error is not None:
@@ -89,7 +94,10 @@ def held_effect(mission: Mission, effect: RandomEffect, coverage: PerCase, gain:
 
 
 def sizes_at(effect: RandomEffect, limits: Limits) -> list[PerCase]:
-    """Size at which an error reaches each of `RANDOM_REQUIREMENTS`, in their order; infinite if never. [unit]"""
+    """Size at which an error reaches each of `RANDOM_REQUIREMENTS`, in their order; infinite if never.
+
+    The sizes are in the unit of the error.
+    """
     with np.errstate(all="ignore"):
         return [
             math.inf
@@ -100,21 +108,21 @@ def sizes_at(effect: RandomEffect, limits: Limits) -> list[PerCase]:
 
 
 class RandomRows:
-    """Errors of sensors and clocks in many cases, and the power that they and vibration spread."""
+    """Builds the rows of sensors, clocks and the air, and of the power that they and vibration spread together."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         self.judging, self.analysis, self.mission = judging, analysis, analysis.mission
         self.allocation, self.errors = analysis.allocation, analysis.random
 
     def _table(self, values: Sequence[PerCase | PerCaseFlag]) -> Floats:
-        """Table (values, cases) of numbers, or of arrays (cases,)."""
+        """Stack values, which are numbers or arrays (cases,), into a table (values, cases)."""
         table = np.empty((len(values), self.judging.cases))
         for row, value in zip(table, values, strict=True):
             row[:] = value
         return table
 
     def _effects(self, model: str) -> RandomEffect:
-        """Effects of one unit of each error, (errors, cases)."""
+        """Effects per unit of each error, (errors, cases)."""
         effects = [error.effect(model) for error in self.errors]
         quadratic, cubic, spread, east, north, hidden, rest = (
             self._table(column)
@@ -123,7 +131,10 @@ class RandomRows:
         return RandomEffect(quadratic, cubic, spread, east, north, hidden=hidden, rest=rest)
 
     def _sizes(self, model: str, effects: RandomEffect) -> Floats:
-        """Size at which each error reaches each requirement, (requirements, errors, cases). [unit]"""
+        """Size at which each error reaches each requirement, (requirements, errors, cases).
+
+        The sizes are in the unit of the error.
+        """
         gain, owners = self.allocation.autofocus_gain, [error.owner for error in self.errors]
         by_owner = {
             owner_name: limits_for(self.mission, self.allocation, owner_name, model, gain) for owner_name in {*owners}
@@ -138,7 +149,7 @@ class RandomRows:
         return sizes
 
     def rows(self, model: str) -> Iterator["RandomRow"]:
-        """Rows of all errors by a model, `published` or `full`, declared or not."""
+        """Yield the rows of all errors by a model, `published` or `full`, declared or not."""
         if not self.errors:
             return
         other_model = OTHER_MODEL[model]
@@ -202,7 +213,7 @@ class RandomRows:
             yield RandomRow(row.in_decibel() if error.unit == "dB" else row, error_index, *columns_of_error)
 
     def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Booleans:
-        """Whether an error's use of a requirement depends on noise below the first point of its mask."""
+        """Whether each error's utilization depends on noise below the first point of its mask, (errors, cases)."""
         rests_on_mask = np.zeros(sizes.shape[1:], dtype=bool)
         for row, error in enumerate(self.errors):
             for effect_kind, limit in zip(("quadratic", "cubic", "spread", "displacement"), sizes, strict=True):
@@ -218,10 +229,10 @@ class RandomRows:
 
     # ---------------------------------------------------------------- powers together
     def islr_rows(self, model: str) -> Iterator["IslrRow"]:
-        """Rows of the summed power that errors spread (ISLR): one row for each owner, and one for the mission.
+        """Yield the rows for the total power that errors spread (ISLR): one for each owner and one for the mission.
 
-        The rows of the owners have neither a size nor a limit in a case in which only wideband vibration and errors
-        with a stated ISLR spread power.
+        In a case in which only wideband vibration and errors with a stated ISLR spread power, the rows of the owners
+        have neither a size nor a limit.
         """
         mission, split = self.mission, self.allocation.islr
         owners = ("transmitter", "receiver", *(["clock"] if split.clock is not None else []), "mission")
@@ -278,7 +289,10 @@ class RandomRows:
             )
 
     def stated_rows(self, model: str) -> Iterator["StatedRow"]:
-        """Rows of errors from elsewhere that state their ISLR: each may use the full requirement."""
+        """Yield the rows of errors from elsewhere that are stated by their ISLR.
+
+        Each row may use the full requirement.
+        """
         mission = self.mission
         allowed = spread_limit(mission, self.allocation, "mission", model)
         for power in stated_powers(mission):
@@ -301,16 +315,16 @@ class RandomRows:
             )
 
     def _level(self, rms: Floats, model: str) -> Floats:
-        """ISLR of rms phases by a model; NaN without a phase. [dB]"""
+        """Convert rms phases to ISLR by a model; NaN without a phase. [dB]"""
         return np.where(rms > 0, islr_db(rms**2, model, mainlobe_energy(self.mission)), math.nan)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RandomRow(FamilyRow):
-    """The row of one error in many cases; `error_index` is its index among the errors.
+    """The row of one error in many cases; `place` is the index of the error among the errors.
 
-    `is_over_other`: the model that does not gate fails the error. `bound_by_other`: index in `RANDOM_REQUIREMENTS` of
-    the requirement that the error breaks by that model.
+    `is_over_other` marks the cases in which the model that does not gate fails the error. `bound_by_other` is the
+    index in `RANDOM_REQUIREMENTS` of the requirement that limits the error by that model.
     """
 
     place: int
@@ -319,7 +333,7 @@ class RandomRow(FamilyRow):
     without_autofocus: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """Row of a case in words, by the model that judges it."""
+        """Describe the row of one case in words; `gating` is the model that judges it."""
         mission, allocation, error = case.mission, case.allocation, case.random[self.place]
         combine, binding, over, doubt = mission.allocation.combine, self.judged.requirement(case), NOTHING, NOTHING
         if self.judged.status[case.place] == CODE["fail"]:
@@ -358,10 +372,10 @@ class RandomRow(FamilyRow):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IslrRow(FamilyRow):
-    """Row of the sum of all phases of one owner that spread, in many cases.
+    """The row for the power that all phases of one owner spread together, in many cases.
 
-    `variance` is the variance of the phase [rad²]. `limit` is the rms phase that the gating model allows,
-    `limit_of_other` the rms phase that the second model allows [rad].
+    `variance` is the variance of the phase [rad²]. `limit` is the rms phase that the gating model allows, and
+    `limit_of_other` is the rms phase that the second model allows [rad].
     """
 
     members: Sequence[SpreadPhase]
@@ -370,7 +384,7 @@ class IslrRow(FamilyRow):
     limit_of_other: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """Row of a case in words, by the model that judges it."""
+        """Describe the row of one case in words; `gating` is the model that judges it."""
         level = _levels(case.mission, gating)
         other_model, over, doubt = OTHER_MODEL[gating], NOTHING, NOTHING
         variance, limit, limit_by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
@@ -407,10 +421,10 @@ class IslrRow(FamilyRow):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StatedRow(FamilyRow):
-    """Row of an error from elsewhere that states its ISLR, in many cases. [dB]"""
+    """The row of an error from elsewhere that is stated by its ISLR, in many cases. [dB]"""
 
     def in_words(self, case: Case, _: str) -> Row:
-        """Row of a case in words."""
+        """Describe the row of one case in words."""
         mission, row = case.mission, self.judged
         index, is_limited = row.subject.entry or 0, not math.isnan(row.allowable[case.place])
         missing, over = phrases.note("no-requirement-of", metric=ISLR), NOTHING
@@ -433,14 +447,14 @@ class StatedRow(FamilyRow):
 
 
 def _is_open(mission: Mission, error: RandomError) -> PerCaseFlag:
-    """Whether the file lacks a spectrum that makes part of an error, per case: ISLR cannot be judged without it."""
+    """Whether the file lacks a spectrum that an error depends on, in each case. ISLR cannot be judged without it."""
     is_shaken = error.subject.kind == "oscillator" and error.subject.axis == "acceleration"
     return is_shaken and lacks_a_spectrum(mission, error.owner)
 
 
 # ---------------------------------------------------------------------- in words
 def _displacement(error: RandomError, model: str) -> GroundVector | None:
-    """Sigmas of the displacement east and north, coverage factor included; None if not known. [m]"""
+    """Sigmas of the displacement east and north, including the coverage factor; None if not known. [m]"""
     effect = error.effect(model)
     if error.declared is None or math.isnan(effect.displacement):
         return None
@@ -448,7 +462,7 @@ def _displacement(error: RandomError, model: str) -> GroundVector | None:
 
 
 def _wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
-    """Equation, evidence and notes of an error's row."""
+    """Texts for the row of an error: equation, evidence and notes."""
     kind, figure, sync = error.subject.kind, error.subject.axis, mission.synchronization
     if sync is not None and kind == "synchronization":
         return "synchronisation", sync.source, () if sync.interval else (phrases.note("another-for-each-pulse"),)
@@ -523,7 +537,7 @@ def _oscillator_wording(mission: Mission, error: RandomError) -> tuple[str, str 
 
 
 def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
-    """Note on the part of an oscillator's noise that remains after synchronisation; empty without synchronisation."""
+    """Yield a note on the noise of an oscillator that remains after synchronisation; none without synchronisation."""
     if sync is None:
         return
     if sync.interval is not None:
@@ -535,7 +549,7 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
 
 
 def _air_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
-    """Equation, evidence and notes of the row of a delay on a leg."""
+    """Texts for the row of a delay on a leg: equation, evidence and notes."""
     source = None if mission.propagation is None else mission.propagation.source_of(legs_of(error.owner)[0])
     if error.counted_in and error.declared is None:  # otherwise the note is the reason of the row
         return "delay of the air", source, (phrases.note("counted-in-another-row", row_id=error.counted_in),)
@@ -583,7 +597,10 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
 
 
 def _continuation(case: Case, error: RandomError, model: str) -> Note:
-    """Note on a declared oscillator's share of noise below its mask, for the effect with the largest share."""
+    """Note on how much of an oscillator's effect comes from noise below the first point of its mask.
+
+    Of all kinds of effect, the one with the largest fraction of such noise is reported.
+    """
     effect, size, worst = error.effect(model), error.declared, NOTHING
     limits = limits_for(case.mission, case.allocation, error.owner, model, case.allocation.autofocus_gain)
     most = 0.0
@@ -598,7 +615,7 @@ def _continuation(case: Case, error: RandomError, model: str) -> Note:
 
 
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:
-    """Note on the requirement by which the model that does not gate fails a declared error."""
+    """Note that the model that does not gate fails a declared error, with the requirement that the error exceeds."""
     other_model, size = OTHER_MODEL[gating], error.declared
     effect = held_effect(mission, error.effect(other_model), error.coverage(mission), autofocus_gain_of(mission))
     if binding == ISLR:
@@ -611,6 +628,6 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
 
 
 def _levels(mission: Mission, model: str) -> Callable[[float], float]:
-    """Function from an rms phase [rad] to its ISLR [dB] by a model."""
+    """Return a function that converts an rms phase [rad] to its ISLR [dB] by a model."""
     energy = mainlobe_energy(mission)
     return lambda rms: float(islr_db(rms**2, model, energy)) if rms else 0.0

@@ -1,10 +1,10 @@
-"""Constant delays of the air in a long aperture: the file does not state how fast the delays change.
+"""Delays of the air that are taken as constant in a long aperture, because the file does not state how they change.
 
-From one minute on the air is not the same at both ends of an aperture. A delay without `correlation_time` moves the
-image and bends its phase with the elevation alone: that is half of the effect of air. So the delays are also computed
-with a correlation time of ten minutes. A requirement is not evaluated if such delays would use more than a tenth of
-it, or would break it together with the declared errors. Effects of such delays that no requirement covers follow the
-rule of `UntakenEffect`.
+In apertures of one minute or longer, the air differs between the two ends. A delay without `correlation_time` is
+constant: it moves the image, and its phase curves only with the elevation. That is half of the effect of the air.
+Therefore the delays are also computed with a correlation time of ten minutes. A requirement is not evaluated if such
+changing delays would use more than a tenth of it, or would exceed it together with the declared errors. Effects of
+changing delays that no requirement covers follow the rule of `UntakenEffect`.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,9 +34,9 @@ AIR_CHANGES_IN_S = 600.0  # correlation time of the zenith delay that remains af
 
 
 class AirUse(NamedTuple):
-    """Size of the effect of changing delays on a row, and its utilization of the row's limit, (cases,).
+    """Size of the effect that changing delays would have on a row, and its utilization of the row's limit, (cases,).
 
-    The size is a phase, an rms phase or a displacement. [rad] or [m] `is_doubted` marks the cases in which no verdict
+    The size is a phase or rms phase [rad], or a displacement [m]. `is_doubted` marks the cases in which no verdict
     may rely on constant delays.
     """
 
@@ -50,10 +50,10 @@ class AirUse(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StayingAir:
-    """Constant delays in long apertures: for each row, the use by the delays if they changed.
+    """Effects that constant delays in long apertures would have if they changed.
 
-    `untaken` are the effects that no requirement covers, with the effects of the changing delays included. `uses` and
-    `untaken` are empty if no case has such a delay.
+    `uses` gives, by row id, the utilization that the changing delays would cause. `untaken` are the effects that no
+    requirement covers, including the effects of the changing delays. Both are empty if no case has such a delay.
     """
 
     errors: Sequence[RandomError] = ()
@@ -63,19 +63,22 @@ class StayingAir:
 
     @property
     def _delays(self) -> frozenset[str]:
-        """Ids of the delays' own rows, which the quadratic requirement limits with `combine: each`.
+        """Ids of the rows of the delays themselves, which the quadratic requirement limits with `combine: each`.
 
-        A different requirement may set the limit of such a row. Then the row's status is not the status of the
+        Another requirement may set the limit of such a row. The status of the row is then not the status of the
         quadratic requirement.
         """
         return frozenset(error.id for error in self.errors)
 
     def doubted_rows(self) -> dict[str, Booleans]:
-        """Ids of the rows of sums that are not evaluated, with the cases (cases,)."""
+        """Rows of sums that are not evaluated, by row id, with the cases (cases,)."""
         return {row_id: use.is_doubted for row_id, use in self.uses.items() if row_id not in self._delays}
 
     def doubted_requirements(self) -> dict[str, Booleans]:
-        """Requirements that are not evaluated, with the cases; a platform's share concerns its row alone."""
+        """Requirements that are not evaluated, by key, with the cases.
+
+        A doubt about a platform's share affects only the row of that share.
+        """
         doubted: dict[str, Booleans] = {}
         for use in self.uses.values():
             if use.row_id in self._delays or use.row_id == subject("mission", use.key).id:
@@ -83,7 +86,7 @@ class StayingAir:
         return doubted
 
     def untaken_rows(self) -> dict[str, Booleans]:
-        """Rows of delays that would make up an effect which no requirement covers, with the cases."""
+        """Rows of delays that would contribute to an effect that no requirement covers, by row id, with the cases."""
         return {
             error.id: np.any([effect.makers.get(error.id, False) & self.is_long for effect in self.untaken], axis=0)
             for error in self.errors
@@ -91,19 +94,19 @@ class StayingAir:
         }
 
     def reason(self, case: Case, row_id: str) -> Note:
-        """Note on the effect of changing delays on a row of a case, with the key to add to the file."""
+        """Note on the effect that changing delays would have on a row of a case, with the key to add to the file."""
         use = self.uses.get(row_id)
         if use is not None:
             return self._says(case, use)
         return self._says_of_untaken(case, row_id)
 
     def reason_of_requirement(self, case: Case, key: str) -> Note:
-        """Note on the effect of changing delays on a requirement; empty if no verdict relies on constant delays."""
+        """Note on the effect that changing delays would have on a requirement; empty if no verdict depends on it."""
         doubted = [use for use in self.uses.values() if use.key == key and case.number(use.is_doubted)]
         return self._says(case, max(doubted, key=lambda use: case.number(use.use))) if doubted else phrases.NOTHING
 
     def note(self, case: Case) -> Iterator[Note]:
-        """Note that delays are taken as constant, if no verdict relies on it."""
+        """Yield a note that delays are taken as constant, if no verdict depends on this."""
         uses = [case.number(use.use) for use in self.uses.values()]
         is_open = any(case.number(use.is_doubted) for use in self.uses.values())
         is_open = is_open or any(case.number(is_made) for is_made in self.untaken_rows().values())
@@ -146,7 +149,7 @@ class StayingAir:
 
 
 def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
-    """Constant delays in the long apertures of some cases, and the use of each row by the delays if they changed."""
+    """Find the delays taken as constant in long apertures, and the effects on each row if the delays changed."""
     mission, cases = analysis.mission, analysis.cases
     is_long = np.broadcast_to(np.asarray(mission.collection.aperture_time) >= LONG_APERTURE_S, (cases,))
     if mission.propagation is None or not is_long.any():
@@ -170,14 +173,18 @@ def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
 
 
 def _rests_on(mission: Mission, use: AirUse, declared_use: Floats) -> Booleans:
-    """Whether delays would use more than a tenth, or break a requirement together with the declared errors."""
+    """Whether a verdict on a row depends on delays being constant, in each case.
+
+    It does if changing delays would use more than a tenth of the limit, or would exceed it together with the declared
+    errors.
+    """
     rule = "rss" if use.key == ISLR else mission.allocation.combine
     together = combined((use.use, declared_use), rule)
     return np.asarray((use.use > NEGLIGIBLE_FRACTION) | ((use.use > 0) & (together > LIMIT_RATIO)))
 
 
 def _uses(analysis: Analysis, errors: Sequence[RandomError], model: str) -> Iterator[AirUse]:
-    """Use of each row that a requirement limits, by changing delays, by one model."""
+    """Yield the utilization of each limited row that changing delays would cause, by one model."""
     mission, allocation = analysis.mission, analysis.allocation
     rule = mission.allocation.combine
     for key in RANDOM_REQUIREMENTS:
@@ -208,10 +215,10 @@ def _use(analysis: Analysis, row_id: str, key: str, size: PerCase, limit: PerCas
 
 
 def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCase:
-    """Size of a delay's effect, as the requirement limits it, with the gain of autofocus. [rad] or [m]
+    """Size of the effect of a changing delay in the form that a requirement limits. [rad] or [m]
 
-    For a displacement the size is the increase by the change of the delay, by root-sum-square: the image moves by the
-    constant displacement, and by this size besides.
+    A quadratic phase includes the gain of autofocus. For a displacement, the size is only the part that the change of
+    the delay adds: the root of the difference of squares with and without the change.
     """
     effect = error.effect(model)
     judged_effect = held_effect(
@@ -231,7 +238,10 @@ def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCa
 
 
 def _keys(mission: Mission) -> list[str]:
-    """Keys to add: one key for one air or for both legs, else the key of the leg without a correlation time."""
+    """List the keys to add to the file.
+
+    This is one key if one air, or both legs, lack a correlation time, otherwise the key of the leg that lacks it.
+    """
     propagation = mission.propagation
     if propagation is None:
         return []

@@ -1,4 +1,4 @@
-"""Rows of tones: spurs of oscillators, tones of oscillators that vibrate, and the echoes of all tones together."""
+"""Rows of tones: spurs of oscillators, tones of vibrating oscillators, and the echoes of all tones together."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -35,10 +35,10 @@ SENSITIVITY = "acceleration_sensitivity"
 
 # ---------------------------------------------------------------------- all tones together
 def pslr_row(judging: Judging, tones: Sequence[Tone], required: PerCase) -> "PslrRow":
-    """Judge the highest echo that all tones make together, in the worst case of their phases.
+    """Judge the highest echo that all tones together can make, with the worst combination of their phases.
 
-    Both models use first principles: shares by the paper's rule are 3 dB stricter. Tones at most 2.5 cycles per
-    aperture apart raise each other's echo, also tones of different sources.
+    Both models use first principles here, because shares by the rule of the paper are 3 dB stricter. Tones that are
+    at most 2.5 cycles per aperture apart raise each other's echo, even if they come from different sources.
     """
     highest, allowed = highest_echo(tones, (judging.cases,)), judging.array(10 ** (np.asarray(required) / 20))
     row_subject = subject("mission", "pslr")
@@ -52,13 +52,16 @@ def pslr_row(judging: Judging, tones: Sequence[Tone], required: PerCase) -> "Psl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PslrRow(FamilyRow):
-    """The `highest` echo that all tones make together in many cases; a row of missions with a required PSLR."""
+    """The row for the highest echo of all tones together, in many cases.
+
+    It exists only for missions with a required PSLR.
+    """
 
     tones: Sequence[Tone]
     highest: Echo | None
 
     def in_words(self, case: Case, _: str) -> Row:
-        """Row of a case in words."""
+        """Describe the row of one case in words."""
         over = NOTHING
         if self.highest is not None:
             makers = [
@@ -80,7 +83,10 @@ class PslrRow(FamilyRow):
 
 # ---------------------------------------------------------------------- spurs
 def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["SpurRow"]:
-    """Judge the oscillators' tones by a model; they make paired echoes, as vibrations do. [dB of echo to response]"""
+    """Judge the spurs of the oscillators by a model. Like vibrations, they make paired echoes.
+
+    Sizes are levels of the echo relative to the response. [dB]
+    """
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
     for spur_index, spur in enumerate(spurs_of(mission, analysis.geometry) if has_instruments(mission) else ()):
@@ -110,22 +116,22 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
 
 
 def _is_used(size: PerCase, limit: PerCase) -> Booleans:
-    """Whether a size uses enough of its limit for a doubt about the size to count, and does not break the limit."""
+    """Whether a size uses so much of its limit that a doubt about the size matters, but does not exceed the limit."""
     return np.asarray((size > MIN_USE_FRACTION * limit) & ~(size > limit * LIMIT_RATIO))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpurRow(FamilyRow):
-    """A tone of an oscillator in many cases, as echo over response in decibel; see `VibrationRow`.
+    """The row of one spur of an oscillator in many cases, as the level of its echo relative to the response. [dB]
 
-    `spur_index` is the index of the tone among the spurs.
+    `spur_index` is the index among the spurs. See `VibrationRow` for the other fields.
     """
 
     spur_index: int
     is_over_other: Booleans
 
     def in_words(self, case: Case, model: str) -> Row:
-        """The row of a case, with values and remarks as text; `model` is the model that judges the row."""
+        """Describe the row of one case in words; `model` is the model that judges it."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         spur = spurs_of(mission)[self.spur_index]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
@@ -173,9 +179,9 @@ class SpurRow(FamilyRow):
 
 
 def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> tuple[Note, ...]:
-    """Note on a part of a tone that exchanged pulses fold below one cycle per aperture; empty without such a part.
+    """Note that exchanges of pulses fold part of a tone below one cycle per aperture; empty without such a part.
 
-    The row `row_id` counts the phases of that part.
+    The row `row_id` includes the phases of that part.
     """
     slow = [
         (float(share), float(frequency))
@@ -201,9 +207,12 @@ def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> 
 
 # ---------------------------------------------------------------------- oscillators that vibrate
 def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["AcceleratedRow"]:
-    """Judge the effect of each vibration on an oscillator by a model: the allowable sensitivity. [s²/m]
+    """Judge the effect of each vibration on an oscillator by a model.
 
-    Tones below one cycle per aperture are phases; the row of the oscillator's random vibration counts these phases.
+    The allowable is an acceleration sensitivity. [s²/m]
+
+    Tones below one cycle per aperture act as phases. The row of the oscillator's random vibration includes these
+    phases.
     """
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
@@ -238,16 +247,17 @@ def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AcceleratedRow(FamilyRow):
-    """A vibration of an oscillator in many cases; `is_there` marks the cases in which it is fast enough.
+    """The row of one vibration that acts on an oscillator, in many cases.
 
-    `tone_index` is the index of the vibration among the accelerated tones.
+    `is_there` marks the cases in which the vibration is fast enough for this row. `tone_index` is its index among the
+    accelerated tones.
     """
 
     tone_index: int
     is_over_other: Booleans
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Row of a case in words, by the model that judges it."""
+        """Describe the row of one case in words; `model` is the model that judges it."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         tone = accelerated_tones(mission)[self.tone_index]
         T, missing = mission.collection.aperture_time, phrases.note("no-requirement-of", metric="pslr")
@@ -290,7 +300,7 @@ class AcceleratedRow(FamilyRow):
 
 
 def _phases_beside(folded: LeftTone, free: PerCase, aperture_time: PerCase) -> tuple[PerCase, PerCase]:
-    """Quadratic and cubic phase of the echoes beside the mainlobe, in their worst phases. [rad]"""
+    """Quadratic and cubic phase of a tone's echoes below three cycles per aperture, in their worst phases. [rad]"""
     qpe: PerCase = 0.0
     cubic: PerCase = 0.0
     for frequency, share in zip(folded.frequencies, folded.echoes(aperture_time), strict=True):
@@ -301,18 +311,21 @@ def _phases_beside(folded: LeftTone, free: PerCase, aperture_time: PerCase) -> t
 
 
 def _near_phases(judging: Judging, analysis: Analysis, name: str, phases: tuple[PerCase, PerCase]) -> NearPhases:
-    """Quadratic and cubic phase of a platform's tone, which limit its row. [rad]"""
+    """Collect the quadratic and cubic phase that limit the row of a platform's tone. [rad]"""
     qpe, cubic = map(judging.array, phases)
     return NearPhases.of(analysis.mission, analysis.allocation, name, qpe + cubic > 0, (qpe, cubic, qpe, qpe))
 
 
 def evidence(oscillator: Oscillator) -> str | None:
-    """Source of the sensitivity of an oscillator: its part, else the `source` in the file."""
+    """Source of an oscillator's acceleration sensitivity: its catalogue part, or else the `source` in the file."""
     return dict(oscillator.of_parts).get(SENSITIVITY, oscillator.source)
 
 
 def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
-    """Note that an oscillator feels the vibration of its platform; empty if the oscillator has its own vibration."""
+    """Note that an oscillator is assumed to feel the vibration of its platform.
+
+    There is no note if the file states a vibration for the oscillator itself.
+    """
     felt_vibration = felt(mission, name)
     return (
         () if felt_vibration is not None and felt_vibration.is_own else (phrases.note("vibration-of-the-platform"),)
@@ -320,7 +333,7 @@ def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
 
 
 def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
-    """Notes on the row of an oscillator's acceleration: which effects count in the row, and which cannot."""
+    """Notes on the row of an oscillator's acceleration: which effects it includes, and which it cannot include."""
     felt_vibration = felt(mission, name)
     oscillator: Oscillator = getattr(mission.platforms, name).oscillator
     notes = list[Note]()

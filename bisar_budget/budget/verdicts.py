@@ -1,4 +1,4 @@
-"""Consequences of images for the rows of a check, and the choice of images to show."""
+"""Effects of image verdicts on the rows of a check, and the choice of images to show."""
 
 from collections.abc import Mapping, Sequence
 from datetime import date
@@ -17,10 +17,11 @@ _SHOWN_ROWS = 4  # rows of a mission, at most
 
 
 def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: date | None = None) -> MissionFindings:
-    """Add verdicts to findings: a declared row fails if an image refutes its limit, and so does its requirement.
+    """Add the verdicts of images to the findings of a check.
 
-    A row that passes by autofocus also fails if the image refutes the autofocus. If the file does not declare the
-    error of a row, the row reports its refuted limit. A refuted limit without a row in the check is a warning. It is
+    If an image refutes the limit of a declared row, the row fails, and so does its requirement. A row that passes
+    only with autofocus also fails if the image refutes the autofocus. If the file does not declare the error of a
+    row, the row reports that its limit is refuted. A refuted limit for which the check has no row is a warning. It is
     also a warning if no image gave a verdict.
 
     Parameters
@@ -30,7 +31,7 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: d
     verified : VerifiedMission
         Verdicts of the mission's images.
     today : date, optional
-        Day on which waivers cover rows that fail by an image, UTC; omitted: no waiver covers such a row.
+        Day (UTC) on which waivers are judged for rows that fail because of an image; omitted: waivers do not apply.
     """
     verdicts = verified.rows
     by_id = {verdict.id: verdict for verdict in verdicts}
@@ -102,10 +103,10 @@ def _with_verdict(row: Row, verdict: Verdict) -> Row:
 
 
 def _is_gate(row: Row) -> bool:
-    """Whether a refuted limit makes a row fail: a declared error uses the limit, and the row does not already fail.
+    """Whether a refuted limit makes a row fail: the row uses the limit and does not already fail.
 
-    Rows that repeat an error of another frame along the scene's axes do not fail. The pull-in range of autofocus is
-    not a requirement: if it is stated too large, gains count up to the limit by range walk.
+    A row that repeats an error of another frame along the scene's axes does not fail. The pull-in range of autofocus
+    is not a requirement: if it is stated too large, the gain counts only up to the limit that range walk sets.
     """
     return (
         bool(row.utilization)
@@ -118,7 +119,7 @@ def _is_gate(row: Row) -> bool:
 def _with_refuted(
     requirement: JudgedRequirement, refuted: Sequence[Row], waivers: tuple[AppliedWaiver, ...]
 ) -> JudgedRequirement:
-    """The requirement with the status of a refuted row that judges it or that it limits."""
+    """Return the requirement with the status of a refuted row that judges it or that it limits."""
     judges = [
         row
         for row in refuted
@@ -153,7 +154,7 @@ def _shown(verdict: Verdict) -> str:
 
 
 def rows_worth_showing(findings: MissionFindings) -> tuple[Verdict, ...]:
-    """Verdicts with a measured quadratic phase, for the most decisive rows: worst status first, then refuted limits.
+    """Select the verdicts with a measured quadratic phase that decide most: worst status first, then refuted limits.
 
     A row without a declared error is shown only if its limit is refuted, or if there is no other row.
     """

@@ -1,4 +1,4 @@
-"""Rows of vibration: each line of a platform, lines near each other, and noise."""
+"""Rows of vibration: each sinusoid (line) of a platform, groups of neighbouring lines, and wideband noise."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -45,7 +45,7 @@ _ROUNDING_DB = 1e-6  # by which a level may exceed the required level
 
 
 class Vibrations:
-    """Rows of vibrations in many cases."""
+    """Builds the rows of vibrations, for many cases at once."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         mission, geometry, allocation = analysis.mission, analysis.geometry, analysis.allocation
@@ -74,9 +74,11 @@ class Vibrations:
         return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
 
     def rows(self, model: str) -> Iterator["VibrationRow"]:
-        """All rows of vibration by a model, `published` or `full`, declared or not, in the order of the contract.
+        """Yield all rows of vibration by a model, declared or not, in the order of the contract.
 
-        A line that is slow in only some of the cases has a row of each kind.
+        `model` is `published` or `full`.
+
+        A line that is slow in only some of the cases has two rows, one for slow and one for fast motion.
         """
         everywhere = np.ones(self.judging.cases, dtype=bool)
         for name in PLATFORMS:
@@ -142,9 +144,11 @@ class Vibrations:
         return judged._replace(allowable_published=published, allowable_full=full)
 
     def _line(self, model: str, name: str, index: int, is_there: Booleans) -> "VibrationRow":
-        """The row of a vibration of one or more cycles per aperture: its echoes, or their power if ISLR limits them.
+        """The row of a line at one or more cycles per aperture.
 
-        Below three cycles its quadratic and cubic phase are limited as well.
+        It is judged by its echoes, or by their power if ISLR limits them.
+
+        Below three cycles per aperture, its quadratic and cubic phase are limited as well.
         """
         cycles, both = self.cycles[name][index], self._both[name][index]
         is_near, phases = cycles < ECHO_CYCLES, None
@@ -175,9 +179,10 @@ class Vibrations:
         )
 
     def _slow(self, name: str, index: int, is_there: Booleans) -> "VibrationRow":
-        """The row of a vibration below one cycle per aperture, judged by its quadratic and cubic phase.
+        """The row of a line below one cycle per aperture, judged by its quadratic and cubic phase.
 
-        A vibration along three axes is declared as the amplitude along the line of sight with the same utilization.
+        For a vibration along three axes, the declared size is the amplitude along the line of sight that has the same
+        utilization.
         """
         row_subject, cycles = subject(name, "vibration", "sinusoidal", entry=index), self.cycles[name][index]
         tone = self.slow_tones[row_subject.id]
@@ -216,7 +221,10 @@ class Vibrations:
         )
 
     def _near_each_other(self, model: str, name: str) -> Iterator["VibrationRow"]:
-        """Rows of lines so near each other that their echoes add: each row is one line with an equally high echo."""
+        """Yield the rows of groups of lines whose frequencies are so close that their echoes add.
+
+        Each row gives the amplitude of a single line with an equally high echo.
+        """
         for index, (members, amplitude) in enumerate(self._near[name]):
             row_subject = subject(name, "vibration", "sinusoidal.sum", entry=index)
             is_there = np.asarray(members.any(axis=0))
@@ -224,14 +232,15 @@ class Vibrations:
 
     @cached_property
     def _near(self) -> dict[str, list[tuple[Booleans, Floats]]]:
-        """Lines near each other on each platform, and the amplitude of one line with an equally high echo. [m]"""
+        """Groups of neighbouring lines by platform, and the amplitude of one line with an equally high echo. [m]"""
         return {name: list(_together(self.amplitudes[name], self.cycles[name])) for name in PLATFORMS}
 
     @cached_property
     def _both(self) -> dict[str, Floats]:
-        """Peak phase of each line together with near lines of the second platform. [rad]
+        """Peak phase that each line has together with neighbouring lines of the other platform. [rad]
 
-        The echoes add in the worst phases. NaN without a near line, without an amplitude, or without a required PSLR.
+        The echoes add in the worst phases. The value is NaN without a neighbouring line, without an amplitude, or
+        without a required PSLR.
         """
         ours = self.count[PLATFORMS[0]]
         amplitudes, cycles = (
@@ -246,7 +255,10 @@ class Vibrations:
 
 
 def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Booleans, Floats]]:
-    """Lines near each other, and the amplitude of one line with an equally high echo, or 0 without lines. [m]"""
+    """Yield each group of neighbouring lines, and the amplitude of a single line with an equally high echo. [m]
+
+    The amplitude is 0 in the cases without a line of the group.
+    """
     groups = near_groups(cycles)
     for index in range(groups.max(initial=-1) + 1):
         members = groups == index
@@ -257,14 +269,14 @@ def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Booleans, Fl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VibrationRow(FamilyRow):
-    """One row of vibration in many cases: a line, lines near each other, or the noise of a platform.
+    """One row of vibration in many cases: a line, a group of neighbouring lines, or the noise of a platform.
 
-    `members` are the lines near each other. `qpe` and `cubic` are the quadratic and cubic phases of a motion below
-    three cycles per aperture, in its worst phase [rad]. A motion that `is_slow` is judged by these phases alone, a
-    faster motion by its echoes too. `is_over_other`: the model that does not gate fails the row. `both` is the peak
-    phase of one line with an echo as high as the sum of echoes of near frequencies on both platforms [rad]. `level`
-    is the level of that echo [dB], `is_over_both`: the level is too high. Sizes of the row are `per_metre` times the
-    sizes in metres.
+    `members` marks the lines of a group. `qpe` and `cubic` are the quadratic and cubic phase of a motion below three
+    cycles per aperture at its worst phase [rad]. If `is_slow` is set, the motion is judged by these phases alone; a
+    faster motion is judged by its echoes too. `is_over_other` marks the cases in which the model that does not gate
+    fails the row. `both` concerns neighbouring lines of the two platforms: it is the peak phase of a single line
+    whose echo is as high as the sum of their echoes [rad]. `level` is the level of that echo [dB], and `is_over_both`
+    marks the cases in which it is too high. Sizes of the row are `per_metre` times the sizes in metres.
     """
 
     limits: VibrationLimits | None = None
@@ -281,13 +293,13 @@ class VibrationRow(FamilyRow):
     per_metre: PerCase = 1.0
 
     def in_unit(self, per_metre: Floats) -> "VibrationRow":
-        """The row in the unit that the file uses for the line."""
+        """Return the row in the unit that the file uses for the line."""
         if np.all(per_metre == 1):
             return self
         return replace(self, judged=self.judged.in_unit(per_metre), per_metre=per_metre)
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Row of a case in words, by the model that judges it."""
+        """Describe the row of one case in words; `model` is the model that judges it."""
         row_subject = self.judged.subject
         error: MotionError = getattr(case.mission.platforms, row_subject.owner).motion_error
         if self.is_slow:
@@ -353,7 +365,7 @@ def _row(
     more: Sequence[Note] = (),
     doubt: Note = NOTHING,
 ) -> Row:
-    """A row of echoes or noise: `notes` come before the notes on its limit, `more` after them."""
+    """Build the row of echoes or noise in words. `notes` come before the notes on its limit, `more` after them."""
     row_subject, metric = vibration_row.judged.subject, vibration_row.judged.metric
     equation = f"Section V, {key[0]}" if model == "published" else "first principles"
     missing, margin = phrases.note("no-requirement-of", metric=metric), None

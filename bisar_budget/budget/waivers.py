@@ -1,7 +1,7 @@
-"""Decisions beside the errors: waivers of rows and requirements, and influences from outside a file on its verdict.
+"""Waivers of rows and requirements, and influences on the verdict from outside the mission file.
 
-Findings list valid, expired and useless waivers. They also list options, settings, environment variables and parts
-of a project that bear on the verdict.
+The findings list valid, expired and unused waivers. They also list the options, settings, environment variables and
+catalogue parts of a project that affect the verdict.
 """
 
 import os
@@ -27,11 +27,11 @@ _PLANNED = "the orbit is the plan: neither its age nor its interpolation counts"
 
 
 class Waived(NamedTuple):
-    """Rows after waivers, and the waivers that name requirements.
+    """Rows after waivers are applied, and the waivers that name requirements.
 
-    A row that fails or is not evaluated becomes `waived` if a valid waiver names it. A row with expired waivers keeps
-    its status and has the waiver that expired last. `requirements` has the first valid waiver of each requirement, by
-    its id.
+    A row that fails or is not evaluated becomes `waived` if a valid waiver names it. A row with only expired waivers
+    keeps its status and shows the waiver that expired last. `requirements` holds the first valid waiver of each
+    requirement, by the requirement's id.
     """
 
     mission: Mission
@@ -40,7 +40,10 @@ class Waived(NamedTuple):
     covered: Sequence[tuple[int, int]]  # per waiver: numbers of named rows and of broken rows among them
 
     def unused(self, judged: Sequence[JudgedRequirement]) -> Iterator[tuple[KeyPath, Note]]:
-        """Warn of waivers that name no row, every row, or no broken row."""
+        """Yield a warning for each waiver that names no row, every row, or no broken row.
+
+        A row is broken if it fails or is not evaluated.
+        """
         broken = {requirement.id for requirement in judged if requirement.status in (*BROKEN, "waived")}
         ids = [requirement.id for requirement in judged]
         for index, (waiver, (named, failing)) in enumerate(zip(self.mission.waivers, self.covered, strict=True)):
@@ -55,16 +58,16 @@ class Waived(NamedTuple):
 
 
 def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
-    """Waive rows that fail or are not evaluated and that a valid waiver names.
+    """Apply waivers to the rows that fail or are not evaluated and that a valid waiver names.
 
     Parameters
     ----------
     rows : sequence of Row
         Judged rows.
     mission : Mission
-        Holds the waivers.
+        Mission with the waivers.
     today : date
-        UTC; a waiver holds through its last day.
+        Current day, UTC. A waiver is valid through its last day.
     """
     ids = [row.id for row in rows]
     broken = {position for position, row in enumerate(rows) if row.status in BROKEN}
@@ -113,7 +116,7 @@ def holding_place(mission: Mission, today: date, ids: Sequence[str]) -> int:
 
 
 def named_by(pattern: str, ids: Sequence[str]) -> list[int]:
-    """Indices of the ids that a waiver names; an id may contain a bracket."""
+    """Indices of the ids that match the pattern of a waiver. An id may itself contain a bracket."""
     if not any(char in pattern for char in "*?["):
         return [id_index for id_index, row_id in enumerate(ids) if row_id == pattern]
     matches = map(re.compile(translate(pattern)).match, ids)
@@ -122,16 +125,16 @@ def named_by(pattern: str, ids: Sequence[str]) -> list[int]:
 
 # ---------------------------------------------------------------------- from outside the file
 def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override, ...]:
-    """Gather the influences from outside the file on the verdict of one mission.
+    """Gather everything outside the mission file that affects the verdict on one mission.
 
     Parameters
     ----------
     mission : Mission
-        Mission as loaded, with the options that changed it and the parts that it takes figures from.
+        Mission as loaded, with the options that changed it and the catalogue parts that it uses.
     outside : Outside
         Influences on all missions of the run.
     today : date
-        Day on which waivers are judged, UTC. It bears on the verdict if the file has a waiver.
+        Day on which waivers are judged, UTC. It affects the verdict if the file has a waiver.
     """
     from_outside = list(outside.options)
     if mission.waivers or outside.is_day_given:
@@ -144,7 +147,10 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
 
 
 def _planned_orbits(mission: Mission) -> Iterator[Override]:
-    """Orbits that are flown as planned: a verdict then depends on the plan, not on its age or interpolation."""
+    """Yield the orbits that are assumed to be flown as planned.
+
+    The verdict then depends on the plan, and not on the age or interpolation of the orbit.
+    """
     for name in PLATFORMS:
         orbit = getattr(mission.platforms, name).orbit
         if orbit is not None and orbit.planned:
@@ -152,7 +158,7 @@ def _planned_orbits(mission: Mission) -> Iterator[Override]:
 
 
 def _own_parts(mission: Mission) -> Iterator[Override]:
-    """Parts of the project that replace parts of the catalogue with the same name."""
+    """Yield the parts of the project that replace catalogue parts of the same name."""
     catalogue = str(resource("specs", "sensors")) if mission.parts else ""
     for name, file, _ in mission.parts:
         if name.endswith((".yaml", ".yml")) or os.path.dirname(file) == catalogue:
@@ -164,7 +170,7 @@ def _own_parts(mission: Mission) -> Iterator[Override]:
 
 
 def _shown(file: str, mission_file: str) -> str:
-    """Path of a file relative to the folder of the mission file, independent of the current folder."""
+    """Path of a file relative to the folder of the mission file, whatever the current folder is."""
     try:
         path = os.path.relpath(file, os.path.dirname(mission_file) or os.curdir)
     except (OSError, ValueError):  # the current folder is gone; another drive

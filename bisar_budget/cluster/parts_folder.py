@@ -1,8 +1,8 @@
-"""Finished parts of a sweep: a Parquet data set for one question, with a file for each block of cases.
+"""Finished parts of a sweep, stored as a Parquet data set with one file for each block of cases.
 
-Each file states its question in its metadata. It is written under a temporary name and then renamed, so that every
-part is complete. Values are the values of the engine, in SI. The table of the command is written from them at the
-end.
+A data set belongs to one question, which each file states in its metadata. A file is written under a temporary name
+and then renamed, so that every stored part is complete. Values are stored as the engine computes them, in SI units.
+The table of the command is written from them at the end.
 """
 
 import json
@@ -29,7 +29,12 @@ _PART_NAME = re.compile(r"part-\d{12}\.parquet", re.ASCII)
 
 
 def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
-    """Refuse an option without its libraries; raises `MemoryError` if they do not fit into `room`. [B]"""
+    """Refuse an option whose libraries are not installed.
+
+    `room` is the memory that the libraries need [B]; raises `MemoryError` if it is not available. `extra` is the
+    extra of the package that installs the libraries, `modules` are the modules to import. Raises `ClusterError` if a
+    module is missing.
+    """
     hold_room(room, option)
     try:
         for module in modules:
@@ -40,7 +45,10 @@ def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
 
 
 def question_of(asked: Asked) -> Question:
-    """All inputs that decide the values of parts, by their words in messages. Parts of equal questions can mix."""
+    """All inputs that determine the values of parts, each by the words that describe it in messages.
+
+    Parts with equal questions can be combined.
+    """
     question, sweep = asked.travelling, asked.swept(iter(()))
     has_waivers = bool(asked.table.mission.waivers)  # only waivers depend on the day
     return {
@@ -58,7 +66,7 @@ def question_of(asked: Asked) -> Question:
 
 
 def _hash_of(cases: Cases) -> str:
-    """SHA-256 of the values of each key, from which the cases are made."""
+    """SHA-256 of the values of all keys from which the cases are made."""
     digest = sha256(repr((cases.is_grid, cases.shape)).encode())
     for values in cases.columns:
         is_words = values.dtype == object
@@ -68,10 +76,11 @@ def _hash_of(cases: Cases) -> str:
 
 @contextmanager
 def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: bool) -> "Iterator[PartsFolder]":
-    """Lock a folder for this command, to continue from its parts if `is_resumed`, or else to begin without parts.
+    """Open and lock a folder of parts for this command.
 
-    Raises `ClusterError` if there are parts without `is_resumed`, or parts of another question, if the folder cannot
-    be written, or if another command has it.
+    If `is_resumed`, the command continues from the parts in the folder. Otherwise the folder must have no parts.
+    Raises `ClusterError` if there are parts although `is_resumed` is false, if the parts belong to another question,
+    if the folder cannot be written, or if another command uses it.
     """
     with ExitStack() as ends:
         try:
@@ -91,13 +100,17 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
 
 
 class PartsFolder:
-    """The parts of a question; `done` are the first cases of finished parts."""
+    """The parts of one question in a folder; `done` holds the index of the first case of each finished part."""
 
     def __init__(self, path: str, question: Question) -> None:
         self.path, self.question, self.done = path, question, set[int]()
 
     def find(self, chunks: Chunks, is_resumed: bool) -> None:
-        """Find the finished parts. Parts of another question are refused, and all parts without `is_resumed`."""
+        """Find the finished parts.
+
+        Raises `ClusterError` if there are parts although `is_resumed` is false, or if there are parts of another
+        question and none of this question.
+        """
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -155,7 +168,10 @@ class PartsFolder:
         self.done.add(part.start)
 
     def parts(self, starts: Iterable[int]) -> Iterator[Part]:
-        """Read parts in the order of `starts`; raises `ClusterError` for an unreadable part, and removes it."""
+        """Read parts in the order of `starts`.
+
+        Raises `ClusterError` if a part cannot be read. A part with damaged content is removed first.
+        """
         import pyarrow as pa
         import pyarrow.parquet as pq
 

@@ -1,8 +1,8 @@
-"""The workers of a Dask scheduler. They call a function with common data and with each of many blocks.
+"""Runs a function on the workers of a Dask scheduler, with common data and with each of many blocks.
 
 A block is a number of cases of a sweep, a number of draws of a Monte Carlo, or a row to verify. Common data, such as
-the mission with its files, go to a worker once. Dask gives the blocks of a lost worker to further workers. A worker
-only needs the same version of bisar-budget.
+the mission with its files, are sent to a worker once. If a worker is lost, Dask gives its blocks to other workers. A
+worker needs nothing but the same version of bisar-budget.
 """
 
 import asyncio
@@ -44,11 +44,12 @@ _MIN_PENDING_BLOCKS_COUNT = 32
 
 @contextmanager
 def connected(address: str, patience: float, tell: Callable[[str], None]) -> "Iterator[Workers]":
-    """Connect to the workers of a scheduler. `local:N` starts N workers on this machine, and ends them.
+    """Connect to the workers of a scheduler.
 
-    `patience` is the longest time without a worker [s]. `tell` takes messages for a waiting user. Raises
-    `ClusterError` if the scheduler cannot be reached, has no worker, or has a worker with another version of
-    bisar-budget. Raises `MemoryError` if there is no memory for its libraries.
+    The address `local:N` starts N workers on this machine and ends them later. `patience` is the longest time to wait
+    for a worker [s]. `tell` receives messages for a waiting user. Raises `ClusterError` if the scheduler cannot be
+    reached, has no worker, or has a worker with another version of bisar-budget. Raises `MemoryError` if there is not
+    enough memory for its libraries.
     """
     local = _LOCAL.fullmatch(address)
     if not (local or _ADDRESS.fullmatch(address)):
@@ -83,7 +84,8 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
 def _local_cluster(count: int, ends: ExitStack) -> "LocalCluster":
     """Start a scheduler and workers on this machine; `ends` closes them.
 
-    A thread starts them, because Ctrl-C does not interrupt a thread: an incomplete cluster could not be closed.
+    They are started in a separate thread, because Ctrl-C does not interrupt a thread. A cluster that is interrupted
+    while it starts could not be closed.
     """
     from distributed import LocalCluster
 
@@ -104,13 +106,13 @@ def _local_cluster(count: int, ends: ExitStack) -> "LocalCluster":
 
 
 def _block_interrupts() -> None:
-    """Block Ctrl-C in this thread and in the workers that it starts, before they could ignore it."""
+    """Block Ctrl-C in this thread, and in the workers that it starts until they can ignore it themselves."""
     if hasattr(signal, "pthread_sigmask"):  # not on Windows
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def dask_setup(worker: object) -> None:
-    """Ignore Ctrl-C, which a terminal sends to every process, in a worker of a local cluster. Dask calls this."""
+    """Make a worker of a local cluster ignore Ctrl-C, which a terminal sends to every process. Dask calls this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -120,7 +122,10 @@ def _close(opened: "Client | LocalCluster", seconds: float) -> None:
 
 
 def _greet(address: str) -> None:
-    """Raise the fault of an address before a client tries it, which would take longer and know less."""
+    """Check that a Dask scheduler answers at an address, and raise an error if not.
+
+    A Dask client would take longer to report the problem, with fewer details.
+    """
     from distributed.core import rpc
     from distributed.security import Security
 
@@ -142,7 +147,7 @@ def _greet(address: str) -> None:
 
 @dataclass
 class Workers:
-    """Workers of a scheduler; `threads` is the number of their threads at the last count."""
+    """The workers of a scheduler; `threads` is the number of their threads when last counted."""
 
     client: "Client"
     address: str
@@ -151,7 +156,10 @@ class Workers:
     threads: int = 0
 
     def look(self) -> None:
-        """Count the threads of the workers. Without workers wait for one; raises `ClusterError` if none comes."""
+        """Count the threads of the workers, and wait for a worker if there is none.
+
+        Raises `ClusterError` if no worker comes.
+        """
         with suppress(Exception):  # the blocks report a lost scheduler
             self.threads = sum(self.client.nthreads().values())
         if self.threads:
@@ -175,10 +183,10 @@ class Workers:
         blocks: Iterable[Block],
         about: Callable[[Block], str],
     ) -> Iterator[tuple[Block, Result]]:
-        """Call `function(common, block)` on workers; yields each block and its result, in any order.
+        """Call `function(common, block)` on workers, and yield each block and its result, in any order.
 
         `about` names a block in messages. Only a few blocks are submitted ahead. Raises `ClusterError` if the
-        scheduler or all workers went away, if a block ended every worker that had it, or if a worker cannot do a
+        scheduler or all workers are lost, if a block ended every worker that had it, or if a worker cannot compute a
         block. Raises `RuntimeError` if the function raised an error.
         """
         finished: SimpleQueue[Future[Result]] = SimpleQueue()
@@ -219,7 +227,11 @@ class Workers:
 
 
 def _called(version: str, function: Callable[[Common, Block], Result], common: Common, block: Block) -> Result:
-    """Do a block on a worker. A worker that came after the check of versions may have another version."""
+    """Compute a block on a worker.
+
+    Raises `ClusterError` if the worker has another version of bisar-budget, which can happen if it joined after the
+    check of versions, or if the worker cannot use the mission.
+    """
     from distributed import get_worker
 
     worker = get_worker().address
@@ -238,7 +250,7 @@ def _version_problem(worker: str, worker_version: object, version: str) -> str:
 
 
 def _fault_of_block(error: BaseException, about: str) -> Exception:
-    """The error of a block that failed, with its message."""
+    """Convert the error of a failed block to the exception to raise; `about` names the block in its message."""
     from distributed.scheduler import KilledWorker
 
     if isinstance(error, ClusterError):  # another version, or an unusable mission

@@ -1,4 +1,4 @@
-"""Design questions of one mission: which values comply, what each number does, which sizes hold together."""
+"""Design questions about one mission: complying values, effects of numbers, and sizes of errors to order."""
 
 # What other rooms may use.
 __all__ = [

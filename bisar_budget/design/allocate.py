@@ -1,11 +1,12 @@
-"""Specifications that hold together: the largest sizes of errors with which a mission meets every requirement.
+"""Specifications of several errors at once: the largest sizes with which a mission meets every requirement.
 
 Each row of the budget that can fail has an allowed utilization. An error adds a power of its size to the row: the
-square if errors combine by root-sum-square or powers add, the size itself if errors add up. The unspecified errors
-leave room in each row. The search divides this room among the specified errors so that the sum of weight·log(size) is
-largest (`geometric_program`). Exact ranges hold for errors of any size: full checks, with each error a fifth larger
-and a fifth smaller, measure what the error adds near the sizes of the step before. The search ends when the sizes
-change no more. Values in SI and radians.
+square if errors combine by root-sum-square or powers add, the size itself if errors add linearly. The unspecified
+errors use a part of each allowed utilization. The search divides the remaining room among the specified errors so
+that the sum of weight·log(size) is largest (`geometric_program`). Exact ranges are valid for errors of any size, but
+are not proportional to it. Each step therefore makes full checks with each error a fifth larger and a fifth smaller
+than in the step before, and measures what the error adds to each row. The search ends when the sizes no longer
+change. Values are in SI and radians.
 """
 
 import math
@@ -34,28 +35,28 @@ from bisar_budget.workers import Progress, unseen
 
 @dataclass(frozen=True)
 class AllocationSettings:
-    """Tunings of the search for the largest sizes.
+    """Settings of the search for the largest sizes.
 
     Attributes
     ----------
     settled_change : float
-        Change of the logarithm of every size below which the search ends.
+        The search ends when the logarithm of every size changes by less than this.
     max_rounds : int
-        Largest number of rounds. Four are enough where effects are proportional to errors.
+        Largest number of rounds. Four are enough if effects are proportional to errors.
     full_step_rounds : int
-        Rounds with full steps. Later rounds make half a step, because steps oscillate where models change.
+        Number of rounds with full steps. Later rounds make half steps, because full steps can oscillate.
     end_steps : int
-        Sizes between two known sizes that are tried to find the last size with an image.
+        Number of sizes between two known sizes that are tried to find the largest size with an image.
     max_shrinks : int
-        Largest number of times by which all sizes shrink by a tenth: 18 powers of ten.
+        Largest number of times that all sizes are reduced by a tenth; together 18 powers of ten.
     free_ratio : float
-        Ratio of the largest to the smallest size that is tried for an error without an apparent limit.
+        Ratio of the largest to the smallest size that is tried for an error that no row seems to limit.
     free_steps : int
-        Sizes that are tried over this ratio.
+        Number of sizes that are tried in this range.
     free_fraction : float
         Fraction of an allowed utilization that an error without a limit may use.
     close_fraction : float
-        Distance to an allowed utilization that the sizes keep, as a fraction of it.
+        Margin below an allowed utilization when sizes are reduced, as a fraction of it.
     """
 
     settled_change: float = 1e-4
@@ -84,9 +85,10 @@ def allocate(
 ) -> SpecificationSheet:
     """Find the largest sizes of errors with which a mission, as a whole, meets every requirement.
 
-    Arguments are those of `bisar_budget.allocate`; `keys` have weights. Split, combination, coverage, autofocus and
-    model of the mission hold. Waivers do not count. The sheet has the verdict of a full check of the mission with the
-    ordered sizes. `progress` gets the number of rounds done and the largest number of rounds.
+    Arguments are those of `bisar_budget.allocate`; `keys` maps keys to weights. The split, the rule of combination,
+    the coverage factor, autofocus and the model are those of the mission. Waivers are ignored. The sheet contains the
+    verdict of a full check of the mission with the ordered sizes. `progress` is called with the number of finished
+    rounds and the largest number of rounds.
 
     Raises
     ------
@@ -106,7 +108,7 @@ def allocate(
 
 
 def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None, today: date) -> str:
-    """Message for `combine: each`, with the limit of each error alone."""
+    """Message of the error for `combine: each`; it lists the allowable size of each error by itself."""
     errors = specified_errors(mission, tree_of(mission), keys)
     rows = check_mission(mission if model is None else Variation(mission, model).read(), today).rows
     limits_in_words = []
@@ -124,7 +126,7 @@ def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None,
 
 
 def _broken(specified_mission: SpecifiedMission) -> tuple[Broken, ...]:
-    """Rows in which the unspecified errors leave no room."""
+    """Find the rows that the unspecified errors already fill, so that no room is left for specified errors."""
     no_errors = np.array([error.nothing for error in specified_mission.specified])
     # Rows that cannot be judged even without the specified errors do not limit them.
     rows = specified_mission.judged(no_errors[:, None]).rows
@@ -150,9 +152,9 @@ class _SizeSearch:
         self.mission = mission
 
     def found(self, progress: Progress) -> tuple[Floats, tuple[RowUse, ...]]:
-        """The sizes (sizes,), and the rows that limit them, the most restrictive first.
+        """Search for the sizes (sizes,), and for the rows that limit them, the most restrictive row first.
 
-        A size is nan if no row limits it. Each step uses utilizations near the sizes of the step before.
+        A size is NaN if no row limits it. Each step uses utilizations near the sizes of the step before.
         """
         sizes = self._first_sizes()
         inside, is_extended = np.minimum(self.mission.tiny, sizes), False
@@ -184,7 +186,10 @@ class _SizeSearch:
         return self._kept(sizes, before)
 
     def _free_sizes(self, sizes: Floats, is_free: Booleans) -> Floats:
-        """For errors without an apparent limit, the size just before they begin to use budget; others unchanged."""
+        """Enlarge the sizes of errors that no row seems to limit, until just before they use part of a limit.
+
+        `is_free` marks these errors, (sizes,). Other sizes are returned unchanged.
+        """
         extended = sizes.copy()
         for index in np.flatnonzero(is_free).tolist():
             steps = np.geomspace(
@@ -205,7 +210,10 @@ class _SizeSearch:
         return extended
 
     def _find_ends(self, inside: Floats, sizes: Floats) -> None:
-        """Update `ends`: sizes from which an error alone leaves no image, with the other errors at `inside`."""
+        """Update `ends`: the size of each error from which there is no image.
+
+        The other errors have the sizes `inside`; only errors that have no image at `sizes` are updated.
+        """
         count = sizes.size
         cases = np.repeat(inside[:, None], count, axis=1)
         cases[np.arange(count), np.arange(count)] = sizes
@@ -213,7 +221,10 @@ class _SizeSearch:
             self.mission.ends[index] = self._end_between(index, inside, min(sizes[index], self.mission.ends[index]))
 
     def _end_between(self, index: int, inside: Floats, high: float) -> float:
-        """Largest size of an error with an image, between its size in `inside`, which has one, and `high`."""
+        """Find the largest size of error `index` that still gives an image.
+
+        The search is between its size in `inside`, which gives an image, and `high`; other errors stay at `inside`.
+        """
         low = float(inside[index])
         for _ in range(2):
             steps = np.geomspace(low, high, ALLOCATION_SETTINGS.end_steps)
@@ -225,7 +236,7 @@ class _SizeSearch:
         return low
 
     def _first_sizes(self) -> Floats:
-        """First sizes: small enough that all errors together have room in every row."""
+        """Sizes for the start of the search, (sizes,): small enough that all errors together fit into every row."""
         count = self.mission.tiny.size
         cases = np.repeat(self.mission.tiny[:, None], count + 1, axis=1)
         cases[np.arange(count), np.arange(1, count + 1)] *= 2
@@ -240,7 +251,11 @@ class _SizeSearch:
         return np.where(np.isfinite(alone), alone / (2 * count), self.mission.tiny)
 
     def _kept(self, sizes: Floats, before: Rows) -> tuple[Floats, tuple[RowUse, ...]]:
-        """Sizes shrunk to the allowed utilizations, and the rows with the shares of each error."""
+        """Reduce the sizes until no row exceeds its allowed utilization.
+
+        Returns the sizes (sizes,), NaN for a size that no row limits, and the rows with the shares of each error.
+        `before` has the rows of earlier directions of a displacement.
+        """
         near = self.mission.near(sizes)
         for _ in range(ALLOCATION_SETTINGS.max_shrinks):
             if near is not None:
@@ -272,7 +287,11 @@ class _SizeSearch:
     def _with_earlier(
         before: Rows, program_multipliers: Floats, near: Near, sizes: Floats, shares: Floats, multipliers: Floats
     ) -> None:
-        """Add the multipliers of earlier directions of a displacement to its row; shares are means by multiplier."""
+        """Merge the rows for earlier directions of the displacement into the row of the location error.
+
+        Their multipliers are added to the multiplier of the row. Shares are averaged with the multipliers as weights.
+        `shares` and `multipliers` are changed in place.
+        """
         if not before.room.size:
             return
         index = list(compress(near.found.ids, near.is_limit)).index(f"mission.{LOCATION}")
@@ -285,13 +304,17 @@ class _SizeSearch:
             multipliers[index] = total
 
     def _used(self, near: Near, sizes: Floats) -> Floats:
-        """Utilizations at sizes of the rows of `near`, (rows,)."""
+        """Compute the utilizations, at some sizes, of the rows in `near`, (rows,)."""
         row_uses = self.mission.uses(sizes[:, None])
         uses = dict(zip(row_uses.ids, row_uses.uses[:, 0].tolist(), strict=True))
         return np.array([uses.get(row, 0.0) for row in near.found.ids])
 
     def _row_uses(self, near: Near, used: Floats, parts: Floats, multipliers: Floats) -> Iterator[RowUse]:
-        """Rows by falling multiplier; `parts` (limits, sizes) are fractions of powers of allowed utilizations."""
+        """Yield the rows that limit a size, with the largest multiplier first.
+
+        `used` are the utilizations (rows,). `parts` are the contributions of the errors, as fractions of the power of
+        the allowed utilization, (limiting rows, sizes); `multipliers` are (limiting rows,).
+        """
         row_indices = np.flatnonzero(near.is_limit)
         for limit in np.argsort(-multipliers, kind="stable").tolist():
             index = int(row_indices[limit])
@@ -308,7 +331,7 @@ class _SizeSearch:
 
 
 def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
-    """Largest share of an error in the rows of each requirement."""
+    """Largest share of an error among the rows of each requirement, by requirement."""
     shares: dict[str, float] = {}
     for row in rows:
         if row.requirement is not None and key in row.shares:
@@ -320,7 +343,7 @@ def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
 def _sheet(
     specified_mission: SpecifiedMission, sizes: Floats, rows: tuple[RowUse, ...], broken: tuple[Broken, ...]
 ) -> SpecificationSheet:
-    """The sheet of found sizes, in words and units, with a check of the mission with the ordered sizes."""
+    """Make the sheet of specifications from the found sizes, and check the mission with the ordered sizes."""
     parts = catalogue(specified_mission.stated)
     specifications = tuple(
         _specification(specified_mission.stated, error, float(error.numbers(np.array(size))), rows, parts)
@@ -350,7 +373,7 @@ def _sheet(
 def _specification(
     mission: Mission, error: Specified, value: float, rows: Sequence[RowUse], parts: Sequence[Entry]
 ) -> Specification:
-    """The specification of an error with a number; nan if no row limits it."""
+    """Make the specification of an error from its computed number; the number is NaN if no row limits the error."""
     declared = error.number.value
     unlimited = Specification(
         key=error.key,

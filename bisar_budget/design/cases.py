@@ -48,10 +48,10 @@ _KEY_HEADER_PATTERN = re.compile(r"^([^\[\]\s]+(?:\[\d+\][^\[\]\s]*)*)\s*(?:\[([
 
 @dataclass(frozen=True, eq=False)
 class Cases:
-    """Cases by their varied keys: for each key a column of values in SI, or of words.
+    """Cases of a sweep: the varied keys, and for each key a column of values in SI, or of words.
 
-    The cases of a grid are all combinations of the values of its keys, the last key the fastest. Otherwise a case is
-    a row of the columns.
+    The cases of a grid are all combinations of the values, and the last key varies fastest. Otherwise each case takes
+    one row of the columns.
     """
 
     varied: tuple[Varied, ...]
@@ -60,7 +60,7 @@ class Cases:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of values of each key of a grid; otherwise the number of cases."""
+        """Number of values of each key for a grid, otherwise the number of cases."""
         return tuple(column.size for column in (self.columns if self.is_grid else self.columns[:1]))
 
     @property
@@ -69,7 +69,7 @@ class Cases:
         return math.prod(self.shape)
 
     def values(self, start: int, stop: int) -> Mapping[str, Values]:
-        """Values of cases `start` to `stop` by key, (stop - start,)."""
+        """Values of the cases `start` to `stop` - 1, as arrays (stop - start,) by key."""
         indices: Sequence[slice | NDArray[np.intp]] = [slice(start, stop)] * len(self.columns)
         if self.is_grid:
             indices = np.unravel_index(np.arange(start, stop), self.shape)
@@ -79,19 +79,20 @@ class Cases:
 
 # ---------------------------------------------------------------- cases of arrays
 def grid_of(tree: JsonObject, values: Mapping[str, ArrayLike]) -> Cases:
-    """Every combination of values in arrays; the last key is the fastest.
+    """Make the cases with every combination of values, given as arrays; the last key varies fastest.
 
     Parameters
     ----------
     tree : dict
         Content of the mission file as text.
     values : mapping
-        Values (n,) of each key: numbers in SI, or words. The check of a case finds numbers that a key cannot have.
+        Values (n,) of each key: numbers in SI, or words. Numbers that a key does not accept are only found when
+        their case is checked.
 
     Raises
     ------
     QuestionError
-        A key is unknown, has neither number nor word, or has no value.
+        A key is unknown, takes neither a number nor a word, or has no values.
     """
     varied: list[Varied] = []
     arrays: list[Values] = []
@@ -116,7 +117,10 @@ def grid_of(tree: JsonObject, values: Mapping[str, ArrayLike]) -> Cases:
 
 
 def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:
-    """Words as an array; names of parts and files are checked when the mission is read with them."""
+    """Make an array of words, and raise `QuestionError` for an invalid word.
+
+    Names of parts and files are only checked when the mission is read with them.
+    """
     for word in dict.fromkeys(words):
         if problem := _wrong_word(choices, word):
             raise QuestionError(f"{option}: {problem}")
@@ -124,7 +128,7 @@ def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:
 
 
 def _wrong_word(choices: Choices, word: str) -> str:
-    """Problem with a word; empty if there is none, or if reading the mission finds it."""
+    """Problem of a word that a key does not accept; empty if there is none, or if only a check can find it."""
     if word.startswith("[") or isinstance(choices.reader, TextList):
         return ""
     try:
@@ -136,7 +140,7 @@ def _wrong_word(choices: Choices, word: str) -> str:
 
 # ---------------------------------------------------------------- cases of options
 class _Asked(NamedTuple):
-    """An option `--vary`: the varied key with its words or values in SI, or with the ends and count of a range."""
+    """One option `--vary`: the varied key, and its words or values in SI, or the ends and the count of a range."""
 
     option: str
     varied: Varied
@@ -147,17 +151,18 @@ class _Asked(NamedTuple):
 
 
 def grid(tree: JsonObject, texts: Sequence[str], name: str = "--vary") -> Cases:
-    """Cases of options `KEY=FROM:TO UNIT:COUNT`, with a further `:log` for equal ratios, or `KEY=VALUE,VALUE,...`.
+    """Make the cases with every combination of the values of options `--vary`.
 
-    Keys without a number take `KEY=WORD,WORD,...`. Ends belong to the range. Values have few digits in the unit of
-    the option: 0:180deg:181 has 60 deg.
+    An option is `KEY=FROM:TO UNIT:COUNT`, followed by `:log` for equal ratios, or `KEY=VALUE,VALUE,...`. Keys without
+    a number take `KEY=WORD,WORD,...`. A range includes both ends. Values are rounded in the unit of the option, so
+    that 0:180deg:181 contains exactly 60 deg.
 
     Parameters
     ----------
     tree : dict
         Content of the mission file as text.
     texts : sequence of str
-        Values of the options `--vary`; an end or a value without a unit has the unit of the last.
+        Texts of the options `--vary`. An end or a value without a unit has the unit of the last one in its text.
     name : str
         Name of the option for messages.
 
@@ -171,7 +176,7 @@ def grid(tree: JsonObject, texts: Sequence[str], name: str = "--vary") -> Cases:
 
 
 def _axis(asked: _Asked) -> Values:
-    """Values of an option of a grid."""
+    """Values of one option of a grid; raises `QuestionError` if a range has no valid count."""
     if asked.listed is not None:
         return asked.listed
     if not asked.size:
@@ -186,21 +191,22 @@ def _axis(asked: _Asked) -> Values:
 
 
 def sample(tree: JsonObject, texts: Sequence[str], how: str) -> Cases:
-    """Draw a Latin hypercube over ranges: each of `COUNT` equal parts of a range has one value.
+    """Draw a Latin hypercube sample: each of `COUNT` equal parts of a range contains exactly one value.
 
     Parameters
     ----------
     tree : dict
         Content of the mission file as text.
     texts : sequence of str
-        As for a grid. Counts are not used, lists of numbers are refused, and all words are drawn equally often.
+        As in `grid`. Counts of ranges are ignored, lists of numbers are refused, and all words of a key are drawn
+        equally often.
     how : str
         `latin:COUNT:SEED`; the same seed gives the same cases.
 
     Raises
     ------
     QuestionError
-        As for a grid; or the method, count or seed of `how` is invalid.
+        As in `grid`; also if the method, count or seed of `how` is invalid.
     """
     option = f"--sample {shown(how)}"
     kind, *fields = (field.strip() for field in how.split(":"))
@@ -230,7 +236,7 @@ def sample(tree: JsonObject, texts: Sequence[str], how: str) -> Cases:
 
 
 def _all_asked(tree: JsonObject, texts: Sequence[str], name: str) -> Iterator[_Asked]:
-    """Options of texts, each key once."""
+    """Yield the option of each text; raises `QuestionError` if there is no text, or if a key is repeated."""
     if not texts:
         raise QuestionError(f"no {name}: nothing would vary; {_ACCEPTED_VARIATIONS}")
     seen: set[tuple[str, ...]] = set()
@@ -269,7 +275,7 @@ def _asked(tree: JsonObject, text: str, name: str) -> _Asked:
 
 
 def _range(option: str, number: Number, fields: list[str]) -> _Asked:
-    """Read a range of an option from the fields between its colons."""
+    """Read the range of an option; `fields` are its texts between colons."""
     if is_log := len(fields) > 2 and fields[-1] == "log":
         fields.pop()
     if len(fields) > 3 or "" in fields:
@@ -286,7 +292,10 @@ def _range(option: str, number: Number, fields: list[str]) -> _Asked:
 
 
 def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tuple[float, ...]]:
-    """Values in SI, and the number with the unit of the last; values without a unit have this unit."""
+    """Read values in SI; returns the number with the unit of the last text, and the values.
+
+    Values without a unit have the unit of the last text.
+    """
     units = [normal_unit(_NUMBER_PREFIX.sub("", text).strip()) for text in texts]
     values = []
     for text, unit in zip(texts, units, strict=True):
@@ -299,20 +308,20 @@ def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tu
 
 
 def _usable_unit(unit: str, dimension: Dimension) -> str:
-    """A unit, or the SI unit for a unit with an offset; empty if the dimension has neither."""
+    """Unit for scaling values: `unit`, or the SI unit if it is empty or has an offset; empty if there is none."""
     unit = unit if unit and unit not in dimension.offsets else dimension.si
     return unit if unit in dimension.scales else ""
 
 
 def _count(text: str, subject: str, least: int, hint: str = "") -> int:
-    """Read a whole number; `subject` begins the message of the error."""
+    """Read a whole number of at least `least`; the message of the error begins with `subject`."""
     if not (text.isascii() and text.isdigit() and len(text) <= 18 and int(text) >= least):
         raise QuestionError(f"{subject} is {shown(text)!r}; accepted: a whole number, at least {least}{hint}")
     return int(text)
 
 
 def _spread(asked: _Asked, fractions: Floats) -> Floats:
-    """Values at fractions of a range, with its exact ends."""
+    """Values at fractions of a range, from 0 to 1; the fractions 0 and 1 give exactly its ends."""
     low, high = asked.ends
     factor, divisor = asked.varied.scale
     first, last = low / factor * divisor, high / factor * divisor
@@ -324,7 +333,7 @@ def _spread(asked: _Asked, fractions: Floats) -> Floats:
 
 # ---------------------------------------------------------------- values of cases
 def sampled_cases(cases: Cases, count: int) -> Cases:
-    """A sample of cases in short stretches, spread over all cases."""
+    """Choose `count` cases, or slightly more, as short runs of neighbouring cases that are spread over all cases."""
     length = max(1, count // _STRETCH_COUNT)
     starts = [
         int((number * _GOLDEN_FRACTION + 0.5) % 1 * (cases.count - length)) for number in range(-(-count // length))
@@ -335,14 +344,14 @@ def sampled_cases(cases: Cases, count: int) -> Cases:
 
 
 def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
-    """Keys with words, and the words that occur."""
+    """Yield each varied key that takes words, with its different words."""
     for varied, words in zip(cases.varied, cases.columns, strict=True):
         if isinstance(varied, Choices):
             yield varied, list(dict.fromkeys(words.tolist()))
 
 
 def in_unit(number: Number, values: Floats) -> Floats:
-    """Values in the unit of the number, with few digits if these give the same SI value again."""
+    """Convert values from SI to the unit of a number; they are rounded if this gives the same SI values again."""
     factor, divisor = number.scale
     values_in_unit: Floats = values / factor * divisor
     rounded = _rounded(values_in_unit)
@@ -350,7 +359,7 @@ def in_unit(number: Number, values: Floats) -> Floats:
 
 
 def _rounded(values: Floats) -> Floats:
-    """Numbers rounded to `_FLOAT_DIGITS` digits, so that 0.30000000000000004 is 0.3."""
+    """Round numbers to `_FLOAT_DIGITS` digits, so that 0.30000000000000004 becomes 0.3."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         power = _FLOAT_DIGITS - 1 - np.floor(np.log10(np.abs(values)))
         scale = 10.0 ** np.abs(power)
@@ -360,7 +369,7 @@ def _rounded(values: Floats) -> Floats:
 
 # ---------------------------------------------------------------- cases of a file
 def table_file(tree: JsonObject, path: str) -> Cases:
-    """Read a CSV file of cases, as `table` does; raises `TableError` also if the file is unreadable or too large."""
+    """Read the cases of a CSV file, as in `table`; raises `TableError` also for an unreadable or too large file."""
     if kind := special_file(path):
         raise TableError.of_file(path, f"cannot be read: {kind}; accepted: a regular file")
     try:
@@ -375,10 +384,10 @@ def table_file(tree: JsonObject, path: str) -> Cases:
 
 
 def table(tree: JsonObject, text: str, file: str) -> Cases:
-    """Read a CSV of cases: a header `KEY [unit]` for each column, then one case in each line.
+    """Read cases from CSV: the first line has a header `KEY [unit]` for each column, each further line is a case.
 
-    Empty lines and lines that begin with `#` are left out. Plain numbers need no unit, and words have none. The check
-    of a case finds numbers that a key cannot have; unknown words are faults of the table.
+    Empty lines and lines that begin with `#` are ignored. Plain numbers need no unit, and words have none. Unknown
+    words are faults of the table. Numbers that a key does not accept are only found when their case is checked.
 
     Parameters
     ----------
@@ -392,8 +401,9 @@ def table(tree: JsonObject, text: str, file: str) -> Cases:
     Raises
     ------
     TableError
-        The header has a cell that is no key with its unit, or repeats a key; a line has too few or too many cells; a
-        cell is no number or unknown word; or there are no cases or too many. The error has at most twenty faults.
+        A cell of the header is not a key with its unit, or repeats a key; a line has too few or too many cells; a
+        cell is not a number or a known word; or there are no cases, or too many. The error lists at most twenty
+        faults.
     """
     lines = (
         (line_number, line.rstrip("\n"))
@@ -442,7 +452,7 @@ def table(tree: JsonObject, text: str, file: str) -> Cases:
 
 
 def _cells(line: str) -> Iterator[tuple[int, str]]:
-    """Column in characters, from 1, and text of each cell, without quotes."""
+    """Yield the position of each cell of a line, in characters from 1, and its text without quotes."""
     at = 1
     for cell in line.split(","):
         word = cell.strip()
@@ -452,7 +462,7 @@ def _cells(line: str) -> Iterator[tuple[int, str]]:
 
 
 def _headed(tree: JsonObject, header: str, line_number: int, file: str) -> tuple[Varied, ...]:
-    """Keys of the header; numbers have the unit of the header."""
+    """Read the keys of the header, with the units that it states; raises `TableError`."""
     if not header:
         accepted = "accepted: KEY [unit], KEY [unit], ..."
         raise TableError.of_faults(file, [Fault(line_number, 1, "", "has no header", accepted=accepted)])
@@ -476,7 +486,7 @@ def _headed(tree: JsonObject, header: str, line_number: int, file: str) -> tuple
 
 
 def _column(tree: JsonObject, cell: str) -> Varied:
-    """Number with the unit of a cell of the header, or the key of words."""
+    """Read one cell of the header: a number with the unit of the cell, or a key that takes words."""
     match = _KEY_HEADER_PATTERN.match(cell)
     if match is None:
         hint = "Cells are separated by commas" if ";" in cell or "\t" in cell else ""
@@ -502,7 +512,10 @@ def _column(tree: JsonObject, cell: str) -> Varied:
 def _row(
     line: str, varied: Sequence[Varied], words: Sequence[dict[str, int]], line_number: int
 ) -> list[float] | Fault:
-    """Numbers of a line, with the number of each word in `words`; or the first fault of the line."""
+    """Read the numbers of a line, or return its first fault.
+
+    Words become numbers; `words` has the number of each word of a column, and receives new words.
+    """
     texts = line.split(",")
     if len(texts) != len(varied):
         behind = min(len(texts), len(varied) + 1)

@@ -27,7 +27,7 @@ _PART_KINDS_BY_SECTION = {"motion_error": ("imu", "gnss"), "oscillator": ("oscil
 
 
 class PartState(NamedTuple):
-    """The verdict of the mission with one part.
+    """Verdict of the mission with one part of the catalogue.
 
     Attributes
     ----------
@@ -40,11 +40,11 @@ class PartState(NamedTuple):
     standing : Standing
         Verdict of the mission.
     own_row, own_utilization : str, float, optional
-        Row with the highest utilization among the rows that depend only on these figures.
+        Row with the highest utilization among the rows that depend only on these figures, and its utilization.
     reason : str
-        Why the mission does not comply, if no row is the cause; else empty.
+        Why the mission does not comply, if no row is the cause; otherwise empty.
     silent_on : tuple of str
-        Figures that other parts of the kind have and this part does not state. They stay undeclared.
+        Figures that other parts of the same kind state and this part does not. They stay undeclared.
     """
 
     id: str
@@ -66,12 +66,12 @@ class PartState(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """Parts for one key of one mission.
+    """Comparison of parts of the catalogue for one key of one mission.
 
-    `parts` has complying parts first, by smallest margin, and then the remaining parts by the nearest miss. `kinds`
-    are the compared kinds, `kept` the parts of other kinds that stay. `overridden` are figures of parts that the file
-    states itself. `imaged` is the result of images with the part of the smallest margin, if images were formed.
-    `overrides` are influences from outside the file.
+    `parts` lists the complying parts first, the smallest margin first, and then the other parts, the smallest excess
+    first. `kinds` are the compared kinds of parts, and `kept` are the parts of other kinds that stay in the mission.
+    `overridden` are figures of parts that the file states itself. `imaged` is the verdict of images with the
+    complying part of the smallest margin, if images were formed. `overrides` are influences from outside the file.
     """
 
     file: str
@@ -119,10 +119,10 @@ def compare_parts(
     today: date,
     progress: Progress = unseen,
 ) -> Comparison:
-    """Check a mission with every part of the catalogue that a key can name; other arguments are those of `solve`.
+    """Check a mission with every part of the catalogue that a key can name.
 
-    A part replaces the file's part of the same kind; parts of other kinds stay. If the file names no part, parts
-    of every kind that the key accepts are tried alone.
+    A part replaces the file's part of the same kind, and parts of other kinds stay. If the file names no part, parts
+    of every kind that the key accepts are tried one at a time. The other arguments are those of `solve`.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def compare_parts(
 
 
 def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
-    """States of parts with the figures that only other parts of their kind have."""
+    """Yield the states with `silent_on`: the figures that other parts of the kind state and this part does not."""
     for state in states:
         if state.standing.status == "error":
             yield state
@@ -192,7 +192,10 @@ def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
 
 
 def _order(state: PartState) -> tuple[int, float, float, str]:
-    """Sort key: complying by smallest margin, then waived, then by the nearest miss, then parts without a mission."""
+    """Sort key of a part: complying parts first, then waived parts, then other parts, then parts without a mission.
+
+    Complying parts are sorted by the smallest margin, other parts by the smallest excess.
+    """
     sign = -1 if state.complies else 1
     uses = (state.standing.utilization, state.own_utilization)
     # Utilizations that agree to six digits are a tie.
@@ -202,9 +205,10 @@ def _order(state: PartState) -> tuple[int, float, float, str]:
 
 
 class _Candidate(NamedTuple):
-    """A part, with the judged mission, or the reason why there is none.
+    """A part that is tried, with the judged mission, or with the reason why the part makes no mission.
 
-    `figures` are taken from the part; `stated` are figures of the mission file in place of the part's figures.
+    `figures` are the figures that the mission takes from the part. `stated` are figures that the mission file states
+    instead of the part.
     """
 
     id: str
@@ -217,7 +221,11 @@ class _Candidate(NamedTuple):
 
 
 class _PartSearch:
-    """Parts that a key of a mission can name, and parts that the file names; raises `PartError`."""
+    """Finds the parts that a key of a mission can name, and tries them in the mission.
+
+    `given` are the parts that the file names, `candidates` all parts to try. The constructor raises `PartError` if
+    the catalogue cannot be read.
+    """
 
     def __init__(self, variation: Variation, key: str) -> None:
         self.variation, self.key = variation, key
@@ -240,12 +248,12 @@ class _PartSearch:
         self.candidates = [each for each in (*project_files, *catalogued.values()) if each.part.kind in self.kinds]
 
     def value(self, name: str, kind: str) -> str:
-        """Text of the key's value with a part; parts of other kinds stay."""
+        """Text of the key's value that names the part `name` of a kind; parts of other kinds stay in it."""
         kept = [named for named, device in self.given.items() if device.kind != kind]
         return json.dumps([*kept, name] if kept else name, ensure_ascii=False)
 
     def checked(self, candidate: _Candidate, today: date) -> _Candidate:
-        """Check the mission with a part."""
+        """Judge the mission with a candidate, or find the reason why the candidate makes no mission."""
         try:
             mission = self.variation.read([SetValue(self.key, self.value(candidate.id, candidate.part.kind))])
         except MissionError as error:
@@ -267,7 +275,7 @@ class _PartSearch:
         )
 
     def state(self, candidate: _Candidate, row: str | None, breaks: frozenset[str]) -> PartState:
-        """State of the mission with a part."""
+        """Verdict of the mission with a checked candidate; `row` is judged instead of the mission if it is set."""
         state = PartState(
             id=candidate.id,
             name=candidate.part.name,
@@ -299,5 +307,5 @@ class _PartSearch:
 
 
 def mission_with(variation: Variation, key: str, state: PartState) -> Mission:
-    """Read the mission with the part of a compared state."""
+    """Read the mission with the part of a state of the comparison."""
     return variation.read([SetValue(key, _PartSearch(variation, key).value(state.id, state.kind))])

@@ -1,8 +1,9 @@
-"""The largest sizes within limits on sums of their powers: a geometric program, solved by a barrier method.
+"""Find the largest sizes for which sums of their powers stay within limits: a geometric program.
 
-In the logarithms x of the sizes each row's Σ aᵢ·e^(p·xᵢ) is convex, and Σ wᵢ·xᵢ, which is maximised, is linear: there
-is one maximum. A barrier keeps inside the rows' room, and Newton's method follows the maximum as the barrier gives
-way. Derived here; the method is that of Boyd & Vandenberghe, Convex Optimization, 4.5 and 11.3.
+Let x be the logarithms of the sizes. The constraint Σ aᵢ·e^(p·xᵢ) ≤ room of each row is convex, and the objective
+Σ wᵢ·xᵢ is linear, so there is one maximum. It is found by a barrier method: a barrier keeps the sizes within the
+constraints, and Newton's method follows the maximum while the barrier is weakened step by step. The formulas are
+derived here; the method is in Boyd & Vandenberghe, Convex Optimization, 4.5 and 11.3.
 """
 
 from dataclasses import dataclass
@@ -15,18 +16,18 @@ from bisar_budget.arrays import Booleans, Floats
 
 @dataclass(frozen=True)
 class BarrierSettings:
-    """Tunings of the barrier method.
+    """Settings of the barrier method.
 
     Attributes
     ----------
     gap_fraction : float
         Largest distance of Σ w·x to its maximum, as a fraction of Σ w.
     firmness_factor : float
-        Factor by which the barrier gives way each time.
+        Factor by which the weight of the objective against the barrier grows in each round.
     max_newton_steps : int
-        Largest number of steps of Newton's method each time; ten are usually enough.
+        Largest number of Newton steps in each round; ten are usually enough.
     decrement_ratio : float
-        Half the square of Newton's decrement that ends the steps.
+        Half the square of Newton's decrement below which a round ends.
     """
 
     gap_fraction: float = 1e-8
@@ -39,28 +40,35 @@ _BARRIER = BarrierSettings()
 
 
 class Rows(NamedTuple):
-    """Rows Σ aᵢ·sᵢ^p ≤ room, (rows,), with `share` a (rows, sizes) and `power` p (rows,); a row limits every size."""
+    """Constraints Σ aᵢ·sᵢ^p ≤ room on sizes s, one for each row.
+
+    `share` are the coefficients a, (rows, sizes). `power` are the powers p, and `room` the right-hand sides, (rows,).
+    """
 
     share: Floats
     power: Floats
     room: Floats
 
     def at(self, x: Floats) -> Floats:
-        """Fractions of the room of each row that sizes e^x take, (rows, sizes)."""
+        """Fraction of the room of each row that each size takes, (rows, sizes); the sizes are e^x."""
         fractions: Floats = self.share * np.exp(self.power[:, None] * x) / self.room[:, None]
         return fractions
 
     def with_rows(self, further: "Rows") -> "Rows":
-        """The rows, followed by other rows."""
+        """Append other rows to these rows."""
         return Rows(*(np.concatenate(both) for both in zip(self, further, strict=True)))
 
     def of_sizes(self, chosen: Booleans) -> "Rows":
-        """The rows for some of the sizes."""
+        """Keep only the columns of the chosen sizes; `chosen` is (sizes,)."""
         return self._replace(share=self.share[:, chosen])
 
 
 class Largest(NamedTuple):
-    """Logarithms of the largest sizes, and the multiplier of each row: Σⱼ multiplierⱼ·partⱼᵢ = weightᵢ."""
+    """Solution of a geometric program: logarithms of the largest sizes, and the multiplier of each row.
+
+    The multipliers satisfy Σⱼ multiplierⱼ·partⱼᵢ = weightᵢ, where partⱼᵢ is the fraction of the room of row j that
+    size i takes.
+    """
 
     log: Floats
     multipliers: Floats
@@ -74,7 +82,7 @@ def largest_sizes(weights: Floats, rows: Rows) -> Largest:
     weights : (sizes,)
         Weights wᵢ, all above 0.
     rows : Rows
-        Upper bounds. Each row has room above 0, and each size is in at least one row.
+        Constraints. The room of each row is above 0, and each size has a coefficient above 0 in at least one row.
     """
     with np.errstate(divide="ignore"):
         alone = (np.log(rows.room[:, None] / rows.share) - np.log(2 * weights.size)) / rows.power[:, None]
@@ -100,7 +108,10 @@ def largest_sizes(weights: Floats, rows: Rows) -> Largest:
 
 
 def _towards(x: Floats, step: Floats, gradient: Floats, pull: Floats, rows: Rows) -> Floats:
-    """Go so much of a step that the barrier's value falls by enough, and no row is full."""
+    """Take a Newton step, halved until the objective with the barrier falls enough and no row exceeds its room.
+
+    `pull` is the weighted linear objective. Returns the new logarithms of the sizes.
+    """
     before, falls = _value(x, pull, rows), float(gradient @ step)
     length = min(1.0, 2.0 / float(np.abs(step).max()))
     while _value(x + length * step, pull, rows) > before + 0.1 * length * falls and length > 1e-12:

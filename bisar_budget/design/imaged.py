@@ -1,4 +1,4 @@
-"""Images at the solution of a design question, which show whether the limit of the binding row is true."""
+"""Images at the solution of a design question; they show whether the limit of the binding row is correct."""
 
 from glob import escape
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from bisar_budget.workers import Progress, unseen
 
 
 class ToImage(NamedTuple):
-    """A case for images: the mission at the solution, the binding row, and the solution as text."""
+    """A case for which images can be formed: the mission at the solution, the binding row, the solution as text."""
 
     mission: Mission
     row: str
@@ -22,14 +22,15 @@ class ToImage(NamedTuple):
 
     @property
     def seconds(self) -> float:
-        """Estimated time that forming the images takes; 0 if it is far below a minute. [s]"""
+        """Estimated time to form the images; 0 if it is far below a minute. [s]"""
         return seconds_to_verify(self.mission, escape(self.row))
 
 
 def to_image(mission: Mission, solution: Solution | Comparison, model: str | None) -> ToImage | None:
-    """Mission at a solution; None if no value complies, if all values comply, or if no row binds.
+    """Make the case for images at a solution; None if no value complies, if all values comply, or if no row binds.
 
-    The solution is the largest value at which compliance ends or begins, or the part with the smallest margin.
+    The case is at the largest value at which compliance ends or begins. For a comparison it is the complying part
+    with the smallest margin.
     """
     variation = Variation(mission, model)
     if isinstance(solution, Comparison):
@@ -48,7 +49,7 @@ def to_image(mission: Mission, solution: Solution | Comparison, model: str | Non
 
 
 def imaged(case: ToImage, progress: Progress = unseen) -> Imaged:
-    """Verdict of images at the limit of the binding row."""
+    """Form images at the limit of the binding row, and return their verdict on the limit."""
     only = escape(case.row)
     if not rows_to_verify(case.mission, only):
         return Imaged(case.row, case.at, None, "its limit is not one that an image could show")

@@ -1,4 +1,4 @@
-"""A supplier's offer compared with a sheet of specifications: each figure, and the whole mission with the offer."""
+"""Comparison of a supplier's offer with a sheet of specifications: every figure, and the mission as a whole."""
 
 from datetime import date
 from typing import NamedTuple
@@ -16,22 +16,22 @@ _OSCILLATOR_KEYS = ("frequency", "phase_noise", "power_law", "allan_deviation", 
 
 
 class OfferedFigure(NamedTuple):
-    """The figure of an offer for a specification.
+    """Figure of an offer, compared with one specification.
 
     Attributes
     ----------
     key : str
         Path of the error in the mission file.
     value : float, optional
-        The figure in SI; None if the offer's file states none.
+        The figure in SI; None if the file of the offer states no figure.
     text : str
         The figure as the file writes it.
     ordered : str
-        The ordered size.
+        The ordered size, as text.
     is_inside : bool, optional
-        Whether the figure meets the order; None if they cannot be compared, or no size is ordered.
+        Whether the figure meets the specification; None if the two cannot be compared, or if no size is ordered.
     remark : str
-        Reason for None.
+        Why `is_inside` is None; otherwise empty.
     """
 
     key: str
@@ -43,7 +43,7 @@ class OfferedFigure(NamedTuple):
 
 
 class Offer(NamedTuple):
-    """An offer compared with a sheet: its mission file, its figures, and the verdict of a check of its mission.
+    """Result of comparing an offer with a sheet: its mission file, its figures, and the verdict of its mission.
 
     `notes` name the other sections in which the mission of the offer differs from the mission of the sheet.
     """
@@ -56,16 +56,16 @@ class Offer(NamedTuple):
 
     @property
     def complies(self) -> bool:
-        """Whether the mission with the offer meets every requirement, even if a figure exceeds its order."""
+        """Whether the mission with the offer meets every requirement, even if a figure exceeds its specification."""
         return exit_code({self.status}, strict=False) == 0
 
 
 def offer(sheet: SpecificationSheet, mission: Mission, today: date) -> Offer:
-    """Compare the mission of an offer with a sheet.
+    """Compare the mission of an offer with a sheet of specifications.
 
-    A figure is inside if it is no larger than the ordered size; the largest of three axes counts, also for figures of
-    parts that the offer names. A level shifts a spectrum, so levels of different spectra cannot be compared.
-    Specifications and waivers in the offer's own file do not count.
+    A figure meets its specification if it is no larger than the ordered size. If a figure has three axes, the largest
+    value counts; the same holds for figures of parts that the offer names. A level shifts a spectrum, so levels of
+    different spectra cannot be compared. Specifications and waivers in the file of the offer are ignored.
     """
     sheet_mission = None if sheet.findings is None else sheet.findings.mission
     figures = tuple(_figure(each, sheet, mission, sheet_mission) for each in sheet.specifications)
@@ -77,7 +77,7 @@ def offer(sheet: SpecificationSheet, mission: Mission, today: date) -> Offer:
 def _figure(
     specification: Specification, sheet: SpecificationSheet, mission: Mission, sheet_mission: Mission | None
 ) -> OfferedFigure:
-    """The figure of an offer for a specification of a sheet."""
+    """Compare the figure of an offer with one specification of the sheet."""
     try:
         number = specified_number(mission, tree_of(mission), specification.key)
         value, text = number.value, "" if number.value is None else number.text(number.value)
@@ -94,7 +94,7 @@ def _figure(
 
 
 def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
-    """The spectrum that a level shifts, without the level."""
+    """Spectrum that a level shifts, without the shift; `parts` are the parts of the key of the level."""
     platform = getattr(mission.platforms, parts[1])
     if parts[-1] == "level":
         return [getattr(platform.oscillator, name, None) for name in _OSCILLATOR_KEYS]
@@ -102,7 +102,7 @@ def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
 
 
 def _rules(mission: Mission) -> AllocationRules:
-    """The rules of the allocation without `specify`, and with balanced shares as equal, as in a sheet."""
+    """Allocation rules of a mission as in a sheet: without `specify`, and with equal in place of balanced shares."""
     split = mission.allocation.split
     if isinstance(split, MetricSplits) and split.quadratic_phase_error == "balanced":
         split = split._replace(quadratic_phase_error="equal")
@@ -110,7 +110,7 @@ def _rules(mission: Mission) -> AllocationRules:
 
 
 def _differences(sheet_mission: Mission, offered: Mission) -> list[str]:
-    """Sections in which the mission of an offer differs from the mission of the sheet."""
+    """Names of the sections in which the mission of an offer differs from the mission of the sheet."""
     sections = ("radar", "collection", "scene", "requirements")
     names_of_sections = [name for name in sections if getattr(sheet_mission, name) != getattr(offered, name)]
     names_of_sections += ["allocation"] if _rules(sheet_mission) != _rules(offered) else []

@@ -1,8 +1,9 @@
-"""Passes of a satellite over the scene of a mission, and what the mission is in each of them.
+"""Passes of a satellite over the scene of a mission, and the verdict of the mission in each pass.
 
-A pass lasts as long as the satellite is above an elevation; where both platforms have orbits, both are. Its mid-time
-is where the satellite looks at the scene with a given squint, at broadside without one: there the aperture is taken,
-and the mission is checked as a file with that `collection.center_time` is.
+A pass lasts as long as the satellite is above a least elevation; if both platforms have orbits, both must be above
+it. The mid-time of a pass is the time at which the satellite sees the scene with a given squint, by default at
+broadside. The middle of the aperture is put at the mid-time, and the mission is checked like a file with this
+`collection.center_time`.
 """
 
 import math
@@ -41,16 +42,17 @@ _TRACK_POINTS = 41  # of a pass in a drawing
 
 
 class SatellitePass(NamedTuple):
-    """One pass: its times, the path of the satellite, and the verdict of the mission at its mid-time.
+    """One pass of a satellite: its times, its track, and the verdict of the mission at its mid-time.
 
     Attributes
     ----------
     number : int
         Number of the pass, from 1.
     start, stop, culmination : Instant
-        Times above the least elevation, and of the largest elevation.
+        Beginning and end of the time above the least elevation, and the time of the largest elevation.
     rises, sets : bool
-        False if the satellite is above at the beginning, or at the end, of the span.
+        False if the satellite is already above the least elevation at the beginning, or still at the end, of the
+        span.
     max_elevation : float
         Elevation at the culmination. [rad]
     track : (n, 2)
@@ -58,17 +60,18 @@ class SatellitePass(NamedTuple):
     center : Instant, optional
         Mid-time, to a millisecond; None if the satellite never has the squint.
     state : PlatformState, optional
-        Path at the mid-time in the axes of the scene.
+        State of the satellite at the mid-time, in the axes of the scene.
     side : str
-        Side of the track on which the scene lies.
+        Side of the ground track on which the scene lies, `left` or `right` in the direction of flight.
     is_ascending : bool
         Whether the satellite flies north at the mid-time.
     doubt : float, optional
-        Largest distance of the satellite from its path. [m]
+        Largest possible distance of the satellite from its computed path. [m]
     status, reason : str
-        Status of `check`, `error` without a mission, `not_evaluated` without a mid-time; and the reason.
+        Status of the check, and the reason for it. `error` if there is no mission at the mid-time, `not_evaluated`
+        if there is no mid-time.
     bistatic_angle, gradient_angle : float, optional
-        Angles at the mid-time. [rad]
+        Bistatic angle, and angle between range and Doppler gradient, at the mid-time. [rad]
     range_resolution, cross_range_resolution : float, optional
         Resolutions at the mid-time. [m]
     row, requirement, utilization : str, str, float, optional
@@ -113,17 +116,17 @@ class SatellitePass(NamedTuple):
 
     @property
     def bearing(self) -> float | None:
-        """Direction to the satellite at the mid-time, from north, clockwise. [rad]"""
+        """Bearing of the satellite at the mid-time, clockwise from north; None without a mid-time. [rad]"""
         return None if self.state is None else bearing(float(self.state.azimuth))
 
 
 def bearing(azimuth: float) -> float:
-    """Direction from north, clockwise, 0 to 2π, of an azimuth from east, counter-clockwise. [rad]"""
+    """Convert an azimuth, counter-clockwise from east, to a bearing, clockwise from north, 0 to 2π. [rad]"""
     return (math.pi / 2 - azimuth) % (2 * math.pi)
 
 
 class UnknownTime(NamedTuple):
-    """A part of the span without a known orbit of a platform, and the reason."""
+    """A part of the span in which the orbit of a platform is not known, and the reason."""
 
     platform: str
     start: Instant
@@ -164,17 +167,17 @@ class Passes(NamedTuple):
 
     @property
     def waived_by(self) -> tuple[str, ...]:
-        """Ids of the waivers of all passes."""
+        """Ids of the waivers of all waived passes, each once."""
         return tuple(dict.fromkeys(waiver for each in self.found for waiver in each.waived_by))
 
 
 def start_of(text: str) -> Instant:
-    """The instant of a text with a day or an instant of UTC.
+    """Read a day or an instant of UTC from a text; a day gives its beginning.
 
     Raises
     ------
     QuestionError
-        The text is neither.
+        The text is neither a day nor an instant, or the year is out of range.
     """
     instant = parse_instant(f"{text.strip()}T00:00:00Z") or parse_instant(text)
     if instant is None or not _YEARS[0] <= instant.as_datetime().year < _YEARS[1]:
@@ -199,9 +202,9 @@ def passes(
 ) -> Passes:
     """Find the passes of a satellite over the scene, and check the mission in each.
 
-    Arguments are those of `bisar_budget.passes`; elevation and squint, positive looking forward, are in radians. The
-    mission may be loaded with or without paths; its `collection.center_time` does not count. `progress` gets the
-    number of checked passes and of all passes.
+    Arguments are those of `bisar_budget.passes`. The least elevation and the squint are in radians; the squint is
+    positive if the satellite looks forward. The mission may be loaded with or without paths. Its
+    `collection.center_time` is ignored. `progress` is called with the number of checked passes and of all passes.
 
     Raises
     ------
@@ -245,7 +248,7 @@ def passes(
 
 
 def _listed(mission: Mission, platform: str | None) -> str:
-    """The platform of the passes: the requested one, or else the first with an orbit."""
+    """Name of the platform whose passes are listed: the requested one, or else the first with an orbit."""
     flying = [name for name in PLATFORMS if getattr(mission.platforms, name).orbit is not None]
     if not flying:
         accepted = "accepted: platforms.transmitter.orbit or platforms.receiver.orbit"
@@ -258,9 +261,10 @@ def _listed(mission: Mission, platform: str | None) -> str:
 def _watched(
     mission: Mission, axes: SceneAxes, start: Instant, days: float, variation: Variation
 ) -> dict[str, Watched]:
-    """Satellites as seen from the scene, by platform.
+    """Find the satellites as seen from the scene, by the name of the platform.
 
-    For an orbit that cannot be used at all, the error is that of a check at the beginning of the span.
+    If an orbit cannot be used at any time of the span, the error is the error of a check at the beginning of the
+    span.
     """
     read = reader_of(folder_of(mission.file))
     seen = {}
@@ -279,7 +283,10 @@ def _watched(
 
 
 def _hold_to_an_orbit(mission: Mission, variation: Variation, start: Instant) -> None:
-    """Raise the error of a check at an instant, without the words about the option that set the instant."""
+    """Raise the error of reading the mission at an instant, if there is an error.
+
+    The message does not mention the setting of the instant, because the user has not set it.
+    """
     try:
         variation.read(center_time(start))
     except MissionError as error:
@@ -291,7 +298,10 @@ def _hold_to_an_orbit(mission: Mission, variation: Variation, start: Instant) ->
 
 
 def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneAxes, squint: float) -> SatellitePass:
-    """A pass of the orbit, without a check of the mission."""
+    """Make a pass with its times, its track and its mid-time; the mission is not checked yet.
+
+    `stretch` is the time of the pass. `squint` is the squint at the mid-time. [rad]
+    """
     culmination = satellite.culmination(stretch)
     times = np.linspace(stretch.start, stretch.stop, _TRACK_POINTS)
     x, y, z = satellite.at(times)[0].T
@@ -326,7 +336,10 @@ def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneA
 
 
 def _side(state: PlatformState, axes: SceneAxes) -> str:
-    """Side of the track over ground on which the scene lies, looking ahead: right is along v × r from the Earth."""
+    """Side of the ground track on which the scene lies, seen in the direction of flight: `left` or `right`.
+
+    The right side is along v × r, with the velocity v and the position r from the centre of the Earth.
+    """
     right = cross(plain_vector(state.velocity), axes.turned(axes.earth_fixed(plain_vector(state.position))))
     return "left" if dot(state.look, right) > 0 else "right"
 
@@ -355,12 +368,12 @@ def _checked(
 
 
 def center_time(instant: Instant) -> list[SetValue]:
-    """The change of a mission file that puts the middle of the aperture at an instant."""
+    """Changed value of a mission file that puts the middle of the aperture at an instant."""
     return [SetValue(CENTER_TIME, instant.as_text())]
 
 
 def _judged(unjudged: SatellitePass, findings: MissionFindings, mission: Mission, platform: str) -> SatellitePass:
-    """A pass with the findings of its check."""
+    """Add the findings of the check at its mid-time to a pass."""
     path = getattr(mission.platforms, platform).path
     row, requirement, utilization, reason = _deciding(findings)
     return unjudged._replace(
@@ -380,10 +393,10 @@ def _judged(unjudged: SatellitePass, findings: MissionFindings, mission: Mission
 
 
 def _deciding(findings: MissionFindings) -> tuple[str | None, str | None, float | None, str]:
-    """Row, key and utilization of the requirement that decides, and the reason for the status of the mission.
+    """Find the row, key and utilization of the requirement that decides, and the reason for the mission's status.
 
     Among requirements with the status of the mission, the one with the highest utilization decides. If no requirement
-    has this status, a row or a warning about the whole mission decides. Without a verdict there is no utilization.
+    has this status, a row or a warning about the whole mission decides. The utilization is None if nothing is judged.
     """
     worst = min(findings.requirements, key=lambda each: (RANK[each.status], -(each.utilization or 0.0)))
     if worst.status == findings.status:

@@ -1,7 +1,7 @@
-"""Rows of the budget with errors of given sizes: the utilization of each row, and the part of each error in it.
+"""Utilizations of the rows of a budget for given sizes of errors, and the contribution of each error to each row.
 
 Each row that can fail has an allowed utilization. An error adds a power of its size to the row: the square if errors
-combine by root-sum-square or powers add, the size itself if errors add up. Values in SI and radians.
+combine by root-sum-square or powers add, the size itself if errors add linearly. Values are in SI and radians.
 """
 
 import math
@@ -47,7 +47,10 @@ _AS_COMBINED = (
 
 
 class RowUses(NamedTuple):
-    """Utilizations of rows that can fail, (rows, cases), with their ids, requirements and powers of sizes (rows,)."""
+    """Utilizations of all rows that can fail, with the ids and requirements of the rows.
+
+    `uses` are the utilizations, (rows, cases). `powers` are the powers of sizes that add up in each row, (rows,).
+    """
 
     ids: Sequence[str]
     requirements: Sequence[str | None]
@@ -56,24 +59,24 @@ class RowUses(NamedTuple):
 
 
 class Near(NamedTuple):
-    """Utilizations of rows near sizes.
+    """Utilizations of the rows for some sizes of errors, and for neighbouring sizes.
 
     Attributes
     ----------
     found : RowUses
-        Utilizations at the sizes and at their neighbours.
+        Utilizations at the sizes and at the neighbouring sizes.
     allowed : (rows,)
         Allowed utilizations.
     sizes : (sizes,)
-        The sizes.
+        The sizes of the specified errors.
     part : (rows, sizes)
-        Part of each size in the power of the utilization.
+        Contribution of each error to the power of the utilization.
     room : (rows,)
-        Power of the allowed utilization that is left for all sizes.
+        Part of the power of the allowed utilization that is left for the specified errors.
     is_limit : (rows,)
-        Whether any size has a part in the row.
+        Whether any specified error contributes to the row.
     is_free : (sizes,)
-        Whether the size has no part in any row.
+        Whether the error contributes to no row.
     """
 
     found: RowUses
@@ -85,21 +88,21 @@ class Near(NamedTuple):
     is_free: Booleans
 
     def rows(self, of: str = "") -> Rows:
-        """Rows of a geometric program: all rows that limit a size, or the row with the id `of`."""
+        """Constraints for the geometric program: all rows that limit a size, or only the row with the id `of`."""
         limits = self.is_limit & np.array([not of or row == of for row in self.found.ids])
         power = self.found.powers[limits]
         return Rows(self.part[limits] / self.sizes ** power[:, None], power, self.room[limits])
 
 
 class SpecifiedMission:
-    """A mission and its specified errors, without waivers and without specifications of the file.
+    """A mission and its specified errors; waivers and specifications of the file are removed.
 
     Attributes
     ----------
     ends : (sizes,)
-        Sizes from which there is no image, infinite until they are met.
+        Sizes at and above which there is no image; infinite until the search finds them.
     most : (sizes,)
-        Largest sizes that a mission file may state, infinite until they are exceeded.
+        Largest sizes that a mission file may state; infinite until the search exceeds them.
     unjudged : set of str
         Ids of rows that cannot be judged even without the specified errors.
     """
@@ -139,7 +142,7 @@ class SpecifiedMission:
         self.largest = np.array([error.largest for error in self.specified])
 
     def _equal(self, mission: Mission) -> Iterator[SetValue]:
-        """Changes that make balanced shares equal, because the errors that balance them are unknown here."""
+        """Changes that replace balanced shares by equal shares, because the balancing errors are still unknown."""
         split = mission.allocation.split
         key = "allocation.split"
         if isinstance(split, MetricSplits):
@@ -149,17 +152,20 @@ class SpecifiedMission:
             yield SetValue(key, "equal")
 
     def with_values(self, texts: Sequence[str]) -> Mission:
-        """The mission with texts of numbers for the specified errors; an empty text leaves the number as it is."""
+        """Read the mission with a text for the size of each specified error; an empty text changes nothing."""
         return self._read(
             [SetValue(error.key, text) for error, text in zip(self.specified, texts, strict=True) if text]
         )
 
     def _read(self, changes: Sequence[SetValue]) -> Mission:
-        """The mission with changes, without waivers and specifications."""
+        """Read the mission with changes; waivers and specifications are removed."""
         return self.variation.read([*self.equal, *changes])._replace(waivers=(), specifications={})
 
     def judged(self, sizes: Floats, *, is_of_sums: bool = True) -> JudgedMission:
-        """The mission judged with sizes (sizes, cases): sums of errors, and without `is_of_sums` each error too."""
+        """Judge the mission with the specified errors set to sizes, (sizes, cases).
+
+        Only the rows of combined errors are judged; without `is_of_sums` also the rows of single errors.
+        """
         mission = self.stated
         for error, column in zip(self.specified, sizes, strict=True):
             mission = with_number(mission, error.key, error.numbers(column))
@@ -169,11 +175,11 @@ class SpecifiedMission:
 
     @cached_property
     def _nodes(self) -> int:
-        """Number of nodes of the fit over the aperture."""
+        """Number of times in the aperture at which exact ranges are computed for the polynomial fit."""
         return int(Analysis(self.stated).exact.fit.shape[1])
 
     def uses(self, sizes: Floats) -> RowUses:
-        """Utilizations of the rows that can fail, with sizes (sizes, cases)."""
+        """Compute the utilizations of all rows that can fail, for sizes (sizes, cases) of the specified errors."""
         judged = self.judged(sizes)
         rows: list[tuple[str, str | None, float, Floats]] = []
         for row in judged.rows:
@@ -208,18 +214,24 @@ class SpecifiedMission:
         return RowUses(ids, requirements, np.array(powers), np.array(uses))
 
     def _power(self, kind: str) -> float:
-        """Power of a size that adds up in a row of a kind."""
+        """Power of the sizes that adds up in rows of a kind: 1 for linear sums, 2 for sums of squares."""
         is_summed = self.combine == "sum" and kind in _AS_COMBINED
         return 1.0 if is_summed or kind in _WARN_ONLY else 2.0
 
     def allowed(self, ids: Sequence[str]) -> Floats:
-        """Allowed utilization of each row; it is less than 1 without a requirement, and at the end of the image."""
+        """Allowed utilizations of rows, (rows,): 1 minus the reserve, less a small margin.
+
+        Rows without a requirement have no reserve. Rows for the end of the image have a margin of at least 0.5 %.
+        """
         usual = (1 - self.reserve) * _SURE_FRACTION
         most = {NEGLIGIBLE: _SURE_FRACTION, END_OF_IMAGE: min(usual, _END_FRACTION), LARGEST_ACCEPTED: _SURE_FRACTION}
         return np.array([most.get(row.partition(".")[0], usual) for row in ids])
 
     def near(self, sizes: Floats) -> Near | None:
-        """Utilizations of rows near sizes; None if they are far beyond the allowed utilizations."""
+        """Compute the utilizations of all rows at sizes (sizes,), and with each size 20 % smaller and larger.
+
+        None if a utilization exceeds three times the allowed one, or if a row has no room for the specified errors.
+        """
         count = sizes.size
         cases = np.repeat(sizes[:, None], 2 * count + 1, axis=1)
         for number, factor in enumerate(PROBE_FACTORS):

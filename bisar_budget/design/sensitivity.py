@@ -1,8 +1,8 @@
-"""The change of the worst utilization by each number of a mission, from differences of full checks.
+"""Sensitivity of the worst utilization to each number of a mission, from differences between full checks.
 
-Every number that the file states, or takes from a part, changes alone, and all cases are checked together. If the
-shares of a budget follow the declared errors, doubling each error shows its cost to the remaining errors. Values in
-SI and radians.
+Each number that the file states, or takes from a part, is changed alone, and all cases are checked together. If the
+shares of the budget are balanced by the declared errors, each error is also doubled, to show how much the other
+errors lose. Values are in SI and radians.
 """
 
 import json
@@ -61,7 +61,7 @@ _EARTH_RADIUS_M = 6.371e6  # mean radius
 
 # ---------------------------------------------------------------- results
 class Skipped(NamedTuple):
-    """A key without a slope, its text in the file, and the reason."""
+    """A key for which no slope is computed: its text in the file, and the reason."""
 
     key: str
     text: str
@@ -69,31 +69,31 @@ class Skipped(NamedTuple):
 
 
 class Slope(NamedTuple):
-    """Change of the utilization by one number of the file.
+    """Slope of the utilization with respect to one number of the file.
 
     Attributes
     ----------
     key, text : str
         Key of the number, and its value as the file writes it.
     value, unit : float, str
-        The value in its unit; 1 for a covariance, as a factor on its sigmas.
+        The value in its unit; for a covariance 1, the factor by which its sigmas are multiplied.
     per, per_text : float, str
-        Increase of the number to which `change` belongs, in SI with the sign of the value, and in words.
+        Increase of the number for which `change` is given: in SI with the sign of the value, and in words.
     step : float
-        Half of the difference, or a step of a one-sided difference.
+        Step of the difference, in SI. A central difference spans two steps.
     difference : str
-        `central`; or `forward` or `backward`, over two steps, if there is no mission on one side.
+        `central`, or `forward` or `backward` over two steps if the other side has no mission.
     change, row_change : float
-        Change of the worst utilization, and of the requested row; None without a row.
+        Change of the worst utilization, and of the requested row's utilization; None without a requested row.
     row_below, row_above : str
-        Rows with the worst utilization at the ends of the difference with the smaller and larger magnitude.
+        Rows with the worst utilization at the end of smaller magnitude, and at the end of larger magnitude.
     is_mixed : bool
-        Whether another row is the worst at an end. The change then mixes the slopes of two rows.
+        Whether another row is the worst at one end. The change then mixes the slopes of two rows.
     part : str
         Part of the catalogue from which the number is taken; empty if the file states it.
     measure : float
-        The increase in the common measure of all numbers: a fraction of the number, of a radian, of a power, or of a
-        range.
+        The increase `per` in a measure that is common to all numbers: a fraction of the number, of a radian, of a
+        power, or of a slant range.
     """
 
     key: str
@@ -124,21 +124,21 @@ class Slope(NamedTuple):
 
     @property
     def even_effect(self) -> float:
-        """Effect of the same small change in the common measure of all numbers."""
+        """Effect of a change that is the same for all numbers in their common measure; see `measure`."""
         return self.effect * COMPARED_CHANGE_FRACTION / self.measure
 
     @property
     def is_proportional(self) -> bool:
-        """Whether the number changes by a fraction of itself."""
+        """Whether the change of the number is a fraction of its value."""
         return self.per_text == "1 %"
 
 
 class Relaxed(NamedTuple):
-    """Cost of doubling one declared error to the remaining errors, with balanced shares.
+    """Effect on the other errors if one declared error is doubled and the shares are balanced again.
 
-    `shares_before` and `shares_after` are the shares of transmitter and receiver. `transmitter` and `receiver` have
-    the worst row after the doubling, and the worst utilization before and after, among judged rows that are not of
-    this error; None without such rows.
+    `shares_before` and `shares_after` are the shares of transmitter and receiver. `transmitter` and `receiver` each
+    have the worst row after the doubling, and the worst utilization before and after it. Only judged rows of other
+    errors count; None if there are no such rows.
     """
 
     key: str
@@ -154,11 +154,12 @@ class Relaxed(NamedTuple):
 
 
 class Sensitivity(NamedTuple):
-    """Numbers of one mission by their effects, the largest first.
+    """Effects of the numbers of one mission on its utilization, the largest effect first.
 
     `worst_row` has the worst utilization of all judged rows that can fail; `requirement` sets its allowable. `row` is
-    the requested row, whose effects order the numbers, or None. `unchanging` are keys of numbers without any effect.
-    `relaxed` is empty if shares are not balanced. `overrides` are influences from outside the file.
+    the requested row, or None. If it is set, the numbers are sorted by their effects on it. `unchanging` are keys of
+    numbers without any effect. `relaxed` is empty if shares are not balanced. `overrides` are influences from outside
+    the file.
     """
 
     file: str
@@ -180,14 +181,15 @@ class Sensitivity(NamedTuple):
 
     @property
     def asked(self) -> float:
-        """Utilization of the requested row, or else the worst."""
+        """Utilization of the requested row, or else the worst utilization."""
         return self.utilization if self.row_utilization is None else self.row_utilization
 
     def to_limit(self, slope: Slope) -> float | None:
-        """Signed change of a number alone, in its unit, at which the utilization is 1.
+        """Change of one number, with its sign and in its unit, at which the utilization would be 1.
 
-        The extrapolated utilization is a power of the number, or exponential in a level or an angle. It is exact for
-        numbers with this law, such as the aperture time or an error. None beyond a millionfold or half a turn.
+        The utilization is extrapolated as a power of the number, or as an exponential of a level or an angle. This is
+        exact for numbers that follow this law, such as the aperture time or an error. None if the change is more than
+        a factor of a million or half a turn.
         """
         if not slope.effect or self.asked <= 0:
             return None
@@ -212,12 +214,12 @@ class Sensitivity(NamedTuple):
 
 # ---------------------------------------------------------------- differences
 class Stated(NamedTuple):
-    """A number that the file states as `text`.
+    """A number of the file that is varied; `text` is the number as the file states it.
 
-    `step` is half of the difference. `per` is the change to which an effect belongs, in SI, and `per_text` the change
-    in words. `part` is this change in the common measure: a fraction of the number, of a radian, of a power, or of
-    the smaller slant range. `others` are numbers that change too, because shares sum to 1. The value of a covariance
-    is a factor on all sigmas.
+    `step` is half of the central difference. `per` is the change for which effects are given, in SI, and `per_text`
+    is this change in words. `part` is this change in the common measure: a fraction of the number, of a radian, of a
+    power, or of the smaller slant range. `others` are further numbers that change with this one, because shares sum
+    to 1. For a covariance the value is a factor by which all sigmas are multiplied.
     """
 
     number: Number
@@ -230,7 +232,7 @@ class Stated(NamedTuple):
     others: tuple[Number, ...] = ()
 
     def at(self, value: float) -> Mapping[Number, float]:
-        """The numbers of the mission that change, if this one has another value."""
+        """New values of all numbers that change if this number is set to `value`."""
         remainder = 1 - self.value
         further = {share: (share.value or 0.0) * (1 - value) / remainder for share in self.others}
         return {self.number: value, **further}
@@ -244,18 +246,18 @@ def sensitivity(
     today: date,
     progress: Progress = unseen,
 ) -> Sensitivity:
-    """Find the effect on the worst utilization of each number that a mission file states or takes from a part.
+    """Compute the effect of each number of a mission on its worst utilization.
 
-    Each number changes alone, to both sides, and the mission is checked again, so that no effect is left out. Numbers
-    change by 1 % of themselves, directions by a degree, levels by a decibel, latitudes and longitudes by 1 % of the
-    smaller slant range. Arguments are those of `solve`; with a `row`, its utilization is followed in addition to that
-    of the mission.
+    The numbers are all that the file states or takes from a part. Each number is changed alone, to both sides, and
+    the mission is checked again in full, so that no effect is left out. Effects are given for a change by 1 % of the
+    number, by a degree for directions, by a decibel for levels, and by 1 % of the smaller slant range for latitudes
+    and longitudes. Arguments are those of `solve`. With a `row`, effects on its utilization are computed too.
 
     Returns
     -------
     Sensitivity
-        Effects as changes of utilization, 0.01 being 1 % of a limit. The number that uses up the margin with the
-        smallest change comes first. Changes have a common measure: fractions of a number, a radian, a power, a range.
+        Effects as changes of utilization; 0.01 is 1 % of a limit. The number that uses up the margin with the
+        smallest change comes first. For this order, changes are fractions of a number, a radian, a power, or a range.
 
     Raises
     ------
@@ -310,9 +312,10 @@ def sensitivity(
 
 
 class _Uses(NamedTuple):
-    """The worst row with its requirement and utilization, and the utilizations of two rows.
+    """The worst row in one case, with its requirement and utilization, and the utilizations of two further rows.
 
-    `row` belongs to the requested row, `of_worst` to the row that is the worst with the numbers of the file.
+    `row` is the utilization of the requested row, or None. `of_worst` is the utilization of the row that is the worst
+    with the numbers of the file.
     """
 
     worst_row: str
@@ -323,12 +326,12 @@ class _Uses(NamedTuple):
 
     @property
     def is_passed(self) -> bool:
-        """Whether another row exceeds the file's worst row, by more than rounding."""
+        """Whether the worst row here is another one than with the numbers of the file, by more than rounding."""
         return self.worst - self.of_worst > _UTILIZATION_ROUNDING_FRACTION * self.worst
 
 
 class _Neighbours:
-    """Checks a mission with a number of its file changed by a few steps, up or down."""
+    """Checks a mission with single numbers changed by one or two steps, up or down, and computes slopes."""
 
     def __init__(
         self, variation: Variation, numbers: Sequence[Stated], worst: str | None, row: str | None, today: date
@@ -342,7 +345,11 @@ class _Neighbours:
         self.table = Table(asked, mission, tuple(varied.values()))
 
     def uses(self, cases: Sequence[tuple[Stated | None, int]], progress: Progress = unseen) -> list[_Uses | str]:
-        """Utilizations of cases with a number some steps from its value, or the reason why there is no mission."""
+        """Check cases, in each of which one number is a number of steps from its value.
+
+        A case (None, 0) is the mission of the file. Returns the utilizations of each case, or the reason why it has
+        no mission or no utilization.
+        """
         values = {key: np.full(len(cases), value) for key, value in self.values.items()}
         for case, (number, steps) in enumerate(cases):
             if number is not None:
@@ -363,7 +370,10 @@ class _Neighbours:
         return uses
 
     def slopes(self, here: _Uses, progress: Progress) -> Iterator[Slope | Skipped]:
-        """Slopes by differences to both sides of each number, or to the side that has missions."""
+        """Yield the slope of each number from a central difference, or from a one-sided one if a side has no mission.
+
+        `here` are the utilizations with the numbers of the file.
+        """
         sides = [(number, side) for number in self.numbers for side in (-1, 1)]
         checked = iter(self.uses(sides, progress) if sides else ())
         both = [(next(checked), next(checked)) for _ in self.numbers]
@@ -390,7 +400,7 @@ class _Neighbours:
     def _slope(
         self, number: Stated, here: _Uses, kind: str, uses: Sequence[_Uses], weights: Sequence[float]
     ) -> Slope:
-        """Slope for a number, by utilizations at rising values and their weights."""
+        """Compute the slope of a number as the weighted sum of utilizations at rising values of the number."""
 
         def change(values: Iterator[float]) -> float:
             return number.per / number.step * math.fsum(map(math.prod, zip(weights, values, strict=True)))
@@ -415,9 +425,10 @@ class _Neighbours:
 
 # ---------------------------------------------------------------- numbers of the file
 def stated_numbers(tree: JsonObject, nearest_m: float) -> tuple[list[Stated], list[Skipped]]:
-    """All numbers of a mission file in its order, and the skipped keys; `tree` is its content as text.
+    """Find all numbers of a mission file that can be varied, in the order of the file, and the skipped keys.
 
-    A position on the Earth changes by a fraction of `nearest_m`, the slant range of the nearer platform. [m]
+    `tree` is the content of the file as text. A latitude or longitude changes by a fraction of `nearest_m`, the slant
+    range of the nearer platform. [m]
     """
     numbers: list[Stated] = []
     skipped: list[Skipped] = []
@@ -439,7 +450,7 @@ Leaf = tuple[str, Reader[object], Content, Mapping[str, object] | None]
 
 
 def _leaves(reader: Reader[object], value: object, path: tuple[str, ...], above: JsonObject | None) -> Iterator[Leaf]:
-    """Yield the key, reader and value of every leaf of a file. A share has its section of shares as fourth item."""
+    """Yield the key, reader and value of every leaf of a file; the fourth item is a share's section, else None."""
     reader = form_of(reader, value)
     children: Sequence[tuple[str, object]] = ()
     if isinstance(value, dict):
@@ -458,7 +469,7 @@ def _leaves(reader: Reader[object], value: object, path: tuple[str, ...], above:
 
 
 def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, object] | None) -> Stated | Skipped:
-    """A number with its step, or why it has none; `shares` are all shares of its section."""
+    """Choose the step of a number, or return the reason why it has none; `shares` are all shares of its section."""
     value = number.value or 0.0
     if number.reader is LATITUDE or number.key.endswith("longitude"):
         step = DIFFERENCE_STEP_FRACTION * nearest_m / _EARTH_RADIUS_M
@@ -484,7 +495,7 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, ob
 
 
 def _no_number(key: str, reader: Reader[object]) -> str:
-    """Words for the content of a key without a number; empty for names and remarks, which have no effect."""
+    """Reason why a key has no number that can vary; empty for names and remarks, which have no effect."""
     kinds = (
         ("is a whole number", isinstance(reader, Whole | Version)),
         ("is a choice", isinstance(reader, Choice)),
@@ -497,7 +508,7 @@ def _no_number(key: str, reader: Reader[object]) -> str:
 
 # ---------------------------------------------------------------- shares that follow the declared errors
 def relaxed_errors(mission: Mission, judged: JudgedMission, today: date) -> Iterator[Relaxed]:
-    """Cost of doubling each declared error; `judged` is the mission without doubled errors."""
+    """Yield, for each declared error, the effect of doubling it; `judged` is the mission before any doubling."""
     for key in _declared_errors(mission):
         try:
             doubled = scaled(mission, key, _RELAXED_FACTOR)
@@ -514,7 +525,7 @@ def relaxed_errors(mission: Mission, judged: JudgedMission, today: date) -> Iter
 
 
 def _declared_errors(mission: Mission) -> Iterator[str]:
-    """Keys of the declared errors: for each platform by kind, with figures of parts of the catalogue."""
+    """Keys of the declared errors of all platforms and sections; figures of parts of the catalogue are included."""
     sections: list[tuple[str, object, Sequence[str], int]] = []  # key, section, its keys, and the length of a list
     for name in PLATFORMS:
         error, key = getattr(mission.platforms, name).motion_error, f"platforms.{name}.motion_error"
@@ -538,13 +549,16 @@ def _declared_errors(mission: Mission) -> Iterator[str]:
 
 
 def _shares(judged: JudgedMission) -> tuple[float, float]:
-    """Shares of transmitter and receiver."""
+    """Shares of transmitter and receiver in the quadratic phase error."""
     split = judged.analysis.allocation.qpe
     return split.transmitter, split.receiver
 
 
 def _of_others(owner: str, before: Sequence[Judged], after: Sequence[Judged]) -> tuple[str, float, float] | None:
-    """Worst row of a platform, and worst utilization before and after, among judged rows with unchanged errors."""
+    """Worst row of a platform after a doubling, and the worst utilization before and after it.
+
+    Only judged rows whose own error is unchanged count; None without such a row.
+    """
     now, kept = {row.subject.id: row for row in after}, []
     for row in before:
         was, then = float(row.utilization[0]), now.get(row.subject.id)

@@ -1,8 +1,9 @@
 """Solve a mission for one of its numbers: every value at which compliance begins or ends.
 
-The search samples the range. Between two samples with different compliance it brackets the border. Where the worst
-utilization has a maximum or minimum between samples, the search finds it first, because compliance may change there
-and back. Each step checks many values at once in the case table. Values in SI and radians; factors are plain numbers.
+The search samples the range. Between two samples with different compliance it brackets the border. If the worst
+utilization has a maximum or minimum between samples, the search finds it first, because compliance may change and
+change back near it. Each step checks many values at once in the case table. Values are in SI and radians; factors are
+plain numbers.
 """
 
 import math
@@ -45,21 +46,22 @@ _GOLDEN = (math.sqrt(5) - 1) / 2
 
 @dataclass(frozen=True)
 class SolveSettings:
-    """Tunings of the search for the borders of compliance.
+    """Settings of the search for the borders of compliance.
 
     Attributes
     ----------
     range_samples, circle_samples : int
-        Number of samples of a range, and of a circle: every 2 degrees, because geometry changes fast near parallel
-        gradients.
+        Number of samples of a range, and of a circle. A circle has a sample every 2 degrees, because geometry changes
+        fast near parallel gradients.
     border_fraction : float
-        Distance between the two sides of a border before they are rounded, as a fraction of the value.
+        Largest distance between the two sides of a border before they are rounded, as a fraction of the value.
     max_turns_count : int
         Largest number of maxima and minima of the utilization that are searched.
     turn_steps : int
-        Number of steps of a golden section, which then ends at 7e-5 of the distance between samples.
+        Number of steps of a golden-section search; the last interval is 7e-5 of the distance between samples.
     ahead_steps, read_ahead_steps : int
-        Number of steps that a search looks ahead: usually, and if each case is read, which takes longer.
+        Number of further steps whose values are checked in advance. The second number applies if each case has to be
+        read, which takes longer.
     """
 
     range_samples: int = 65
@@ -79,11 +81,12 @@ Search = Callable[[Mapping[float, "State"]], SearchT | set[float]]
 
 
 class State(NamedTuple):
-    """Verdict of the mission at one value.
+    """Verdict of the mission at one value of the number.
 
     `row` has the highest utilization of the rows that decide; `requirement` sets its allowable. Both are None if no
-    row is judged. `reason` is why there is no mission at this value; empty if there is one. `waived_by` are the ids
-    of waivers of a waived state, which does not comply. Resolutions are peak to first null on the ground. [m]
+    row is judged. `reason` tells why there is no mission at this value; it is empty if there is a mission.
+    `waived_by` are the ids of the waivers of a waived state, which does not comply. Resolutions are from peak to
+    first null on the ground. [m]
     """
 
     value: float
@@ -99,10 +102,10 @@ class State(NamedTuple):
 
 
 class Crossing(NamedTuple):
-    """A border of compliance: the last value that complies and the first beyond it that does not.
+    """A border of compliance: the last value that complies, and the next value, which does not comply.
 
-    `inside` and `outside` are 1e-6 of the value apart. `is_upper` tells whether lower values comply. `is_verified`
-    tells whether checks of the mission with the texts of both values confirm the border.
+    The values of `inside` and `outside` differ by 1e-6 of the value. `is_upper` tells whether the values below the
+    border comply. `is_verified` tells whether checks of the mission with the texts of both values confirm the border.
     """
 
     inside: State
@@ -114,8 +117,8 @@ class Crossing(NamedTuple):
 class Imaged(NamedTuple):
     """Verdict of the image on the row that binds at a solution.
 
-    `at` is the solution as text. `verdict` is None if the row has no image. `reason` is why there is no verdict, or
-    the basis of the verdict; it may be empty.
+    `at` is the solution as text. `verdict` is None if no image can show the limit of the row. `reason` tells why
+    there is no verdict, or what the verdict is based on; it may be empty.
     """
 
     row: str
@@ -125,12 +128,12 @@ class Imaged(NamedTuple):
 
     @property
     def is_optimistic(self) -> bool:
-        """Whether the image, with autofocus or without, shows a larger error than the limit allows."""
+        """Whether the image at the limit, with or without autofocus, shows a larger error than the limit allows."""
         return self.verdict is not None and "optimistic" in (self.verdict.verdict, self.verdict.verdict_autofocus)
 
 
 class Solution(NamedTuple):
-    """The crossings of one mission in a range, in rising order.
+    """Result of `solve`: the crossings of one mission in a range, in rising order.
 
     Attributes
     ----------
@@ -145,11 +148,11 @@ class Solution(NamedTuple):
     given : State, optional
         State at the value of the file.
     nearest : State
-        The nearest miss if no value complies; the value with the smallest margin if all values comply.
+        The state with the smallest excess if no value complies; the state with the smallest margin if all comply.
     is_constant : bool
-        Whether the number changes no utilization that decides.
+        Whether the number has no effect on the utilization that decides.
     skipped, waived : int
-        Number of samples without a mission, and of waived samples.
+        Number of samples without a mission, and number of waived samples.
     waived_by : tuple of str
         Ids of the waivers of waived samples.
     texts : mapping of float to str
@@ -200,7 +203,10 @@ class Solution(NamedTuple):
 
     @property
     def status(self) -> str:
-        """`crossing`; `all` or `none` if all or no values comply; `waived` if none complies and some are waived."""
+        """`crossing` if compliance changes in the range, otherwise `all`, `none`, or `waived`.
+
+        `waived` is returned if no value complies and some values are waived.
+        """
         if self.crossings:
             return "crossing"
         return "all" if self.nearest.complies else "waived" if self.waived else "none"
@@ -218,11 +224,12 @@ def solve(
     today: date,
     progress: Progress = unseen,
 ) -> Solution:
-    """Find every value of a number of a mission at which its compliance begins or ends.
+    """Find every value of one number of a mission at which compliance begins or ends.
 
     Arguments are those of `bisar_budget.solve`; `between` is `A..B` with units, by default 0.1 to 10 for a factor.
-    With the target `fail` a value complies if `check` exits with 0, with `warn` if `check --strict` does. `progress`
-    gets the number of finished values and of all values. Values of the solution are in SI.
+    With the target `fail` a value complies if `check` exits with 0, with the target `warn` if `check --strict` does.
+    `progress` is called with the number of finished values and the number of all values. Values of the solution are
+    in SI.
 
     Raises
     ------
@@ -266,10 +273,10 @@ def solve(
 
 
 def _nearest(states: Sequence[State]) -> State:
-    """The first state with the smallest margin if all comply, else the first with the smallest excess.
+    """First state with the smallest margin if all states comply, otherwise the first with the smallest excess.
 
-    Waived states come before other states that do not comply. A state that is not evaluated breaks no limit, so it
-    is the nearest.
+    Waived states come before other states that do not comply. A state that is not evaluated exceeds no limit, so it
+    counts as the smallest excess.
     """
     if all(state.complies for state in states):
         uses = [state.utilization or 0.0 for state in states]
@@ -285,7 +292,7 @@ def _nearest(states: Sequence[State]) -> State:
 
 
 def _is_alike(first: float | None, second: float | None) -> bool:
-    """Whether two utilizations are equal but for rounding."""
+    """Whether two utilizations are equal except for rounding."""
     return first == second or (
         first is not None and second is not None and math.isclose(first, second, rel_tol=EQUAL_USE_FRACTION)
     )
@@ -315,7 +322,10 @@ class _Search:
         self.range: Range = range_of(self.number, between)
 
         def judged() -> Iterator[JudgedMission]:
-            """The mission of the file and at the end of the range, because the file may not declare the error."""
+            """Judge the mission of the file, and the mission at the upper end of the range.
+
+            The second one is needed because the file may not declare the error.
+            """
             yield judged_mission(Analysis(self.base), today)
             with suppress(MissionError):
                 end = self.range.high
@@ -329,7 +339,10 @@ class _Search:
         self.levels = SOLVE_SETTINGS.read_ahead_steps if self.table.to_read else SOLVE_SETTINGS.ahead_steps
 
     def scanned(self, progress: Progress) -> tuple[list[State], State | None]:
-        """States at the samples of the range and at turns of the utilization, and the state of the file."""
+        """Find the states at the samples, and at maxima and minima of the utilization where compliance changes.
+
+        Returns these states in rising order, and the state at the value of the file, or None without such a value.
+        """
         values = self.range.places(
             SOLVE_SETTINGS.circle_samples if self.range.is_circle else SOLVE_SETTINGS.range_samples
         )
@@ -346,7 +359,7 @@ class _Search:
         return sorted([*states, *turned], key=lambda state: state.value), file_state
 
     def states(self, values: Sequence[float], progress: Progress = unseen) -> list[State]:
-        """States of the mission at values."""
+        """Check the mission at values of the number, in SI, and return the state at each value."""
         (number,) = self.table.numbers
         columns_by_name = self.table.watched({number.key: np.array(values)}, progress)
         columns = (*VERDICT, *GEOMETRY[:2], WAIVED_BY, REASON)
@@ -373,7 +386,10 @@ class _Search:
         return states
 
     def crossings(self, borders: Sequence[tuple[State, State]]) -> tuple[Crossing, ...]:
-        """Crossings of borders: bracketed, with both sides rounded to few digits and checked as rounded."""
+        """Find the crossing at each border: bracket it, round both sides to few digits, and check the rounded values.
+
+        A border is a pair of neighbouring states with different compliance.
+        """
         least = 1e-9 * (self.range.high - self.range.low)  # near 0, where a fraction of the value is no useful width
         narrow = self._searched([partial(_bracketed, low, high, least, self.levels) for low, high in borders])
         texts = [
@@ -385,7 +401,7 @@ class _Search:
         return tuple(_crossing(low, high, next(rounded), next(rounded)) for low, high in narrow)
 
     def _searched(self, searches: Sequence[Search[SearchT]]) -> list[SearchT]:
-        """Results of searches that take their steps together."""
+        """Run several searches, and check the values that they need together; return their results."""
         states_by_value: dict[float, State] = {}
         while True:
             results = [search(states_by_value) for search in searches]
@@ -398,7 +414,7 @@ class _Search:
             states_by_value.update(zip(values, self.states(values), strict=True))
 
     def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[float, str]:
-        """Texts of all values of the answer, as the file would write them."""
+        """Texts of all values of the solution, by value, as they would be written in a mission file."""
         values = [self.range.low, self.range.high, nearest.value]
         values += [state.value for crossing in crossings for state in (crossing.inside, crossing.outside)]
         values += [] if self.number.value is None else [self.number.value]
@@ -408,7 +424,11 @@ class _Search:
 def _bracketed(
     low: State, high: State, least: float, levels: int, states_by_value: Mapping[float, State]
 ) -> tuple[State, State] | set[float]:
-    """Bisect an interval with a border until it is narrow, or return the values of the next steps."""
+    """Bisect the interval between two states with different compliance until it is narrow.
+
+    Returns the states at both ends, or, if a state is missing in `states_by_value`, the set of values that the next
+    `levels` steps may need. `least` limits the width for values near 0.
+    """
     while high.value - low.value > SOLVE_SETTINGS.border_fraction * max(abs(low.value), abs(high.value), least):
         middle = (low.value + high.value) / 2
         if not low.value < middle < high.value:
@@ -421,7 +441,11 @@ def _bracketed(
 
 
 def _ahead(points: Callable[[float, float], tuple[float, ...]], low: float, high: float, levels: int) -> set[float]:
-    """All values that the next `levels` steps may need: a step goes on below its last point, or above its first."""
+    """All values that the next `levels` steps of a search may need.
+
+    `points` gives the values that a step checks in an interval. The next interval is below the last of these values,
+    or above the first.
+    """
     values = points(low, high)
     if not levels or not low < values[0] < high:
         return set()
@@ -437,7 +461,10 @@ def _golden(low: float, high: float) -> tuple[float, float]:
 
 
 def _turns(states: Sequence[State]) -> list[tuple[float, float, State]]:
-    """Intervals (low, high, middle state) with a turn of the utilization and without a change of compliance."""
+    """Find the intervals with a maximum or minimum of the utilization and without a change of compliance.
+
+    Each item has the low and high value of the interval, and the state at the sample between them.
+    """
     turns = []
     for before, here, after in zip(states, states[1:], states[2:], strict=False):
         uses = [state.utilization for state in (before, here, after)]
@@ -453,7 +480,11 @@ def _turns(states: Sequence[State]) -> list[tuple[float, float, State]]:
 def _turn(
     low: float, high: float, here: State, levels: int, states_by_value: Mapping[float, State]
 ) -> State | set[float] | None:
-    """A state near a turn with another compliance, None if there is none, or the values of the next steps."""
+    """Search near a maximum or minimum of the utilization for a state with another compliance than `here`.
+
+    Returns the state, None if there is none, or, if a state is missing in `states_by_value`, the set of values that
+    the next steps may need.
+    """
     for _ in range(SOLVE_SETTINGS.turn_steps):
         values = _golden(low, high)
         if not states_by_value.keys() >= set(values):
@@ -470,7 +501,11 @@ def _turn(
 
 
 def _crossing(low: State, high: State, below: State, above: State) -> Crossing:
-    """The crossing between two states; `below` and `above` are the states at the rounded values."""
+    """Make the crossing between two states.
+
+    `below` and `above` are the states at the rounded values. They replace `low` and `high` if they have the same
+    compliance; otherwise compliance changes again within the rounding.
+    """
     is_upper = low.complies
     is_verified = below.complies == low.complies and above.complies == high.complies
     if not is_verified:  # compliance changes again within the rounding
@@ -480,5 +515,5 @@ def _crossing(low: State, high: State, below: State, above: State) -> Crossing:
 
 
 def _sign(state: State) -> float:
-    """1 for a state that complies, since a higher utilization may not comply; -1 for a state that does not."""
+    """Sign of the utilization change that may end the compliance of a state: 1 if it complies, otherwise -1."""
     return 1.0 if state.complies else -1.0

@@ -57,7 +57,7 @@ _DENSITY_ROUNDING_FACTOR = 1 + 1e-9
 
 
 class Specified(NamedTuple):
-    """A specified error: its number in the file, and its weight."""
+    """An error for which a specification is wanted: its number in the mission file, and its weight."""
 
     number: Number
     weight: float
@@ -69,22 +69,22 @@ class Specified(NamedTuple):
 
     @property
     def nothing(self) -> float:
-        """The size of no error."""
+        """Size that stands for no error: 0, or the amplitude of a very low level."""
         return float(10 ** (_SILENT_DB / 20)) if self.number.is_level else 0.0
 
     @property
     def largest(self) -> float:
-        """The largest size that a mission file may state."""
+        """Largest size of the error that a mission file may state."""
         bound = min(self.number.reader.bounds[2:])
         return float(10 ** (bound / 20)) if self.number.is_level else bound * (1 - 1e-9)
 
     @property
     def tiny(self) -> float:
-        """A size so small that effects are proportional to it."""
+        """A size so small that all effects of the error are proportional to it."""
         return _TINY_BY_DIMENSION.get(self.number.dimension, _TINY_SIZE)
 
     def numbers(self, sizes: Floats) -> Floats:
-        """Numbers of the file for sizes: the sizes, or for levels the decibels of amplitudes."""
+        """Convert sizes to numbers of the mission file; for a level, amplitudes are converted to decibels."""
         if not self.number.is_level:
             return sizes
         with np.errstate(divide="ignore"):
@@ -92,11 +92,11 @@ class Specified(NamedTuple):
         return levels
 
     def text(self, size: float) -> str:
-        """A size as the file would write it, in SI."""
+        """Text of a size as in a mission file, in SI."""
         return f"{float(self.numbers(np.array(size)))!r} {self.number.dimension.si}".rstrip()
 
     def unit_of(self, value: float) -> str:
-        """Unit of an ordered number: the unit of the file, or else a suitable one."""
+        """Unit in which a number is ordered: the unit of the file, or else a unit that suits its magnitude."""
         dimension = self.number.dimension
         if self.number.value is not None or dimension not in _ORDERED_IN:
             return self.number.unit
@@ -104,13 +104,16 @@ class Specified(NamedTuple):
         return next((unit for unit in candidates if abs(value) >= np.divide(*dimension.scales[unit])), candidates[-1])
 
     def said(self, value: float) -> str:
-        """The number with four digits, in its ordered unit."""
+        """Text of a number with four digits, in the unit in which it is ordered."""
         unit = self.unit_of(value)
         factor, divisor = self.number.dimension.scales[unit]
         return f"{value / factor * divisor:.4g} {unit}".rstrip()
 
     def ordered(self, value: float) -> tuple[float, str]:
-        """The number rounded down to two digits in its ordered unit: in SI, and as the file would write it."""
+        """Round a number down to two digits in the unit in which it is ordered.
+
+        Returns the rounded number in SI, and its text as in a mission file.
+        """
         unit = self.unit_of(value)
         factor, divisor = self.number.dimension.scales[unit]
         number = value / factor * divisor
@@ -121,7 +124,9 @@ class Specified(NamedTuple):
 
 
 def specified_errors(mission: Mission, tree: dict[str, object], keys: Mapping[str, float] | None) -> list[Specified]:
-    """Errors to specify: of `keys`, or else of the mission's `allocation.specify`, or else of the usual keys.
+    """Find the errors to specify, with their weights.
+
+    They are the errors of `keys`, or else of the mission's `allocation.specify`, or else of the usual keys.
 
     Raises
     ------
@@ -144,7 +149,10 @@ def specified_errors(mission: Mission, tree: dict[str, object], keys: Mapping[st
 
 
 def usual_keys(mission: Mission) -> Iterator[str]:
-    """Keys of position, velocity, acceleration and clocks, without figures of parts and covariances."""
+    """Yield the keys that are specified by default: position, velocity, acceleration and clock errors.
+
+    Errors that a part or a covariance determines are left out.
+    """
     for name in PLATFORMS:
         platform = getattr(mission.platforms, name)
         error = platform.motion_error
@@ -162,7 +170,7 @@ def usual_keys(mission: Mission) -> Iterator[str]:
 
 
 def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
-    """The number of a key that can be specified; raises `QuestionError`."""
+    """Find the number of a key; raises `QuestionError` if its error cannot be specified."""
     parts = parts_of(key)
     if not is_error(key):
         raise QuestionError(f"{key}: is no error that can be specified; {ACCEPTED_ERRORS}")
@@ -174,9 +182,9 @@ def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
 
 
 def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Number:
-    """The number that a key names, with its value in the file, or else the figure of the part that the file names.
+    """Find the number that a key names, with its value in the file, or else in the part that the file names.
 
-    If the value has three components, one for each axis, the number has the component of largest magnitude.
+    If the value has three components, one for each axis, the component of largest magnitude is taken.
     """
     number = number_of(tree, key, is_for_each=True)
     if number.value is not None:
@@ -187,7 +195,10 @@ def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Num
 
 
 def multiplied(keys: Sequence[str]) -> tuple[str, str] | None:
-    """Two keys whose values multiply, so that only their product is limited; None without such keys."""
+    """Find two keys whose values are multiplied in the mission, so that only their product is limited.
+
+    The first key is a level, and the second key is a figure that the level shifts. None if there are no such keys.
+    """
     for key in keys:
         *section, name = parts_of(key)
         if name not in ("level", "spectrum_level"):
@@ -201,7 +212,10 @@ def multiplied(keys: Sequence[str]) -> tuple[str, str] | None:
 
 # ---------------------------------------------------------------- parts that meet a specification
 def catalogue(mission: Mission) -> list[Entry]:
-    """Parts that the file of a mission may name: parts of this package, and of the mission's project."""
+    """Parts that a mission file may name: the parts of this package, and the parts of the mission's project.
+
+    Empty if a file of the project is no valid part.
+    """
     try:
         return list(entries(folders(folder_of(mission.file))))
     except PartError:  # a folder of the project has a file that is no part; `sensors` says which
@@ -209,12 +223,13 @@ def catalogue(mission: Mission) -> list[Entry]:
 
 
 def suitable_parts(mission: Mission, specified: Specified, most: float, candidates: Sequence[Entry]) -> Iterator[str]:
-    """Ids of the parts that meet a specification with the ordered number `most`; the mission states the error.
+    """Yield the ids of the parts that meet a specification with the ordered number `most`.
 
-    A sensor meets it if its figure of the same name is no larger on any axis. An oscillator meets it if its phase
-    noise, at the same frequency, is nowhere above the ordered spectrum; an oscillator without noise at some offsets
-    does not. A satellite gets only sensors that serve in orbit: receivers for the ground and the air stop at 515 m/s
-    or 18 km by export rules, and inertial sensors measure nothing in free fall.
+    `mission` must state the error. A sensor meets the specification if its figure of the same name is no larger on
+    any axis. An oscillator meets it if its phase noise, converted to the same frequency, is nowhere above the ordered
+    spectrum; an oscillator without noise values at some offsets does not meet it. For a satellite only sensors that
+    work in orbit are listed: export rules stop receivers for ground and air use at 515 m/s or 18 km, and inertial
+    sensors measure nothing in free fall.
     """
     *above, section, figure = parts_of(specified.key)
     if section == "oscillator" and figure == "level":
@@ -234,7 +249,7 @@ def _is_satellite(platform: Platform) -> bool:
 
 
 def _quiet_oscillators(mission: Mission, name: str, level: float, candidates: Sequence[Entry]) -> Iterator[str]:
-    """Ids of the oscillators whose phase noise is nowhere above a platform's spectrum at a level."""
+    """Yield the ids of oscillators with phase noise nowhere above a platform's spectrum, shifted by a level [dB]."""
     carrier, pieces = _spectrum(mission, name)
     aperture = mission.collection.aperture_time
     last = max(piece.high for piece in pieces)
@@ -252,7 +267,7 @@ def _quiet_oscillators(mission: Mission, name: str, level: float, candidates: Se
 
 
 def ordered_noise(mission: Mission, specified: Specified, level: float) -> str:
-    """Words for the phase noise of an oscillator at an ordered level; empty for another error."""
+    """Text with the phase noise of an oscillator at an ordered level [dB]; empty if the error is not such a level."""
     _, name, *below = parts_of(specified.key)
     if below != ["oscillator", "level"]:
         return ""
@@ -265,7 +280,7 @@ def ordered_noise(mission: Mission, specified: Specified, level: float) -> str:
 
 
 def _spectrum(mission: Mission, name: str) -> tuple[float, Sequence[PowerLawPiece]]:
-    """Frequency of a platform's oscillator, or else of the radar, and the phase spectrum there at 0 dB."""
+    """Frequency of a platform's oscillator, or else of the radar [Hz], and the phase spectrum there at level 0 dB."""
     oscillator = getattr(mission.platforms, name).oscillator
     carrier = oscillator.frequency or mission.radar.center_frequency
     return carrier, noise_of(oscillator.noise_alone, carrier, mission.collection.aperture_time).pieces

@@ -1,6 +1,6 @@
-"""Checks of a mission in many cases: arrays of numbers in, columns of results out.
+"""Check a mission in many cases: values are given as arrays, results are returned as columns.
 
-Memory does not grow with the number of cases, because the cases are checked in parts when a part is needed.
+The cases are checked in parts, each when it is needed, so memory does not grow with the number of cases.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -62,9 +62,9 @@ _UNIT_BY_SUFFIX = {"rad": "rad", "db": "dB"}  # by the last word of a field's na
 
 
 class Asked:
-    """A mission that is to be checked in many cases, in chunks.
+    """A mission, and the cases in which it is to be checked in chunks.
 
-    Arguments are those of `bisar_budget.sweep`. Repeated columns count once.
+    Arguments are those of `bisar_budget.sweep`. Repeated columns are used once.
 
     Raises
     ------
@@ -97,7 +97,7 @@ class Asked:
                 self._hold_to_a_mission(number)
 
     def _chosen(self) -> Iterator[Mission]:
-        """Missions with one word each; words that make no mission are left out.
+        """Yield the missions with each single word of the varied keys; words that make no mission are left out.
 
         Raises
         ------
@@ -123,7 +123,7 @@ class Asked:
                 raise QuestionError(f"{choices.key}: no value of it makes a mission: {problem}")
 
     def _hold_to_a_mission(self, number: Number) -> None:
-        """Refuse a key whose first, middle and last value make no mission, for the same reason."""
+        """Raise `QuestionError` if the first, middle and last value of a key make no mission, for the same reason."""
         problems = set()
         for index in {0, self.cases.count // 2, self.cases.count - 1}:
             values = self.cases.values(index, index + 1)
@@ -137,7 +137,7 @@ class Asked:
             raise QuestionError(f"{number.key}: no value of it makes a mission: {problems.pop()}")
 
     def _columns(self, missions: Sequence[Mission]) -> Iterator[Column]:
-        """The requested columns; a row is known if any of the missions has it."""
+        """Yield the requested columns; raises `QuestionError` for an unknown field, or a row that no mission has."""
         rows: dict[str, Row] = {}
         for mission in missions:
             rows = {row.id: row for row in check_mission(mission, self.question.today).rows} | rows
@@ -152,7 +152,7 @@ class Asked:
             yield Column(name, unit, _FIELDS[field].format(row), is_text=is_status(name))
 
     def swept(self, parts: Iterator[Part]) -> Swept:
-        """The sweep with parts."""
+        """Make the sweep from an iterator over its parts."""
         varied = [
             Column(
                 each.key, each.dimension.si if isinstance(each, Number) else "", "Varies.", isinstance(each, Choices)
@@ -169,12 +169,12 @@ class Asked:
         )
 
     def checked(self, jobs: int = 1) -> Swept:
-        """The sweep; its parts are checked when they are needed, by `jobs` processes."""
+        """Make the sweep; `jobs` processes check its parts when they are needed."""
         return self.swept(self.shared_out(self.chunks.starts, jobs))
 
     @cached_property
     def chunks(self) -> "Chunks":
-        """Division of the cases into chunks, smaller if many cases are read one by one; a sample of cases decides."""
+        """Division of the cases into chunks, which are smaller if many cases of a sample are read one by one."""
         cases, is_slow = self.cases, False
         if cases.count > _READ_PART_CASES:
             indices = np.linspace(0, cases.count - 1, _READ_PART_CASES).astype(int)
@@ -185,15 +185,16 @@ class Asked:
 
     @cached_property
     def travelling(self) -> Question:
-        """The question with the files that the mission names, so that other processes read the same content."""
+        """The question, with the content of the files that the mission names, for use in other processes."""
         words = [SetValue(choices.key, word) for choices, chosen in words_of(self.cases) for word in chosen]
         return self.question._replace(named=named_by(self.mission, words))
 
     def shared_out(self, starts: Sequence[int], jobs: int, mapped: MapBlocks | None = None) -> Iterator[Part]:
-        """Check the chunks that begin at `starts`, in this order; processes share cases that are read one by one.
+        """Check the chunks that begin at `starts`, and yield their parts in this order.
 
-        Arrays of cases take less time to check than to send to another process. With `mapped`, other workers check
-        all chunks, and parts come in any order.
+        `jobs` processes share the work only if many cases have to be read one by one, because cases in arrays take
+        less time to check than to send to another process. With `mapped`, other workers check all chunks, and parts
+        come in any order.
         """
         stops = ((start, self.chunks.stop(start)) for start in starts)
         blocks = ((start, stop, self.cases.values(start, stop)) for start, stop in stops)
@@ -210,7 +211,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Chunks:
-    """Division of cases up to `end` into chunks; `is_slow` if many cases are read one by one."""
+    """Division of `end` cases into chunks of `size` cases; `is_slow` if many cases have to be read one by one."""
 
     end: int
     size: int
@@ -218,27 +219,27 @@ class Chunks:
 
     @property
     def starts(self) -> range:
-        """First case of each chunk."""
+        """Index of the first case of each chunk."""
         return range(0, self.end, self.size)
 
     def stop(self, start: int) -> int:
-        """End of the chunk that begins at a case."""
+        """Index after the last case of the chunk that begins at case `start`."""
         return min(start + self.size, self.end)
 
 
 @lru_cache(maxsize=1)
 def _table(question: Question) -> Table:
-    """Table of a question; the last one is kept."""
+    """Make the table of a question; the table of the last question is cached."""
     parse = mission_of if question.named is None else question.named.parse
     tree = read_tree(question.data, question.file)
     return Table(question, parse(tree, question.data, question.file, question.model, changes=question.changes))
 
 
 def part_of(question: Question, block: Block) -> Part:
-    """Check a block of cases in another process, which keeps the table of the last question."""
+    """Check a block of cases; other processes call this, and each of them keeps the table of the last question."""
     return _table(question).part(*block)
 
 
 def _fault_text(fault: Fault) -> str:
-    """Text of a fault: the problem, and accepted values."""
+    """Text of a fault, with its problem and the accepted values."""
     return fault_words(fault.problem, "", fault.accepted, "" if "Read with" in fault.hint else fault.hint)

@@ -1,8 +1,9 @@
-"""The case table: one mission in many cases, for sweeps, solutions, sensitivities and comparisons of parts.
+"""The case table: checks of one mission in many cases, for sweeps, solutions, sensitivities and comparisons.
 
-A number becomes an array in the mission if it decides nothing but its own value. Other cases are read like a file,
-from the tree of the mission with the numbers of the case; missions of one shape then become one mission of arrays.
-Either way all cases are judged together. Only this module decides which row is the worst.
+If a number affects nothing in the mission but its own value, an array with the values of all cases replaces it. Other
+cases are read one by one, like a file with the numbers of the case, and missions of the same structure are then
+joined into one mission with arrays. In both ways all cases are judged together. Only this module decides which row is
+the worst.
 """
 
 import math
@@ -40,7 +41,7 @@ _FIRST_REPORTS, _REPORT_INTERVAL_CASES = (2, 12), 48
 
 
 class Column(NamedTuple):
-    """One column of a table: name, unit (SI; empty for texts and numbers without a unit) and description."""
+    """One column of a table: its name, its SI unit (empty for texts and plain numbers) and its description."""
 
     name: str
     unit: str
@@ -54,10 +55,10 @@ class Column(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Cases `start` to `stop` of a table, in their order.
+    """Results for the cases `start` to `stop` - 1 of a table, in their order.
 
-    `values` holds an array (stop - start,) for each column by its name: float64 with NaN for missing values, or texts
-    with empty texts for missing values.
+    `values` has an array (stop - start,) for each column, by the name of the column. Numbers are float64, with NaN
+    for missing values; texts are empty for missing values.
     """
 
     start: int
@@ -67,7 +68,7 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Swept:
-    """A sweep: its columns, the varied keys in order, and its parts as they are checked."""
+    """A sweep: the varied keys in their order, the columns, and an iterator that checks the parts on demand."""
 
     mission_name: str
     mission_sha256: str
@@ -98,7 +99,11 @@ _IS_JUDGED = np.array([status.is_judged for status in STATUS.values()])
 
 # ---------------------------------------------------------------- the worst row
 def breaking(target: str) -> frozenset[str]:
-    """Statuses that do not comply: those that break `check` (fail) or `check --strict` (warn), and `waived`."""
+    """Names of the statuses that do not comply, for a target.
+
+    For the target `fail` these are the statuses that break `check`, for `warn` the statuses that break
+    `check --strict`. `waived` is always included.
+    """
     fails = (name for name, status in STATUS.items() if (status.fails if target == "fail" else status.fails_strict))
     return frozenset([*fails, "waived"])
 
@@ -106,12 +111,12 @@ def breaking(target: str) -> frozenset[str]:
 def _verdict(
     judged: JudgedMission, by_id: Mapping[str, Judged], row_id: str | None, breaks: Container[str]
 ) -> dict[str, ArrayLike]:
-    """Columns of the verdict in each case: status of the mission or of a row, and the binding row.
+    """Columns of the verdict in each case: the status of the mission or of a row, and the binding row.
 
-    The binding row is the judged row with the highest utilization, and the first of several rows that are equal but
-    for rounding. A row that is not evaluated and has no number does not bind. If the mission does not comply, only
-    rows that break can bind; waived rows can if no other row breaks. A case that is not evaluated has no utilization,
-    because it would not belong to the requirement that decides.
+    The binding row is the judged row with the highest utilization; among rows that differ only by rounding it is the
+    first one. A row that is not evaluated and has no number cannot be the binding row. If the mission does not
+    comply, the binding row is one of the rows that break a limit, and a waived row only if no other row breaks one.
+    A case that is not evaluated has no utilization, because it would not belong to the requirement that decides.
     """
     rows = list(judged.rows) if row_id is None else [by_id[row_id]] if row_id in by_id else []
     if not rows:
@@ -158,7 +163,7 @@ def _verdict(
 
 
 def _waived_by(judged: JudgedMission, row_id: str | None, is_waived: Booleans) -> Values:
-    """Ids of the waivers of waived cases (cases,), as the file writes them; empty for cases that are not waived."""
+    """Ids of the waivers in each case, (cases,), as the file writes them; empty for cases that are not waived."""
     ids = np.full(is_waived.shape, "", dtype=object)
     for waiver_id, covers in judged.covering(row_id) if is_waived.any() else ():
         extended = np.where(ids == "", "", BETWEEN_WAIVERS).astype(object) + waiver_id
@@ -178,12 +183,12 @@ class Standing(NamedTuple):
 
 
 def listed(waived_by: str) -> tuple[str, ...]:
-    """Ids of waivers in a cell of the table."""
+    """Split a cell of the column `waived_by` into the ids of the waivers."""
     return tuple(filter(None, waived_by.split(BETWEEN_WAIVERS)))
 
 
 def standing(judged: JudgedMission, row_id: str | None, breaks: Container[str]) -> Standing:
-    """Verdict of a single mission, or of one row."""
+    """Verdict of a single mission, or of its row `row_id`; statuses in `breaks` do not comply."""
     rows = {row.subject.id: row for row in judged.rows}
     (status,), (row,), (use,), (requirement,), (waived_by,) = (
         np.ravel(column) for column in _verdict(judged, rows, row_id, breaks).values()
@@ -194,7 +199,7 @@ def standing(judged: JudgedMission, row_id: str | None, breaks: Container[str]) 
 
 
 def hold_to_decisions(judged: Sequence[JudgedMission], row_id: str | None) -> None:
-    """Check that missions have rows that decide.
+    """Raise an error if the missions have no row that can decide about compliance.
 
     Raises
     ------
@@ -216,10 +221,10 @@ def hold_to_decisions(judged: Sequence[JudgedMission], row_id: str | None) -> No
 
 # ---------------------------------------------------------------- the mission with changed values
 class Variation:
-    """A mission whose file can be read with changed values, which are checked like values of a file.
+    """Reads a mission again with changed values; changed values are checked like the values of a file.
 
-    Options that changed the mission stay. `model` replaces the gating model of the mission. `named` has the content
-    of files that the mission names, for machines without these files.
+    Changes that options made to the mission stay. `model` replaces the gating model of the mission. `named` has the
+    content of the files that the mission names, for machines without these files.
     """
 
     def __init__(self, mission: Mission, model: str | None, named: Named | None = None) -> None:
@@ -228,7 +233,7 @@ class Variation:
 
     @cached_property
     def tree(self) -> Tree:
-        """Content of the file as a tree."""
+        """Content of the mission file as a tree of keys and values."""
         return read_tree(self.mission.data, self.mission.file)
 
     def read(self, changes: Sequence[SetValue] = ()) -> Mission:
@@ -239,7 +244,7 @@ class Variation:
         return self.parse(tree, mission.data, mission.file, self.model, changes=(*kept, *changes))
 
     def at(self, values: Mapping[Number, float], changes: Sequence[SetValue] = ()) -> Mission:
-        """Read the mission with numbers in SI, after changes; raises `MissionError`."""
+        """Read the mission with changes and with numbers in SI; raises `MissionError` if they make no mission."""
         numbers = [SetNumber.of(number.key, value, number.dimension.si) for number, value in values.items()]
         return self.read([*changes, *numbers])
 
@@ -267,15 +272,15 @@ class Question(NamedTuple):
 
     @classmethod
     def of(cls, mission: Mission, keys: Sequence[str], model: str | None, today: date, **settings: Any) -> "Question":
-        """The question about a loaded mission."""
+        """Make a question about a loaded mission; `settings` are further fields of the question."""
         return cls(mission.data, mission.file, mission.changes, tuple(keys), model, today, **settings)
 
 
 class Table:
-    """Checks cases of one mission, also in a process of its own.
+    """Checks cases of one mission; it can be built from a question in any process.
 
-    `numbers` are the numbers of the question's keys, by default those of the file. A number with the reader `FACTOR`
-    scales the errors below its key.
+    `numbers` are the numbers of the question's keys, by default the numbers of the file. A number with the reader
+    `FACTOR` is a factor by which the errors below its key are multiplied.
     """
 
     def __init__(self, question: Question, mission: Mission, numbers: Sequence[Number] = ()) -> None:
@@ -300,7 +305,10 @@ class Table:
         }
 
     def watched(self, values: Mapping[str, Values], progress: Progress = unseen) -> dict[str, Values]:
-        """Check cases, and report progress: early, and then seldom, because each report costs time."""
+        """Check all cases with `values` (cases,) by key, and report progress; returns the columns by name.
+
+        The first reports come early, so that time can be estimated. Later reports are rare, because each costs time.
+        """
         cases = len(next(iter(values.values())))
         ends = (
             [cases]
@@ -318,7 +326,7 @@ class Table:
         return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
     def part(self, start: int, stop: int, values: Mapping[str, Values]) -> Part:
-        """Check cases `start` to `stop`, with values (stop - start,)."""
+        """Check the cases `start` to `stop` - 1, whose values are arrays (stop - start,) by key."""
         columns = self._columns(values, stop - start)
         if self.question.choices:
             for table, cases in self._by_words(columns):
@@ -330,7 +338,7 @@ class Table:
         return Part(start, stop, columns)
 
     def reads(self, values: Mapping[str, Values]) -> int:
-        """Number of cases that have to be read one by one."""
+        """Count the cases that have to be read one by one, for values (cases,) by key."""
         cases = len(next(iter(values.values())))
         columns = self._columns(values, cases)
         if self.question.choices:
@@ -342,7 +350,7 @@ class Table:
         return cases - int(self._arrays(columns, cases)[0].size)
 
     def _columns(self, values: Mapping[str, Values], cases: int) -> dict[str, Values]:
-        """Columns of some cases: their values, and empty columns for the results."""
+        """Make the columns of `cases` cases: the given values, and empty columns for the results."""
         columns: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
         columns |= {number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers}
         is_text = {column.name: column.is_text for column in (*GEOMETRY, *VERDICT, WAIVED_BY, REASON)}
@@ -352,7 +360,10 @@ class Table:
 
     # ---------------------------------------------------------------- one mission for the same words
     def _by_words(self, columns: Mapping[str, Values]) -> Iterator[tuple["Table", Indices]]:
-        """Tables for cases with the same words, with the indices of the cases; `columns` gets the errors of cases."""
+        """Yield a table for each combination of words, with the indices of its cases.
+
+        If no case with these words makes a mission, the status and the reason of each case go into `columns`.
+        """
         indices_by_words: dict[tuple[str, ...], list[int]] = {}
         for index, words in enumerate(zip(*(columns[key].tolist() for key in self.question.choices), strict=True)):
             indices_by_words.setdefault(words, []).append(index)
@@ -371,7 +382,7 @@ class Table:
             yield self.chosen[words], np.array(indices)
 
     def _read(self, columns: Mapping[str, Values], index: int) -> Mission | None:
-        """Read the mission of a case; None if there is none, with the reason in `columns`."""
+        """Read the mission of a case; None if its values make no mission (the reason goes into `columns`)."""
         words = [SetValue(key, columns[key][index]) for key in self.question.choices]
         values = {number: float(columns[number.key][index]) for number in self.numbers}
         changed = {
@@ -392,7 +403,7 @@ class Table:
 
     # ---------------------------------------------------------------- all together
     def _fill(self, columns: dict[str, Values]) -> None:
-        """Check every case."""
+        """Check every case, and write the results into the columns."""
         cases = columns["utilization"].size
         indices, mission_of_arrays, geometries = self._arrays(columns, cases)
         if indices.size:
@@ -400,7 +411,7 @@ class Table:
         read_indices: list[int] = []
 
         def read() -> Iterator[Mission]:
-            """Missions of the remaining cases, one after the other; their indices go into `read_indices`."""
+            """Read the missions of the remaining cases one by one; their indices are added to `read_indices`."""
             for index in np.delete(np.arange(cases), indices).tolist():
                 mission = self._read(columns, index)
                 if mission is not None:
@@ -411,7 +422,10 @@ class Table:
             self._check(columns, np.array(read_indices)[cases_of_shape], mission, mission.geometry)
 
     def _arrays(self, columns: Mapping[str, Values], cases: int) -> tuple[Indices, Mission, BistaticGeometry]:
-        """Indices of the cases whose numbers can become arrays, the mission with the arrays, and its geometry."""
+        """Find the cases that arrays of numbers can represent.
+
+        Returns their indices, the mission with the arrays, and its geometry.
+        """
         is_direct = np.ones(cases, dtype=bool)
         for number in self.numbers:
             values, (gt, ge, lt, le) = columns[number.key], number.reader.bounds
@@ -433,7 +447,10 @@ class Table:
     def _check(
         self, all_columns: dict[str, Values], indices: Indices, mission: Mission, geometries: BistaticGeometry
     ) -> None:
-        """Judge the cases of a mission together, in groups that need equally many nodes."""
+        """Judge all cases of a mission with arrays, in groups of cases that need the same number of nodes.
+
+        `indices` are the places of the cases in `all_columns`, which receives the results.
+        """
         for nodes, group, mission_of_group, geometry_of_group in by_nodes(mission, indices.size, geometries):
             analysis = Analysis(
                 mission_of_group,
@@ -465,5 +482,5 @@ class Table:
 
 
 def is_status(name: str) -> bool:
-    """Whether a column, `ROW.FIELD`, has statuses instead of numbers."""
+    """Whether a column with the name `ROW.FIELD` has statuses instead of numbers."""
     return name.endswith(".status")

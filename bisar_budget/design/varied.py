@@ -1,6 +1,7 @@
-"""A mission in which some numbers are arrays, one element a case.
+"""Missions in which some numbers are arrays with one element for each case.
 
-How they come into it, where they cannot, which cases then are missions, and how all errors below a key are scaled.
+The functions tell which numbers an array can replace and which cases certainly form an image, and they scale all
+errors below a key.
 """
 
 import math
@@ -97,9 +98,10 @@ _FREE = {
 
 
 def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDArray[np.bool_]:
-    """Whether each case certainly forms an image; `mission` may hold arrays (cases,).
+    """Whether each case certainly forms an image, (cases,); numbers of `mission` may be arrays (cases,).
 
-    Cases near a limit are False; reading them as a file decides exactly, and gives the reason.
+    The result is False for cases near a limit. Such a case has to be read like a file, which decides exactly and
+    gives the reason.
     """
     is_safe = _has_possible_figures(mission, cases)
     half = np.asarray(mission.collection.aperture_time) / 2
@@ -132,7 +134,10 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
 
 
 def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
-    """Whether dependent numbers of a file certainly fit: shares, masks, correlations, ages."""
+    """Whether numbers that depend on each other are certainly valid together, (cases,).
+
+    These are the shares, the bandwidth and noise mask of an oscillator, the correlations, and the age of a holdover.
+    """
     is_safe = np.ones(cases, dtype=bool)
     sync = mission.synchronization
     if sync is not None and sync.is_holdover:
@@ -175,9 +180,10 @@ _ACCEPTED_KEYS = (
 
 
 def scaled(mission: Mission, key: str, factor: PerCase) -> Mission:
-    """The mission with every error below a key multiplied: amplitudes and sigmas, also of parts of the catalogue.
+    """Multiply every error of a mission below a key by a factor, and return the changed mission.
 
-    Frequencies, correlation times and correlations stay. The factor may be an array (cases,).
+    Amplitudes and sigmas are multiplied, also those of parts of the catalogue. Frequencies, correlation times and
+    correlations stay. The factor may be an array (cases,).
 
     Raises
     ------
@@ -196,7 +202,7 @@ def scaled(mission: Mission, key: str, factor: PerCase) -> Mission:
 def _below(
     value: SectionValue, reader: Reader[object], steps: Sequence[str], factor: PerCase, key: str
 ) -> tuple[SectionValue, int]:
-    """A value with the errors at a path below it scaled, and the number of errors that are not zero."""
+    """Scale the errors at a path below a value; return the changed value and the number of errors that are not 0."""
     if not steps:
         name = parts_of(key)[-1]
         if name in _MEASURES:
@@ -216,7 +222,7 @@ def _below(
 
 
 def _scaled(value: SectionValue, reader: Reader[object], factor: PerCase, is_clock: bool) -> tuple[SectionValue, int]:
-    """A value with all errors below it scaled, and the number of errors that are not zero."""
+    """Scale all errors below a value; return the changed value and the number of errors that are not 0."""
     reader = _form(reader, value)
     if value is None:
         return value, 0
@@ -246,7 +252,7 @@ def _scaled(value: SectionValue, reader: Reader[object], factor: PerCase, is_clo
 
 
 def _form(reader: Reader[object], value: object) -> Reader[object]:
-    """The reader that read a value: one of the forms of a `OneOf`, otherwise `reader` itself."""
+    """Find the reader that has read a value: one of the forms of a `OneOf`, otherwise `reader` itself."""
     if isinstance(reader, OneOf):
         kind = Triple if isinstance(value, tuple) and not hasattr(value, "_fields") else Quantity
         matching = [form for form in reader.forms if isinstance(form, Section) and type(value) is form.kind]

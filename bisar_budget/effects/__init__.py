@@ -1,4 +1,4 @@
-"""Effects of errors on range history and image, by the published model, the full model and exact ranges."""
+"""Effects of errors on range history and image, in the published model, the full model and by exact ranges."""
 
 # What other rooms may use.
 __all__ = [

@@ -1,14 +1,14 @@
-"""Random delays in the air: after correction each leg is longer than the processor assumes.
+"""Random delays in the air: after correction, each leg is longer than the processor assumes.
 
-The delay of a leg is the zenith delay times a factor of the leg's elevation, seen from the scene. The elevation
-changes over the aperture, and the delay with it. Orders 0 and 1 of the delay displace the image; orders from 2 on
-defocus it.
+The delay of a leg is the zenith delay times a factor that depends on the leg's elevation, seen from the scene. The
+elevation changes over the aperture, and the delay with it. Orders 0 and 1 of the delay displace the image; orders
+from 2 on defocus it.
 
-The troposphere delays every frequency alike. Free electrons delay the group of frequencies, g = 40.3·TEC/f², and
-advance the phase at the centre frequency by the same amount. An image finds its range by the band, that is, by the
-group, and everything else by the phase. So its range error is the range error of the phase, −g, with the constant
-part of the group, +ḡ: the displacement is Q⁻¹[ḡ, −g₁], and the phases are the phases of −g together with the phases
-that the displacement adds. Derived here.
+The troposphere delays all frequencies by the same amount. Free electrons delay the group of frequencies by g =
+40.3·TEC/f², and advance the phase at the centre frequency by the same amount. In the image, the constant part of the
+range follows from the group delay across the band, and everything else follows from the phase. The range error in the
+image is therefore that of the phase, −g, except that its constant part is that of the group, +ḡ. The displacement is
+Q⁻¹[ḡ, −g₁], and the phases are those of −g together with the phases that the displacement adds. Derived here.
 
 With a correlation time the zenith delay changes within the aperture (`range_processes`). The published model takes
 the parts of such a process along the line of sight of mid-aperture. The full model follows the leg.
@@ -44,7 +44,9 @@ DELAY_UNITS = dict(zip(DELAYS, ("m", "1/m^2"), strict=True))
 
 
 def obliquity(position: Vectors, shell: PerCase) -> PerCase:
-    """Length of a leg through a thin shell of the air over the length at the zenith, exact for a sphere.
+    """Ratio of the path length of a leg in a thin shell of the air to the path length at the zenith.
+
+    It is exact for a spherical Earth.
 
     Parameters
     ----------
@@ -61,9 +63,10 @@ def obliquity(position: Vectors, shell: PerCase) -> PerCase:
 def leg_factor(delay: str, position: Vectors, middle: Vectors) -> PerCase:
     """Ratio of the delay on a platform's leg to the delay at the zenith, for positions (…) of the platform.
 
-    `middle` is the platform's position at mid-aperture. If the platform is below `AIR_TOP_M`, the ratio is that of a
-    flat Earth for the neutral air, and 0 for free electrons, which are all above the leg. For the neutral air, the
-    ratio is also 0 at an elevation below `LEAST_ELEVATION_DEG`, for which a mission file must not state a delay.
+    `middle` is the platform's position at mid-aperture. For a platform below `AIR_TOP_M`, the ratio of the neutral
+    air is that of a flat Earth. The ratio of free electrons is then 0, because all of them are above the leg. The
+    ratio of the neutral air is also 0 at an elevation below `LEAST_ELEVATION_DEG`, for which a mission file must not
+    state a delay.
     """
     height = np.asarray(height_of(middle))
     is_above = height >= AIR_TOP_M
@@ -75,31 +78,34 @@ def leg_factor(delay: str, position: Vectors, middle: Vectors) -> PerCase:
 
 
 def metres_per_unit(mission: Mission, delay: str) -> PerCase:
-    """Group delay at the zenith by a unit of a figure, at the centre frequency. [m/unit]"""
+    """Group delay at the zenith per unit of a declared delay, at the centre frequency. [m/unit]"""
     return 1.0 if delay == DELAY else ELECTRON_DELAY_M3_PER_S2 / np.square(mission.radar.center_frequency)
 
 
 def group_delay(mission: Mission, path: PlatformState, delay: str, times: PerCase) -> PerCase:
-    """Group delay of the leg of a platform by a unit of a figure, at slow times. [m/unit]"""
+    """Group delay of a platform's leg at slow times, per unit of a declared delay. [m/unit]"""
     return metres_per_unit(mission, delay) * leg_factor(delay, path.place(times), path.position)
 
 
 def seen_course(group: Floats, mean: Floats, delay: str) -> Floats:
-    """Range error that an image shows by a group delay whose constant part is `mean`. [m]"""
+    """Range error in the image that a group delay causes. [m]
+
+    `group` is the group delay over the aperture, and `mean` is its constant part.
+    """
     return group if delay == DELAY else 2 * mean - group
 
 
 def group_at_nodes(delay: str, track: Vectors, middle: Vectors, scale: PerCase) -> Floats:
-    """Group delay of the leg to a track by a constant zenith delay of `scale` m/unit, (nodes, cases).
+    """Group delay of a leg at the nodes per unit of a constant zenith delay, (nodes, cases). [m/unit]
 
     Parameters
     ----------
     delay : str
         One of `DELAYS`.
     track : Vectors
-        Positions of the platform at the nodes, (nodes, cases), seen from a point of the scene. [m]
+        Positions of the platform at the nodes, (nodes, cases), relative to a point of the scene. [m]
     middle : Vectors
-        Position at mid-aperture, seen from the scene centre. [m]
+        Position of the platform at mid-aperture, relative to the scene centre. [m]
     scale : (cases,)
         `metres_per_unit`.
     """
@@ -107,9 +113,9 @@ def group_at_nodes(delay: str, track: Vectors, middle: Vectors, scale: PerCase) 
 
 
 def dispersion_per_unit(mission: Mission, path: PlatformState) -> PerCase:
-    """Quadratic phase at the edges of the band by a unit of electron content at the zenith. [rad/unit]
+    """Quadratic phase at the edges of the band per unit of electron content at the zenith. [rad/unit]
 
-    The phase exp(2πi·K/(c·f)), K = g·f₀², has the second order (2π/λ)·g·(B/2f₀)² in f − f₀.
+    The phase exp(2πi·K/(c·f)), with K = g·f₀², has the second order (2π/λ)·g·(B/2f₀)² in f − f₀.
     """
     radar = mission.radar
     g = metres_per_unit(mission, CONTENT) * leg_factor(CONTENT, path.position, path.position)
@@ -117,7 +123,7 @@ def dispersion_per_unit(mission: Mission, path: PlatformState) -> PerCase:
 
 
 def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, PerCase]:
-    """Quadratic phase at the edges of the band by the declared electron content of each leg. [rad]
+    """Quadratic phase at the edges of the band due to the declared electron content of each leg. [rad]
 
     The phases include the coverage factor. Legs without a declared content are left out.
     """
@@ -131,23 +137,26 @@ def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, Pe
 
 
 def dispersed(mission: Mission, geometry: BistaticGeometry) -> PerCase:
-    """Quadratic phase at the edges of the band by both legs. One air adds the phases; two airs combine them. [rad]"""
+    """Quadratic phase at the edges of the band by both legs. [rad]
+
+    If one air covers both legs, the phases add. For two independent airs, the mission's rule combines them.
+    """
     legs = list(dispersed_legs(mission, geometry).values())
     is_one_air = mission.propagation is not None and mission.propagation.is_one_air
     return combined(np.broadcast_arrays(*legs), "sum" if is_one_air else mission.allocation.combine)
 
 
 def legs_of(owner: str) -> tuple[str, ...]:
-    """Platforms whose legs have an error of the air. The mission's error is on both legs."""
+    """Platforms whose legs have a delay of the given owner. A delay of the mission is on both legs."""
     return PLATFORMS if owner == "mission" else (owner,)
 
 
 def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
-    """Delays of the air, declared or not; empty where the file states nothing about the air.
+    """Delays of the air, declared or not; empty if the file states nothing about the air.
 
-    A figure that the file states once is one random number over the scene. Both legs have it, each by its own
-    elevation, and the effects of both legs add with their signs before they are squared. Then each leg has a row of
-    its own, which counts in the row of the air.
+    A delay that the file states once for the whole mission is one random number over the scene. Both legs have this
+    delay, each at its own elevation, and the effects of both legs add with their signs before they are squared. In
+    this case each leg also has a row of its own, which counts only in the row of the air.
     """
     propagation = seen.mission.propagation
     if propagation is None:
@@ -166,7 +175,10 @@ def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
 
 
 def _groups_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Floats]:
-    """Group delay at the nodes by a unit at the zenith, for a leg as it turns and held at mid-aperture. [m/unit]"""
+    """Group delay of a leg at the nodes per unit at the zenith, turning and fixed. [m/unit]
+
+    The first result follows the leg as it turns. The second holds the leg at mid-aperture.
+    """
     exact, middle = seen.exact, getattr(seen.geometry, name).position
     scale = metres_per_unit(seen.mission, delay)
     moving = group_at_nodes(delay, exact.tracks[PLATFORMS.index(name)], middle, scale)
@@ -176,7 +188,7 @@ def _groups_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Fl
 def _delay_error(
     seen: SensorCases, owner: str, delay: str, groups: Sequence[tuple[Floats, Floats]], counted_in: str = ""
 ) -> RandomError:
-    """A delay of one leg, or of one air over both."""
+    """Error of the delay of one leg, or of one air that covers both legs."""
     propagation = seen.mission.propagation
     name = legs_of(owner)[0]
     leg = None if propagation is None else propagation.leg(name)
@@ -201,7 +213,10 @@ def _delay_error(
 
 
 def correlation_time_of(mission: Mission, owner: str) -> PerCase | None:
-    """Time in which the delays of a leg, or of one air over both, change; None if they are constant. [s]"""
+    """Correlation time of the delay of a leg, or of one air over both legs. [s]
+
+    None if the delay is constant.
+    """
     leg = None if mission.propagation is None else mission.propagation.leg(legs_of(owner)[0])
     return None if leg is None else leg.correlation_time
 
@@ -209,7 +224,11 @@ def correlation_time_of(mission: Mission, owner: str) -> PerCase | None:
 def _changing(
     seen: SensorCases, delay: str, group: Floats, at_mid_aperture: Floats, correlation_time: PerCase
 ) -> tuple[RandomEffect, RandomEffect]:
-    """Effects by both models of a unit that changes, for group delays of a leg that turns and held. [m/unit]"""
+    """Effects, in both models, of one unit of a delay that changes within the aperture.
+
+    `group` is the group delay of the leg as it turns, for the full model. `at_mid_aperture` is the group delay at
+    mid-aperture, for the published model. [m/unit]
+    """
     k, half = seen.exact.k, seen.exact.half
     along = gauss_markov(2 * half, np.broadcast_to(correlation_time, half.shape)).times(np.square(at_mid_aperture))
     quadratic, cubic, spread = (k * np.sqrt(power) for power in along[:3])
@@ -222,9 +241,9 @@ def _changing(
 def changing_air(
     mission: Mission, geometry: BistaticGeometry, cases: int, correlation_time: float
 ) -> list[RandomError]:
-    """Declared delays that are constant within the aperture, as if they changed in a correlation time. [s]
+    """Declared delays that are constant within the aperture, recomputed with a correlation time [s].
 
-    Each delay counts once: one air counts both legs together. `geometry` is the geometry of the cases.
+    Each delay is listed once. One air over both legs is a single delay. `geometry` is the geometry of the cases.
     """
     propagation = mission.propagation
     staying = [name for name in PLATFORMS if correlation_time_of(mission, name) is None]
@@ -240,7 +259,10 @@ def changing_air(
 
 
 def zenith_courses(mission: Mission, owner: str, aperture_time: Floats, count: int) -> Floats:
-    """Independent courses of the zenith delay at `count` nodes, (courses, nodes, cases), together of variance 1."""
+    """Independent variations of the zenith delay at `count` nodes, (courses, nodes, cases).
+
+    Together they make up a delay of variance 1.
+    """
     correlation_time = correlation_time_of(mission, owner)
     if correlation_time is None:
         return np.ones((1, count, 1))

@@ -1,8 +1,8 @@
-"""Several errors at once: worst case and root-sum-square, of phases and of displacements on the ground.
+"""Combination of several errors by worst case or root-sum-square, for phases and displacements on the ground.
 
-The errors of one covariance count as one error under root-sum-square, √(gᵀCg). With gᵢ the effect of one unit of
+Under root-sum-square the errors of one covariance C count as one error, √(gᵀCg). With gᵢ the effect of one unit of
 error i and φᵢ = gᵢσᵢ, gᵀCg is Σ ρᵢⱼφᵢφⱼ. The result does not depend on the frame: the covariance stays in its own
-frame, and the effects are taken along that frame's axes.
+frame, and the effects are taken along the axes of that frame.
 
 Phases and displacements are arrays over cases, (cases,). For one case they may be numbers.
 """
@@ -29,7 +29,7 @@ Size = TypeVar("Size")  # of an error: a phase, or a displacement
 
 
 class Correlated(NamedTuple):
-    """The six errors of a platform's covariance, by the ids of their rows, and their correlations (6, 6)."""
+    """The six errors of a platform's covariance: the ids of their rows, and their correlations (6, 6)."""
 
     platform: str
     ids: tuple[str, ...]
@@ -37,11 +37,11 @@ class Correlated(NamedTuple):
 
     @property
     def id(self) -> str:
-        """Name of the six errors together."""
+        """Id of the six errors as one entry."""
         return f"{self.platform}.covariance"
 
     def of(self, cases: Indices) -> "Correlated":
-        """The same covariance in some of the cases."""
+        """Return the covariance of some of the cases."""
         rows = [
             [rho[cases] if isinstance(rho, np.ndarray) and rho.ndim else rho for rho in row]
             for row in self.correlation
@@ -49,13 +49,20 @@ class Correlated(NamedTuple):
         return self._replace(correlation=rows)
 
     def phase(self, phases: Sequence[PerCase] | Floats) -> PerCase:
-        """√(gᵀCg) of the six phases gᵢσᵢ; infinite if any phase is infinite. [rad]"""
+        """Combined phase √(gᵀCg) of the six errors, from their phases gᵢσᵢ. [rad]
+
+        Infinite if any of the phases is infinite.
+        """
         with np.errstate(invalid="ignore"):
             size = np.sqrt(squared(self.correlation, phases))
         return np.where(np.isnan(size), math.inf, size)[()]
 
     def displacement(self, moves: Sequence[tuple[PerCase, PerCase]]) -> tuple[PerCase, PerCase]:
-        """The rms length of the displacement, the root of its covariance's trace, and 0: it has no direction. [m]"""
+        """Rms length of the combined displacement, as the pair (length, 0). [m]
+
+        The length is the root of the trace of the displacement's covariance. The combined displacement has no
+        direction.
+        """
         length = np.sqrt(sum(squared(self.correlation, along) for along in zip(*moves, strict=True)))
         return length, 0.0 * length
 
@@ -76,7 +83,7 @@ def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
 
 
 def squared(correlation: Sequence[Sequence[PerCase]], parts: Sequence[PerCase] | Floats) -> PerCase:
-    """Square of the sum of correlated parts, Σ ρᵢⱼvᵢvⱼ; a negative rounding error becomes zero."""
+    """Square of a sum of correlated parts, Σ ρᵢⱼvᵢvⱼ. A result below zero, due to rounding, is set to zero."""
     values = np.array(np.broadcast_arrays(*parts))
     if any(np.ndim(rho) for row in correlation for rho in row):  # the correlations differ between cases
         of_cases = np.array([np.broadcast_arrays(*row, values[0])[:-1] for row in correlation])
@@ -88,14 +95,20 @@ def squared(correlation: Sequence[Sequence[PerCase]], parts: Sequence[PerCase] |
 
 # ---------------------------------------------------------------------- terms of a combination
 def phase_parts(phases: Phases, rule: str, groups: Sequence[Correlated]) -> list[tuple[str, PerCase]]:
-    """List the phases to combine. Under `rss` the six errors of a covariance are one part, else six. [rad]"""
+    """List the phases that a rule combines, as pairs of id and phase. [rad]
+
+    Under `rss` the six errors of a covariance are one entry; under all other rules they are six entries.
+    """
     return _parts(phases, rule, groups, Correlated.phase)
 
 
 def displacement_parts(
     moves: Moves, rule: str, groups: Sequence[Correlated]
 ) -> list[tuple[str, tuple[PerCase, PerCase]]]:
-    """List the displacements to combine: id, and (east, north). A covariance counts as in `phase_parts`. [m]"""
+    """List the displacements that a rule combines, as pairs of id and (east, north). [m]
+
+    A covariance is treated as in `phase_parts`.
+    """
     return _parts(moves, rule, groups, Correlated.displacement)
 
 
@@ -116,12 +129,18 @@ def _parts(
 
 # ---------------------------------------------------------------------- combined sizes
 def combined_phase(phases: Phases, rule: str, groups: Sequence[Correlated] = ()) -> PerCase:
-    """Combine the phases of errors by a rule, the phases of a covariance with their correlations. [rad]"""
+    """Combine the phases of errors by a rule. [rad]
+
+    Under `rss` the phases of a covariance are combined with their correlations.
+    """
     return combined([phase for _, phase in phase_parts(phases, rule, groups)], rule)
 
 
 def combined_displacement(moves: Moves, rule: str, groups: Sequence[Correlated] = ()) -> PerCase:
-    """Combine displacements by a rule: the longest of all signs for `sum`, the rms of a covariance for `rss`. [m]"""
+    """Combine displacements by a rule. [m]
+
+    `sum` takes the longest vector sum over all signs of the displacements. `rss` uses the rms length of a covariance.
+    """
     vectors = np.array([move for _, move in displacement_parts(moves, rule, groups)])
     if not vectors.size:
         return 0.0
@@ -129,7 +148,10 @@ def combined_displacement(moves: Moves, rule: str, groups: Sequence[Correlated] 
 
 
 def combined(sizes: Sequence[PerCase] | Floats, rule: str) -> PerCase:
-    """Combine phases or lengths, (n, ...): `each` is the largest, `sum` the worst case, `rss` the root-sum-square."""
+    """Combine phases or lengths (n, ...) by a rule.
+
+    `each` takes the largest magnitude, `sum` the sum of the magnitudes, and `rss` the root-sum-square.
+    """
     if not len(sizes):
         return 0.0
     magnitudes: Floats = np.abs(np.array(sizes))
@@ -144,11 +166,11 @@ def combined(sizes: Sequence[PerCase] | Floats, rule: str) -> PerCase:
 
 
 def largest_signed_sum(vectors: Floats) -> PerCase:
-    """Length of the longest of the sums ±v₁ ± v₂ … of plane vectors (n, 2, ...), exactly.
+    """Length of the longest of all sums ±v₁ ± v₂ … of plane vectors (n, 2, ...), computed exactly.
 
-    All sums lie in a polygon with two sides along each vector, and the longest sum is one of its corners. With every
-    vector turned into the upper half plane and sorted by angle, flipping the vectors in turn walks along half of the
-    outline. The second half is the mirror image of the first.
+    All sums lie in a polygon that has two sides parallel to each vector. The longest sum is a corner of this polygon.
+    With every vector turned into the upper half plane and the vectors sorted by angle, reversing one vector after
+    another gives the corners of one half of the polygon. The other half is its mirror image.
     """
     x, y = vectors[:, 0], vectors[:, 1]
     is_upper = (y > 0) | ((y == 0) & (x > 0))
@@ -169,9 +191,10 @@ def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[Note, ..
 
 
 def likely_error(group: Correlated, members: Sequence[ErrorSource]) -> tuple[float, ...]:
-    """Most probable of the errors whose quadratic phase is √(gᵀCg) by the full model: Cg/√(gᵀCg), (6,).
+    """Most probable six errors of a covariance that together cause the phase √(gᵀCg): Cg/√(gᵀCg), (6,).
 
-    The components run along the frame's axes and include the coverage factor. Without a phase, each is its sigma.
+    The phase is the quadratic phase of the full model. The components are along the axes of the covariance's frame
+    and include the coverage factor. If the phase is zero, each component is its sigma.
     """
     sizes = np.array([source.declared or 0.0 for source in members])
     phases = sizes * [source.full.qpe for source in members]

@@ -1,12 +1,12 @@
-"""Effects of the errors of cases by both models, and the allowable sizes of the errors; a check is one case.
+"""Effects of the errors of many cases according to both models, and the allowable sizes of the errors.
 
-The published model, Tables I and II and (25) of Rigling & Moses, is linear. The full model holds for errors of any
-size. Where the second order provably does not matter, its effects are proportional to the error; elsewhere they are
-the effects of exact ranges. An error has two signs and a bound covers both, so phases and allowables belong to the
-worse sign.
+A check is a single case. The published model, Tables I and II and (25) of Rigling & Moses, is linear. The full model
+holds for errors of any size. Its effects are proportional to the error where the second order provably does not
+matter; elsewhere they come from exact ranges. An error has two signs and a bound covers both, so phases and
+allowables belong to the worse sign.
 
-Errors are kept in blocks, each an array (errors, cases). With one case, all errors are one block. With thousands of
-cases, each error is a block, so that the arrays at work stay in a processor's cache.
+Errors are stored in blocks, each an array (errors, cases). With one case, all errors are one block. With thousands of
+cases, each error is a block, so that the arrays in use stay in a processor's cache.
 """
 
 import math
@@ -58,12 +58,14 @@ _FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)
 class Declared(NamedTuple):
     """Phases and displacements by errors of a given size, as arrays over cases, or as plain numbers of one case.
 
-    `qpe` and `cubic` are the phases at the aperture edge by the worse sign. Their sign is the sign of the first order
-    of the declared error. [rad] `displacement` is the displacement east and north by the declared sign, `opposite`
-    the displacement by the opposite sign. [m] Both are NaN, or None in one case, where there is no displacement: the
-    plane has no inverse, or no ground point has the range history, in which case the phases are infinite. `hidden` is
-    the phase that band and turn do not resolve, as it enters the judged phase. `rest` is the rms beyond the cubic by
-    the worse sign. [rad]
+    `qpe` and `cubic` are the phases at the aperture edge for the worse sign of the error. They have the sign of the
+    first-order phase of the declared error. [rad] `displacement` is the displacement east and north for the declared
+    sign, `opposite` for the opposite sign. [m] Both are NaN (None in one case) if there is no displacement, because
+    the matrix Q has no inverse or because no ground point has the range history. In the second case the phases are
+    infinite.
+
+    `hidden` is the part of the judged phase that band and turn of the line of sight do not resolve. [rad] `rest` is
+    the rms phase beyond the cubic for the worse sign. [rad]
     """
 
     qpe: Any
@@ -74,23 +76,26 @@ class Declared(NamedTuple):
     rest: Any = 0.0
 
     def judged(self, gain: PerCase) -> PerCase:
-        """Magnitude of the phase that counts against a limit raised by the gain of autofocus. [rad]
+        """Magnitude of the phase that is compared with a limit raised by the gain of autofocus. [rad]
 
-        Autofocus corrects the quadratic phase and no hidden phase: √(φ² − φ₂² + (φ₂/gain)²)·gain, with φ the phase of
-        equal loss and φ₂ the quadratic phase.
+        Autofocus corrects the quadratic phase, but no hidden phase. The judged phase is √(φ² − φ₂² +
+        (φ₂/gain)²)·gain, where φ is the phase of equal loss and φ₂ the quadratic phase.
         """
         phase: PerCase = np.hypot(self.qpe, gain * self.hidden)
         return phase
 
     @property
     def equal_loss(self) -> PerCase:
-        """Quadratic phase with the same loss of the peak as quadratic and hidden phase together. [rad]"""
+        """Quadratic phase that causes the same peak loss as the quadratic and the hidden phase together. [rad]"""
         phase: PerCase = np.hypot(self.qpe, self.hidden)
         return phase
 
     @property
     def farthest(self) -> Any:
-        """Displacement by the sign that moves the image farther, turned to the side of the declared sign. [m]"""
+        """Larger of the displacements for the two signs of the error, east and north. [m]
+
+        If the opposite sign moves the image farther, its displacement is given with reversed sign.
+        """
         if self.displacement is None or self.opposite is None:
             return None
         (x, y), (u, v) = self.displacement, self.opposite
@@ -99,7 +104,7 @@ class Declared(NamedTuple):
         return np.where(is_gone, math.nan, east), np.where(is_gone, math.nan, north)
 
     def of(self, errors: int | Indices | slice) -> "Declared":
-        """The effects of some of the errors."""
+        """Select the effects of some of the errors."""
         (x, y), (u, v) = self.displacement, self.opposite
         phases = self.qpe[errors], self.cubic[errors]
         return Declared(
@@ -107,7 +112,7 @@ class Declared(NamedTuple):
         )
 
     def in_one_case(self, case: int = 0) -> "Declared":
-        """The effects in one case, as plain numbers."""
+        """Return the effects in one case as plain numbers."""
         moved, opposite = point(self.displacement, case), point(self.opposite, case)
         qpe, cubic, hidden, beyond_cubic = (
             plain(phase, case) for phase in (self.qpe, self.cubic, self.hidden, self.rest)
@@ -116,16 +121,17 @@ class Declared(NamedTuple):
 
 
 def point(displacement: tuple[PerCase, PerCase], case: int = 0) -> GroundVector | None:
-    """A ground point in one case; None where no point exists. [m]"""
+    """Ground point of one case, east and north; None if there is no such point. [m]"""
     east, north = (plain(component, case) for component in displacement)
     return None if math.isnan(east) else (east, north)
 
 
 class Allowed(NamedTuple):
-    """Allowable sizes of errors by one model, for all requirements and for the quadratic phase alone; NaN: no limit.
+    """Allowable sizes of errors according to one model; NaN where there is no limit.
 
-    `binding` is the index in `LIMITING_REQUIREMENTS` of the requirement that sets the smallest size, their number
-    where the image ends at that size, and -1 where no limit exists.
+    `smallest` is the allowable for all requirements, `quadratic` the allowable for the quadratic phase alone.
+    `binding` is the index in `LIMITING_REQUIREMENTS` of the requirement that sets the smallest size. It is the number
+    of these requirements if the image ends at that size, and -1 if no limit exists.
     """
 
     smallest: Floats
@@ -134,14 +140,14 @@ class Allowed(NamedTuple):
 
 
 class ImagePlane(NamedTuple):
-    """Q⁻¹ of each case: takes constant and linear range error to the displacement of the image."""
+    """The matrix Q⁻¹ of each case, which maps constant and linear range error to displacement of the image."""
 
     adjugate: tuple[tuple[PerCase, ...], tuple[PerCase, ...]]
     determinant: PerCase
     is_singular: PerCaseFlag = False
 
     def displacement(self, effect: Effect, size: PerCase) -> tuple[PerCase, PerCase]:
-        """Displacement on the ground by (25), with the Q of a model; NaN where Q has no inverse. [m]"""
+        """Displacement on the ground according to (25) with the model's Q; NaN where Q has no inverse. [m]"""
         (a, b), (c, d) = self.adjugate
         scale = size / np.where(self.is_singular, math.nan, self.determinant)
         # Adding 0.0 turns -0.0, which reads as a claim about a sign, into 0.0.
@@ -156,11 +162,11 @@ _published_ground_inverse: Callable[..., tuple[tuple[PerCase, ...], ...]] = eval
 
 
 def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, PerCase]:
-    """Invert Q with the range held constant, (19) and (30); and the angle between its gradients. [deg]
+    """Invert the published Q, (19) and (30), and return the angle between its two gradients. [deg]
 
-    This Q can be singular where the true gradients are not: its second row is v/R, the true second row is v⊥/R. It
-    also has no inverse where the look vectors all but cancel on the ground; it knows only the look vectors of
-    mid-aperture.
+    The published Q takes the slant ranges as constant: its second row is v/R, while the true second row is v⊥/R. It
+    can therefore be singular where the true gradients are not. It also has no inverse where the look vectors at
+    mid-aperture almost cancel on the ground, because it contains no other look vectors.
     """
     ground: list[PerCase] = []
     for path in geometry.both:
@@ -173,7 +179,7 @@ def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, PerCase]:
 
 
 class OwnPlane(NamedTuple):
-    """Displacement of the image by the full model, whose effects include the displacement; see `ImagePlane`."""
+    """Displacement of the image in the full model, whose effects already contain it; see `ImagePlane`."""
 
     is_singular: PerCaseFlag = False
 
@@ -183,7 +189,7 @@ class OwnPlane(NamedTuple):
 
 
 class ErrorBlock:
-    """Some errors of all cases: arrays are (errors, cases).
+    """A block of errors in all cases. Its arrays are (errors, cases).
 
     Attributes
     ----------
@@ -192,7 +198,8 @@ class ErrorBlock:
     declared : (errors, cases)
         Signed sizes, coverage factor included; NaN where the file declares no size.
     effects : mapping of str to Effect
-        Effect of a unit by each model. In the full model the unit belongs to an error too small for a second order.
+        Effect of one unit for each model. The full model gives the effect of an error that is small enough to have no
+        second order, scaled to one unit.
     """
 
     def __init__(self, table: "DeclaredErrors", sources: Sequence[ErrorSource]) -> None:
@@ -217,7 +224,7 @@ class ErrorBlock:
 
     # ---------------------------------------------------------------- small errors
     def per_unit(self, model: str) -> Floats:
-        """Magnitudes of judged phase, cubic phase [rad] and displacement [m] by a small unit, (3, errors, cases)."""
+        """Judged phase, cubic phase [rad] and displacement [m] per unit of a small error, (3, errors, cases)."""
         if model not in self._per_unit:
             effect = self.effects[model]
             moved = np.hypot(*self.table.planes[model].displacement(effect, 1.0))
@@ -229,7 +236,7 @@ class ErrorBlock:
 
     @cached_property
     def hidden_per_unit(self) -> Floats:
-        """Hidden phase, and rms beyond the cubic, by a small unit of each error, (2, errors, cases). [rad]"""
+        """Hidden phase and rms beyond the cubic per unit of each small error, (2, errors, cases). [rad]"""
         phases = np.zeros((2, *self.declared.shape))
         if self.moves:
             remaining = self.left_per_unit(self.moves)
@@ -237,7 +244,7 @@ class ErrorBlock:
         return phases
 
     def left_per_unit(self, indices: Sequence[int]) -> Floats:
-        """Range error at the nodes that a small unit of some errors leaves, (errors, nodes, cases). [m]"""
+        """Range error at the nodes that remains per unit of some small errors, (errors, nodes, cases). [m]"""
         full = self.effects["full"]
         if self.cases == 1:
             lanes = self.paths.lanes.of(self._lane[indices, 0])
@@ -248,15 +255,19 @@ class ErrorBlock:
         return self.exact.left_of_small(range_error, (full.east[indices], full.north[indices]))
 
     def adds(self, size: Floats) -> Floats:
-        """Bounds of judged phase, cubic [rad] and displacement [m] that the second order adds, (3, errors, cases)."""
+        """Upper bounds of the second-order part of the effects, (3, errors, cases).
+
+        The effects are judged phase [rad], cubic phase [rad] and displacement [m].
+        """
         strays = self._strays(size)
         return self.table.per_metre * self._grows(size, strays) + self.table.per_stray * strays
 
     def _strays(self, size: Floats) -> Floats:
-        """Bound of the displacement by the phase that is left, in metres.
+        """Upper bound of the displacement that the remaining phase causes. [m]
 
-        A platform that an error moves within the aperture sees the ground in another direction, by r̃/R. Where this
-        direction turns as the phase does, V is smaller beside the point: the point strays by H⁻¹⟨r̃/R, ρ⟩.
+        An error that moves a platform by r̃ within the aperture changes the direction to the ground by r̃/R. Where
+        this change varies over the aperture like the remaining range error ρ, the phase variance V (see
+        `exact_ranges`) has its minimum beside the first-order image point. The distance is at most H⁻¹⟨r̃/R, ρ⟩.
         """
         full, exact, bent = self.effects["full"], self.exact, self._bent(size)
         hidden, beyond_cubic = self.hidden_per_unit
@@ -266,9 +277,9 @@ class ErrorBlock:
         return np.asarray(turns * remaining_m * (1 + exact.band) / exact.matrix.least)
 
     def _bent(self, size: Floats) -> PerCase:
-        """Distance by which errors take platforms from where small errors take them, (errors, cases). [m]
+        """Distance by which the motion of errors deviates from one proportional to their size, (errors, cases). [m]
 
-        Only a time tag is not proportional to its size. Where the direct path is the clock, each metre counts twice.
+        Only a time tag error has such a deviation. If the direct path is the clock, each metre counts twice.
         """
         tags = [index for index, source in enumerate(self.sources) if source.is_time_tag]
         if not tags:
@@ -279,12 +290,12 @@ class ErrorBlock:
         return bends
 
     def _grows(self, size: Floats, strays: Floats) -> Floats:
-        """Bound of the range error that the second order of errors adds, in metres.
+        """Upper bound of the range error that the second order of errors adds. [m]
 
         The second order of two platforms is −Σ|P⊥(r̃ − x̂)|²/2R, at most |r̃ − x̂|²/R of the nearer platform. With a
-        direct path the second order of the ranges is kept apart by platform: for a distant platform much of it
-        cancels to first order. The second order of the distance, |P⊥r̃|²/2D, has the opposite sign, so the sum is no
-        more than the larger term.
+        direct path the second order of the ranges is bounded separately for each platform, because for a distant
+        platform much of it cancels to first order. The second order of the distance between the platforms,
+        |P⊥r̃|²/2D, has the opposite sign, so the sum is not larger than the larger term.
         """
         exact, bent = self.exact, self._bent(size)
         shift, moved = size * self.edge + bent, size * self.per_unit("full")[2] + strays
@@ -301,7 +312,7 @@ class ErrorBlock:
         return np.asarray(growth + bent)
 
     def is_large(self, size: Floats) -> Booleans:
-        """Whether effects of errors may not be proportional to their size, by the bounds of the second order."""
+        """Mark the errors whose effects may not be proportional to their size, by the second-order bounds."""
         size = np.abs(size)
         large = np.zeros(size.shape, dtype=bool)
         for added, per_unit, floor in zip(self.adds(size), self.per_unit("full"), _FLOORS, strict=True):
@@ -310,7 +321,7 @@ class ErrorBlock:
 
     @cached_property
     def is_declared_large(self) -> Booleans:
-        """Whether effects of the declared errors may not be proportional to their size."""
+        """Mark the declared errors whose effects may not be proportional to their size."""
         return self.is_large(self.declared)
 
     @cached_property
@@ -321,7 +332,7 @@ class ErrorBlock:
 
     # ---------------------------------------------------------------- errors of any size
     def does(self, model: str, size: Floats) -> Declared:
-        """Effects of errors of given sizes by a model, (errors, cases); NaN for an error without a size."""
+        """Effects of errors of given sizes in a model, (errors, cases); NaN for an error without a size."""
         effect = self.effects[model]
         qpe, cubic = effect.qpe * size + 0.0, effect.cubic * size + 0.0
         moved = self.table.planes[model].displacement(effect, size)
@@ -337,7 +348,7 @@ class ErrorBlock:
         return effects
 
     def _exactly(self, effects: Declared, size: Floats, is_large: Booleans) -> None:
-        """Replace the effects of errors too large for a first order by the effects of exact ranges."""
+        """Replace the effects of errors that are too large for the first order by those of exact ranges."""
         sizes = size[is_large]
         points = self.followed(is_large, np.abs(sizes))
         ahead, back = (np.where(sizes > 0, *pair) for pair in (points, points[::-1]))
@@ -360,7 +371,10 @@ class ErrorBlock:
             east[is_large], north[is_large] = each[point_paths.EAST], each[point_paths.NORTH]
 
     def followed(self, errors: Booleans, sizes: Floats) -> Floats:
-        """Rows of known points of some errors at sizes, by the positive and the negative sign, (2, rows, some)."""
+        """Results of exact ranges for some errors at given sizes, (2, rows, some).
+
+        The first axis is the positive and the negative sign. The rows are those of `point_paths.ROWS`.
+        """
         lanes = np.concatenate(self._lanes_of(errors))
         both = np.tile(sizes, 2)
         self.paths.follow_to(lanes, both)
@@ -368,7 +382,10 @@ class ErrorBlock:
 
     @cached_property
     def _lane(self) -> Indices:
-        """Lane of each error with a positive sign, in each case; the lanes with a negative sign follow."""
+        """Lane of each error with positive sign, in each case, (errors, cases).
+
+        The lanes of the negative sign follow the lanes of the positive sign.
+        """
         first_lane = np.zeros((len(self.sources), 1), dtype=int)
         first_lane[self.moves, 0] = 2 * self.cases * np.arange(len(self.moves))
         return first_lane + np.arange(self.cases)
@@ -379,7 +396,10 @@ class ErrorBlock:
 
     @property
     def paths(self) -> PointPaths:
-        """Paths of the image point by the errors that displace it; the positive sign of each error comes first."""
+        """Paths of the image point for the errors that displace it.
+
+        For each error, the positive sign comes before the negative sign.
+        """
         if self._follows is None:
             table, full = self.table, self.effects["full"]
             lanes = table.lanes(*(self.sources[index] for index in self.moves), signs=(1.0, -1.0))
@@ -395,9 +415,9 @@ class ErrorBlock:
 
     @cached_property
     def quadratic_by_sign(self) -> Floats:
-        """Quadratic phases of the declared errors of each sign, positive first, where they are large. [rad]
+        """Quadratic phases of the large declared errors for each sign, positive first, (2, errors, cases). [rad]
 
-        (2, errors, cases), NaN where they leave no image.
+        NaN for errors that are not large and for errors that leave no image.
         """
         phases = np.full((2, *self.declared.shape), math.nan)
         is_large = self.is_declared_large
@@ -409,9 +429,9 @@ class ErrorBlock:
     # ---------------------------------------------------------------- allowable sizes
     @cached_property
     def farthest(self) -> Floats:
-        """Largest size of the search for a limit; infinite for an error that has no effect at any size.
+        """Largest size at which the search for a limit stops, (errors, cases).
 
-        A larger error of a path is no navigation error.
+        A larger path error would not be a navigation error. Infinite for an error that has no effect at any size.
         """
         slant = [path.slant_range for path in self.table.geometries.both]
         size = np.full(self.declared.shape, math.inf)
@@ -429,7 +449,7 @@ class ErrorBlock:
         return size
 
     def allowed(self, model: str, limits: Sequence[PerCase | None], *, is_complete: bool) -> Allowed:
-        """Allowable sizes of errors by a model.
+        """Allowable sizes of the errors according to a model.
 
         Parameters
         ----------
@@ -438,7 +458,7 @@ class ErrorBlock:
         limits : three of (errors, cases) or (cases,) or None
             Limits of quadratic phase, cubic phase [rad] and displacement [m]; None: no limit.
         is_complete : bool
-            Search for the size that the quadratic phase alone allows too.
+            Also search for the size that the quadratic phase alone allows.
         """
         limit = np.array([self._limit(requirement, sizes) for requirement, sizes in enumerate(limits)])
         per_unit = self.per_unit(model)
@@ -460,7 +480,7 @@ class ErrorBlock:
         return Allowed(smallest, quadratic if is_complete else smallest, binding)
 
     def ends_image(self, size: Floats) -> Booleans:
-        """Whether the image ends at the allowables that were found."""
+        """Mark the errors for which the image ends at the allowable size that was found."""
         ends_there = np.zeros(size.shape, dtype=bool)
         if self._follows is not None:
             sizes = size[self.moves]
@@ -469,18 +489,21 @@ class ErrorBlock:
         return ends_there
 
     def _limit(self, requirement: int, limit: PerCase | None) -> Floats:
-        """A limit of each error; NaN: no limit. A pure phase error has the limit of the quadratic phase alone."""
+        """Limit of one requirement for each error; NaN where there is no limit.
+
+        A pure phase error has a limit of the quadratic phase only.
+        """
         limit = math.nan if limit is None else limit
         limits = np.broadcast_to(limit, self.declared.shape)
         return limits if requirement == 0 else np.where(self.is_motion, limits, math.nan)
 
     def _searched(self, limit: Floats, small: Floats, required: Sequence[int], *, is_complete: bool) -> Floats:
-        """Smallest sizes, of either sign, at which errors reach limits, (3, errors, cases); infinite: never.
+        """Smallest sizes, of either sign, at which errors reach their limits, (3, errors, cases).
 
-        `small` are the sizes if all effects were the effects of small errors. The search ends at the size that takes
-        the platform farther than a tenth of the slant range, or farther than the declared error takes it. It also
-        ends at the size that another limit allows, except for the quadratic phase where `is_complete`. The limit that
-        is likely to bind is searched first.
+        Infinite where no size reaches the limit. `small` are the sizes if all effects were proportional to the
+        errors. The search ends at the size that moves the platform by more than a tenth of the slant range, or by
+        more than the declared error does. It also ends at the size that another limit allows, except for the
+        quadratic phase if `is_complete`. The limit that is most likely to bind is searched first.
         """
         most = np.fmax(self.farthest, np.abs(self.declared))
         smallest = np.full(small.shape, math.inf)
@@ -517,13 +540,13 @@ class ErrorBlock:
 
 
 def _less(shift: Vectors, velocity: Vectors, tag_s: Floats) -> Vectors:
-    """A time tag's shift, less a shift along the velocity. [m]"""
+    """Shift of a time tag error less the shift along the velocity, `tag_s`·velocity. [m]"""
     (x, y, z), (u, v, w) = shift, velocity
     return (x - tag_s * u, y - tag_s * v, z - tag_s * w)
 
 
 class DeclaredErrors:
-    """The errors of cases that need the same number of nodes.
+    """Errors of cases that need the same number of nodes.
 
     Parameters
     ----------
@@ -538,14 +561,16 @@ class DeclaredErrors:
     shown : container of str, optional
         Ids of the rows to list in addition to the declared errors; omitted: every row is listed.
     gain : float or (cases,)
-        Factor by which autofocus lets quadratic phases be larger. Hidden phases get no such factor.
+        Factor by which autofocus raises the limit of quadratic phases. It does not apply to hidden phases.
     is_complete : bool
         Compute all numbers of each row, in the same way for any number of cases.
 
     Attributes
     ----------
-    listed, stated : list of ErrorSource
-        All errors, and the declared errors along the axes in which the file states them.
+    listed : list of ErrorSource
+        All listed errors.
+    stated : list of ErrorSource
+        The declared errors along the axes in which the file states them.
     """
 
     def __init__(
@@ -581,11 +606,11 @@ class DeclaredErrors:
         self._does: dict[tuple[str, int], Declared] = {}
 
     def array(self, value: PerCase | PerCaseFlag | None) -> Floats:
-        """One number for each case, (cases,)."""
+        """Array with one number for each case, (cases,)."""
         return np.full(self.cases, value, dtype=float)
 
     def lanes(self, *errors: ErrorSource, signs: Sequence[float] = (1.0,)) -> Lanes:
-        """Lanes of unit errors, ordered by error, then sign, then case."""
+        """Lanes of errors of one unit, ordered by error, then sign, then case."""
         orders = [self._order(error) for error in errors]
         courses = np.array([self._course(error, order) for error, order in zip(errors, orders, strict=True)])
         at_nodes = np.moveaxis(courses[:, None] * np.array(signs)[:, None, None], 2, 0)
@@ -601,7 +626,7 @@ class DeclaredErrors:
     def _of_lanes(self, values: Any, signs: int) -> Any:
         """Repeat values (..., errors, cases) for each sign of an error, (..., lanes).
 
-        Values of one error and one case, which all lanes share, have shape (..., 1).
+        A value for a single error in a single case is shared by all lanes and becomes (..., 1).
         """
         *more, errors, cases = values.shape
         if errors == cases == 1:
@@ -609,14 +634,20 @@ class DeclaredErrors:
         return np.broadcast_to(values[..., None, :], (*more, errors, signs, self.cases)).reshape(*more, -1)
 
     def edge_of(self, error: ErrorSource) -> PerCase:
-        """Position error at the aperture's edge by a unit of an error, the larger of both platforms; 0 by a clock."""
+        """Position error at the aperture edge per unit of an error.
+
+        For an error of both platforms it is the larger of both. It is 0 for a clock error.
+        """
         if not error.is_time_tag and error.shifts is None:
             return self.edge.get(error.unit, 0.0)
         farthest: Floats = np.max([norm(error.way_of(platform)).max(axis=0) for platform in error.platforms], axis=0)
         return farthest
 
     def bent(self, error: ErrorSource, size: Floats) -> Floats:
-        """Distance of a time tag's shift, of either sign, from a shift along the velocity, platforms added. [m]"""
+        """Deviation of a time tag's shift from a shift along the velocity, for the worse sign, (cases,). [m]
+
+        The deviations of the platforms are added.
+        """
         times, bend = self.exact.times, np.zeros(self.cases)
         for platform in error.platforms:
             path, straight = self.geometries.both[platform], error.direction_of(platform)
@@ -627,13 +658,19 @@ class DeclaredErrors:
         return bend
 
     def _order(self, error: ErrorSource) -> int:
-        """Power of slow time with which a position error grows: -1 for a clock, 0 for motions at the nodes."""
+        """Power of slow time with which a position error grows.
+
+        It is -1 for a clock error, and 0 for an error whose motion is given at the nodes.
+        """
         if not error.platforms:
             return -1
         return 0 if error.is_time_tag or error.shifts is not None else list(self.edge).index(error.unit)
 
     def _course(self, error: ErrorSource, order: int) -> Floats:
-        """Position error at the nodes by a unit of an error, or its range error where it moves no platform."""
+        """Position error at the nodes per unit of an error, (nodes, cases).
+
+        For an error that moves no platform it is the range error.
+        """
         exact = self.exact
         if order >= 0:
             return exact.powers[list(self.edge)[order]]
@@ -648,36 +685,39 @@ class DeclaredErrors:
         return self.blocks[block], index
 
     def does(self, model: str, error: ErrorSource) -> Declared:
-        """Effect of a declared error by a model, (cases,)."""
+        """Effect of a declared error in a model, (cases,)."""
         block, index = self._place[error.id]
         return self.of_block(model, block).of(index)
 
     def of_block(self, model: str, block: int) -> Declared:
-        """Effects of the declared errors of a block by a model, (errors, cases)."""
+        """Effects of the declared errors of a block in a model, (errors, cases)."""
         key = (model, block)
         if key not in self._does:
             self._does[key] = self.blocks[block].does(model, self.blocks[block].declared)
         return self._does[key]
 
     def is_large(self, error: ErrorSource) -> Booleans:
-        """Cases in which effects of a declared error are not proportional to its size."""
+        """Cases in which the effects of a declared error are not proportional to its size."""
         block, index = self.block_of(error)
         return np.asarray(block.is_declared_large[index])
 
     def quadratic_by_sign(self, error: ErrorSource) -> Floats:
-        """Quadratic phases of a declared error of each sign, positive first, where it is large, (2, cases). [rad]
+        """Quadratic phases of a large declared error for each sign, positive first, (2, cases). [rad]
 
-        NaN where the error leaves no image.
+        NaN where the error is not large or leaves no image.
         """
         block, index = self.block_of(error)
         return block.quadratic_by_sign[:, index]
 
     def doubts(self, model: str, is_over: PerCaseFlag) -> PerCaseFlag:
-        """Cases in which a model that does not gate raises a doubt. The published model knows no direct path."""
+        """Cases in which a model that does not gate gives reason for doubt.
+
+        With a direct path the published model never does, because it does not include the direct path.
+        """
         return False if model == "published" and self.has_direct_path else is_over
 
     def degeneracy(self, model: str, case: int = 0) -> Note:
-        """Why a model has no displacement in a case; empty where it has a displacement."""
+        """Note on why a model has no displacement in a case; empty if it has one."""
         if model == "full" or not plain(self.planes[model].is_singular, case):
             return NOTHING
         degrees = plain(self.published_angle_deg, case)
@@ -687,9 +727,9 @@ class DeclaredErrors:
 
 
 def _motions(errors: Sequence[ErrorSource]) -> tuple[Floats, Floats]:
-    """Whether units of errors move each platform, (2, errors, 1), and directions, as in `Lanes`.
+    """Flags of the platforms that each error moves, (2, errors, 1), and directions of the motion, as in `Lanes`.
 
-    Directions are (2, 3, nodes, errors, cases).
+    The directions are (2, 3, nodes, errors, cases).
     """
     ways = [
         (platform, index, error.way_of(platform))
@@ -708,7 +748,10 @@ def _motions(errors: Sequence[ErrorSource]) -> tuple[Floats, Floats]:
 
 
 class Model:
-    """One model of one collection, for questions about a single error: plain numbers, None for a missing value."""
+    """One model of a single case, for questions about one error at a time.
+
+    Its methods take and return plain numbers. A missing value is None.
+    """
 
     def __init__(self, errors: DeclaredErrors, name: str) -> None:
         self.errors, self.exact, self.name = errors, errors.exact, name
@@ -717,7 +760,7 @@ class Model:
         self.plane, self.degeneracy = errors.planes[name], errors.degeneracy(name)
 
     def effect(self, source: ErrorSource) -> Effect | FullEffect:
-        """Effect of a unit of an error; in the full model, of an error too small for a second order."""
+        """Effect of one unit of an error. In the full model it is the first-order effect."""
         return source.effect if self.is_published else source.full
 
     def displacement(self, effect: Effect | FullEffect, size: float) -> GroundVector | None:
@@ -725,11 +768,11 @@ class Model:
         return point(self.plane.displacement(effect, size))
 
     def equation(self, source: ErrorSource) -> str:
-        """Source of the effect: an equation or a table."""
+        """Name of the equation or table from which the effect follows."""
         return source.equation if self.is_published or not source.is_motion else "full model"
 
     def no_limit(self, source: ErrorSource) -> Note:
-        """Reason why the quadratic phase of an error sets no limit."""
+        """Note on why the quadratic phase of an error sets no limit."""
         if self.is_published or not source.is_heard:
             return source.no_limit
         return phrases.note("no-size-reaches-the-limit") if source.is_motion else phrases.note("no-quadratic-phase")
@@ -742,9 +785,10 @@ class Model:
         return block.does(self.name, sizes).of(index).in_one_case()
 
     def allowed(self, source: ErrorSource, limits: Sequence[float | None]) -> tuple[float | None, str | None]:
-        """Smallest size, of either sign, at which an error reaches a limit, and the requirement it reaches; or None.
+        """Smallest size, of either sign, at which an error reaches a limit, and the requirement it reaches.
 
-        `limits` are the limits of quadratic and cubic phase [rad], and of the displacement. [m]
+        Both are None if no size reaches a limit. `limits` are the limits of quadratic phase [rad], cubic phase [rad]
+        and displacement. [m]
         """
         block, index = self.errors.block_of(source)
         limits_of_block: list[PerCase | None] = []
@@ -757,27 +801,30 @@ class Model:
         return (None, None) if math.isnan(size) else (size, (*LIMITING_REQUIREMENTS, END_OF_IMAGE)[binding])
 
     def allowable(self, source: ErrorSource, requirement: str, limit: float) -> float | None:
-        """Smallest size, of either sign, at which an error reaches one limit; or None."""
+        """Smallest size, of either sign, at which an error reaches one limit; None if there is no such size."""
         return self.allowed(source, [limit if name == requirement else None for name in LIMITING_REQUIREMENTS])[0]
 
     def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
-        """Size at which an error would reach a limit if its effects were proportional to it; infinite: never."""
+        """Size at which an error would reach a limit if its effects were proportional to it.
+
+        Infinite if the error has no such effect.
+        """
         block, index = self.errors.block_of(source)
         per_unit = float(block.per_unit(self.name)[LIMITING_REQUIREMENTS.index(requirement), index, 0])
         return limit / per_unit if per_unit else math.inf
 
     def hidden_per_unit(self, source: ErrorSource) -> float:
-        """Hidden phase of a small unit of an error; 0 in the published model. [rad/unit]"""
+        """Hidden phase per unit of a small error; 0 in the published model. [rad/unit]"""
         block, index = self.errors.block_of(source)
         return 0.0 if self.is_published else float(block.hidden_per_unit[0, index, 0])
 
     def ends_image(self, source: ErrorSource, size: float) -> bool:
-        """Whether the image ends at an allowable that was found; never by a linear model."""
+        """Whether the image ends at an allowable size that was found. Always false in the published model."""
         block, index = self.errors.block_of(source)
         return not self.is_published and bool(block.ends_image(np.full(block.declared.shape, size))[index, 0])
 
     def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
-        """Whether effects of an error are proportional to its size up to a limit."""
+        """Whether the effects of an error are proportional to its size up to a limit."""
         block, index = self.errors.block_of(source)
         requirement_index = LIMITING_REQUIREMENTS.index(requirement)
         per_unit = block.per_unit(self.name)[requirement_index]
@@ -788,12 +835,12 @@ class Model:
 
     # ---------------------------------------------------------------- by exact ranges
     def is_small(self, source: ErrorSource, size: float) -> bool:
-        """Whether effects of an error are proportional to its size, by the bounds of the second order."""
+        """Whether the effects of an error are proportional to its size, by the second-order bounds."""
         block, index = self.errors.block_of(source)
         return not block.is_large(np.full(block.declared.shape, size))[index, 0]
 
     def at(self, source: ErrorSource, size: float) -> ExactEffect | None:
-        """Phases and displacement of an error of a signed size, by exact ranges; None without a ground point."""
+        """Phases and displacement of an error of a signed size by exact ranges; None without an image point."""
         block, index = self.errors.block_of(source)
         is_asked = np.zeros(block.declared.shape, dtype=bool)
         is_asked[index] = True
@@ -802,17 +849,20 @@ class Model:
         return None if math.isnan(east) else ExactEffect((east, north), *phases)
 
     def largest_range_error(self, source: ErrorSource) -> float:
-        """Largest range error at the nodes of a small unit of an error, before it displaces anything. [m/unit]"""
+        """Largest range error at the nodes per unit of an error, before displacement is removed. [m/unit]"""
         return float(np.abs(self.exact.range_error(self.errors.lanes(source))).max())
 
     def left_over(self, source: ErrorSource, size: float, point: GroundVector) -> Sequence[float]:
-        """Range error at the nodes that an error leaves at a ground point. [m]"""
+        """Range error at the nodes that remains at a ground point. [m]"""
         remaining = self.exact.left_over(self.errors.lanes(source), np.array([size]), point)
         range_error: list[float] = remaining[:, 0].tolist()
         return range_error
 
     def left_over_small(self, source: ErrorSource, size: float) -> Sequence[float]:
-        """Range error left at the displaced point by an error so small that its effects are proportional. [m]"""
+        """Range error at the nodes that remains at the displaced point of a small error. [m]
+
+        The effects of the error are taken as proportional to its size.
+        """
         east, north = self.displacement(source.full, size) or (0.0, 0.0)
         by_east, by_north = self.exact.slopes
         remaining = size * self.exact.range_error(self.errors.lanes(source)) + east * by_east + north * by_north

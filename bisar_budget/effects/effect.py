@@ -1,7 +1,7 @@
-"""Effect of one unit of an error on the range history and the image, by both models; its subject and its name.
+"""Effect of one unit of an error on the range history and the image in both models, and the error's subject.
 
-The published effects follow Rigling & Moses (Tables I and II). The full model lets the line of sight turn and counts
-the phase that the displacement of the image adds (`ranges.exact_ranges`).
+The published effects follow Rigling & Moses (Tables I and II). The full model includes the turn of the line of sight
+and the phase that the displacement of the image adds (`ranges.exact_ranges`).
 """
 
 import math
@@ -33,13 +33,15 @@ MOTION = ("position", "velocity", "acceleration")  # kinds of error that a platf
 
 
 class Subject(NamedTuple):
-    """The subject of a row or an error. `subject` makes it together with its id, so that no code has to parse an id.
+    """Subject of a row or an error. The function `subject` creates it with its id, so that no code parses an id.
 
-    `owner` owns the share of the budget that the error uses: transmitter, receiver, clock, or mission where no part
-    of the system owns the error. `kind` is position, velocity, acceleration, time_tag, vibration, timing,
-    propagation, dispersion, terrain, other, specification, or the name of a sum. `axis` is the axis of `frame`, the
-    term of the clock, the figure of a sensor or of the air, the name of an error from elsewhere, the specified key,
-    or the sort of a vibration. `entry` is the index of the error in a list of the file.
+    `owner` owns the share of the budget that the error uses: transmitter, receiver, clock, or mission if no part of
+    the system owns the error. `kind` is position, velocity, acceleration, time_tag, vibration, timing, propagation,
+    dispersion, terrain, other, specification, or the name of a sum.
+
+    `axis` is the axis of `frame`, the term of the clock, the name of a declared value of a sensor or of the air, the
+    name of an error from elsewhere, the specified key, or the sort of a vibration. `entry` is the index of the error
+    in a list of the file.
     """
 
     id: str
@@ -52,7 +54,7 @@ class Subject(NamedTuple):
 
 @cache
 def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: int | None = None) -> Subject:
-    """Name an error or a sum as the contract does."""
+    """Create the subject of an error or a sum, with the id that the contract defines."""
     if kind in ("timing", "other", "specification"):  # kinds with one possible owner
         parts = [kind, axis]
     elif kind == "propagation":  # one air over both legs, or one leg
@@ -75,7 +77,7 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of an error that is no motion
 
 
 def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: str) -> tuple[Note, ...]:
-    """Notes on the figures of parts that the file replaces: the named `figures`, or all figures."""
+    """Notes on values of parts that the file overrides: those named in `figures`, or all if none is named."""
     return tuple(
         phrases.note("overrides-a-part", key=f"platforms.{platform}.{figure.key}", text=figure.text, part=figure.part)
         for figure in overridden
@@ -84,14 +86,14 @@ def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: 
 
 
 def plain(column: PerCase | PerCaseFlag, case: int = 0) -> float:
-    """The number of a case, by its index. A single number counts for every case."""
+    """Plain number of one case, given by its index. A single number holds for every case."""
     if not isinstance(column, np.ndarray):
         return float(column)
     return float(column.item(case if column.size > 1 else 0))
 
 
 def _plain_way(component: PerCase) -> PerCase:
-    """A component of a direction in one case. A component that turns keeps all its nodes."""
+    """Component of a direction in one case. A component that varies over the nodes stays an array."""
     return component if np.ndim(component) > 1 else plain(component)
 
 
@@ -101,23 +103,24 @@ def _plain_ways(direction: Vectors) -> Vectors:
 
 
 class ErrorSource(NamedTuple):
-    """One error: subject, declared size and the effect of one unit. Numbers are plain, or arrays over cases.
+    """One error: its subject, its declared size, and the effect of one unit. Numbers are plain, or arrays over cases.
 
-    `declared` is signed and includes the coverage factor. It is None where the file declares no size.
-    `is_independent` marks the errors as the file states them. Sums and root-sum-squares run over these errors alone,
-    so that an error stated along the track is not counted again by its components along the scene's axes.
+    `declared` is signed and includes the coverage factor. It is None if the file declares no size. `is_independent`
+    marks the errors as the file states them. Sums and root-sum-squares include only these errors, so that an error
+    stated along the track is not counted again by its components along the scene's axes.
 
     `direction` is a unit vector of the scene, or zero for an error that is no motion. For an error of the mission,
     `direction` holds for both platforms, unless `of_receiver` gives the receiver a direction of its own. The
-    direction of a time tag is the velocity at the nodes of the aperture, (nodes, cases), along which a small time tag
-    moves the platform. [m/s]
+    direction of a time tag error is the velocity at the nodes of the aperture, (nodes, cases), along which a small
+    time tag error moves the platform. [m/s]
 
-    `clock` holds t̃₀ … t̃₃ of a unit of a clock error, zeros where synchronisation removes the error. It is None for
-    any other error.
+    `clock` holds the coefficients t̃₀ … t̃₃ of one unit of a clock error. They are zero if synchronization removes
+    the error. It is None for any other error.
 
-    `shifts` are the motions of both platforms over the aperture by a unit of an error, (nodes, cases) for each axis,
-    where a platform is in free fall: its error follows the dynamics of the orbit. [m] `rates` are then the velocities
-    at mid-aperture of position errors in `ric`, which are at rest against the stars. [m/s] Both are None otherwise.
+    `shifts` are the motions of both platforms over the aperture per unit of the error, (nodes, cases) for each axis.
+    [m] They are set if a platform is in free fall, where the error follows the dynamics of the orbit. `rates` are
+    then the velocities at mid-aperture of position errors in `ric`, which have no velocity relative to the stars.
+    [m/s] Both are None otherwise.
     """
 
     subject: Subject
@@ -143,7 +146,7 @@ class ErrorSource(NamedTuple):
         return self.subject.id
 
     def in_one_case(self) -> "ErrorSource":
-        """The same error with plain numbers instead of arrays of one case."""
+        """Return the same error with plain numbers in place of arrays of one case."""
         effect, full = Effect._make(map(plain, self.effect)), FullEffect._make(map(plain, self.full))
         declared = None if self.declared is None else plain(self.declared)
         clock = self.clock and tuple(map(plain, self.clock))
@@ -163,11 +166,17 @@ class ErrorSource(NamedTuple):
         return self.of_receiver if platform_index == 1 and self.of_receiver is not None else self.direction
 
     def way_of(self, platform_index: int) -> Any:
-        """Motion of a platform by a unit at each node, if it follows an orbit or a path; else its direction."""
+        """Motion of a platform at each node per unit of the error, if the platform follows an orbit or a path.
+
+        Otherwise it is the direction of the error.
+        """
         return self.direction_of(platform_index) if self.shifts is None else self.shifts[platform_index]
 
     def state_of(self, platform_index: int) -> tuple[Any, Any, Any]:
-        """Error of position, velocity and acceleration of a platform at mid-aperture by a unit. [m, m/s, m/s²]"""
+        """Position, velocity and acceleration error of a platform at mid-aperture per unit of the error.
+
+        The units are m, m/s and m/s².
+        """
         vectors: list[Any] = [NOWHERE, NOWHERE, NOWHERE]
         if self.rates is not None:
             vectors[1] = self.rates[platform_index]
@@ -181,27 +190,36 @@ class ErrorSource(NamedTuple):
 
     @property
     def is_motion(self) -> bool:
-        """Whether the error moves platforms or the clock. A pure phase error displaces nothing."""
+        """Whether the error moves platforms or the clock; not for a pure phase error, which displaces nothing."""
         return self.unit != "rad"
 
     @property
     def is_time_tag(self) -> bool:
-        """Whether the error shifts a path in time. On a turning path its effect is not proportional to its size."""
+        """Whether the error shifts a path in time.
+
+        On a turning path the effect of such an error is not proportional to its size.
+        """
         return self.subject.kind == "time_tag"
 
     @property
     def is_covered(self) -> bool:
-        """Whether the declared size includes the coverage factor: not for terrain or a pure phase error."""
+        """Whether the declared size includes the coverage factor.
+
+        It does not for terrain and for a pure phase error.
+        """
         return self.subject.kind in (*MOTION, "time_tag") or self.clock is not None
 
     @property
     def is_heard(self) -> bool:
-        """Whether the data contain the error. For a clock error: whether synchronisation leaves any of it."""
+        """Whether the data contain the error.
+
+        A clock error is contained unless the synchronization removes all of it.
+        """
         return self.clock is None or any(map(np.any, self.clock))
 
     @property
     def displaces(self) -> bool:
-        """Whether the error moves platforms, or a clock whose errors the data contain."""
+        """Whether the error is one of motion, or a clock error that the data contain."""
         return self.is_motion and self.is_heard
 
     @property
@@ -211,7 +229,10 @@ class ErrorSource(NamedTuple):
 
     @property
     def platforms(self) -> tuple[int, ...]:
-        """Indices of the platforms whose position has the error. An error of the mission is in both positions."""
+        """Indices of the platforms whose position has the error.
+
+        An error of the mission is in the positions of both platforms.
+        """
         owners = (self.owner,) if self.owner in PLATFORMS else PLATFORMS
         return tuple(map(PLATFORMS.index, owners)) if self.is_position else ()
 
@@ -226,7 +247,10 @@ PRINTED, TRUE = "v/R as printed, ranges held", "v⊥/R, lines of sight as they t
 
 
 class LinePiece(NamedTuple):
-    """A piece of the range error: centre τ_i from mid-aperture [s], value (27) [m] and slope (28) [m/s] there."""
+    """A piece of the range error, approximated by a line.
+
+    `time` is its centre τ_i from mid-aperture [s]. `value` (27) [m] and `slope` (28) [m/s] are those at this time.
+    """
 
     time: float
     value: float
@@ -234,7 +258,7 @@ class LinePiece(NamedTuple):
 
 
 def gradients_of(model: str) -> str:
-    """Name the gradients of range and Doppler from which a model forms Q_i: as printed, or true."""
+    """Name of the range and Doppler gradients from which a model forms Q_i: as printed, or true."""
     return PRINTED if model == "published" else TRUE
 
 
@@ -250,8 +274,8 @@ def indicated_point(
     piece : LinePiece
         Piece of the range error, without the range history of the scatterer itself.
     model : str
-        `published`: Q_i of (30) as printed, with the platforms at their positions at τ_i and speeds over ranges held
-        constant. PerCase other name: the true gradients of the lines of sight at τ_i.
+        `published`: Q_i of (30) as printed, with the platforms at their positions at τ_i and constant ratios of speed
+        to range. Any other name: the true gradients of the lines of sight at τ_i.
     seen_from : (2,)
         Position of the scatterer, east and north. [m]
 

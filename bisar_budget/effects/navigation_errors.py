@@ -1,18 +1,20 @@
-"""Random navigation errors: figures of inertial sensors, lever arms, and noise of a position.
+"""Random navigation errors: errors of inertial sensors, lever arms, and noise of a position.
 
-A bias of an inertial sensor is one error over the aperture; noise is another error at every moment. Both count from
-mid-aperture on: the mission declares the position and velocity errors that aiding leaves there. A tilt also swings a
-lever arm, if the file states one. An error of the attitude at mid-aperture swings the arm there already.
+A bias of an inertial sensor is one constant error over the aperture; noise is an independent error at every moment.
+The effect of both starts at mid-aperture, where the mission declares the position and velocity errors that aiding
+leaves. A tilt also rotates the lever arm, if the file states one. An attitude error at mid-aperture rotates the arm
+there already.
 
-A lever arm leads from the navigation's reference to the antenna's phase centre, in axes that turn with the body.
-These axes are along, cross and up of the velocity, at every moment of the aperture; for a platform at rest they are
-the scene's axes. The antenna's position is the navigation's position plus R(τ)·l. An error δl of the arm is carried
-along, R(τ)·δl: it displaces, and as the body turns it defocuses. An attitude error ψ swings the arm, ψ × R(τ)·l. It
-keeps its direction in space, like the error of a strapdown navigation with perfect gyros, and also where it turns the
-specific force. A gyro's bias ε makes it grow, ψ = ε·τ; a gyro's noise makes it walk.
+A lever arm leads from the reference point of the navigation to the antenna's phase centre, in axes that turn with the
+body. These axes are along, cross and up of the velocity at every moment of the aperture; for a platform at rest they
+are the scene's axes. The antenna's position is the navigation's position plus R(τ)·l, with the arm l and the rotation
+R of the body. An error δl of the arm turns with the body, R(τ)·δl: it displaces the image, and defocuses it if the
+body turns. An attitude error ψ moves the antenna by ψ × R(τ)·l. The error ψ keeps its direction in space, like the
+error of a strapdown navigation with perfect gyros, also where it tilts the specific force. A gyro bias ε makes it
+grow, ψ = ε·τ; gyro noise makes it a random walk.
 
-The same ψ acts through the specific force and through the arm. So a figure of an inertial sensor has both effects in
-its own row. The effect of attitude through the arm alone has a row that counts nowhere else. Derived here.
+The same ψ acts through the specific force and through the arm, so an error of an inertial sensor has both effects in
+its own row. A further row shows the effect of attitude through the arm alone, and counts nowhere. Derived here.
 """
 
 import math
@@ -63,7 +65,7 @@ _UNIFORM_SIGMA_RATIO = 12**-0.5  # sigma of an error that is uniform over a step
 
 
 def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
-    """Process of an error that is correlated noise of a position, along the axes of `process_axes`."""
+    """Gauss–Markov process of an error that is correlated noise of a position, along `process_axes`."""
     if error.subject.kind == "trajectory":
         return _log_process(mission, error.owner, error.subject.axis)[0]
     motion: MotionError | CommonMotionError | None = mission.common_motion_error
@@ -74,7 +76,7 @@ def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
 
 
 def process_axes(mission: Mission, error: RandomError) -> dict[str, Floats]:
-    """Axes (3, 3) along which a process moves each platform, by the name of the platform."""
+    """Axes (3, 3) along which a process moves each platform, as a mapping from the platform's name."""
     if error.subject.kind == "trajectory":
         return {error.owner: _log_process(mission, error.owner, error.subject.axis)[1]}
     common, names = mission.common_motion_error, [error.owner]
@@ -86,7 +88,7 @@ def process_axes(mission: Mission, error: RandomError) -> dict[str, Floats]:
 
 
 def _log_process(mission: Mission, name: str, figure: str) -> tuple[GaussMarkov, Floats]:
-    """Noise of a log whose fixes are flown unsmoothed, and its axes, in one case."""
+    """Noise, and its axes, of a log whose fixes the processor uses without smoothing, for one case."""
     path: FlownPath | None = getattr(mission.platforms, name).path
     assert path is not None
     assert path.log_noise is not None
@@ -96,10 +98,10 @@ def _log_process(mission: Mission, name: str, figure: str) -> tuple[GaussMarkov,
 
 
 def specific_force(mission: Mission, state: PlatformState) -> Vectors:
-    """Specific force of a platform, f = a − g, which accelerometers measure, in the axes of the scene. [m/s²]
+    """Specific force of a platform, f = a − g, in the axes of the scene. [m/s²]
 
-    It is zero where the platform falls freely. On the Earth g includes the terms of the Earth's rotation
-    (`earth.free_fall`).
+    Accelerometers measure this force. It is zero in free fall. On the Earth, g includes the terms of the Earth's
+    rotation (`earth.free_fall`).
     """
     from bisar_budget.paths.earth import free_fall  # the import takes 8 ms, and most missions name no sensor
 
@@ -109,10 +111,10 @@ def specific_force(mission: Mission, state: PlatformState) -> Vectors:
 
 
 def acceleration_errors(kind: str, axes: Floats, force: Floats) -> Floats:
-    """Acceleration error by a unit of a figure about, or along, each axis, (axes, 3, ...), from axes of that shape.
+    """Acceleration error per unit of a sensor error about or along each axis, (axes, 3, ...). [m/s²/unit]
 
-    A tilt turns the specific force (3, ...), which accelerometers measure. A scale factor adds a part of it. A figure
-    that is an acceleration acts along its axis. [m/s²/unit]
+    `axes` has the same shape. A tilt rotates the specific force (3, ...), which accelerometers measure. A scale
+    factor adds a fraction of the specific force. A sensor error that is an acceleration acts along its axis.
     """
     if kind in TILTS:
         return np.asarray(np.cross(axes, force, axisa=1, axisb=0, axisc=1))
@@ -122,7 +124,7 @@ def acceleration_errors(kind: str, axes: Floats, force: Floats) -> Floats:
 
 
 def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Figures of a platform's inertial sensor, declared or not; empty without a sensor."""
+    """Errors of a platform's inertial sensor, declared or not; empty without a sensor."""
     error = seen.error(name)
     if error.imu is None:
         return
@@ -159,7 +161,10 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
 def _moves_by_imu(
     seen: SensorCases, platform_index: int, kind: str, directions: Floats, about: Floats, arm: Floats | None
 ) -> tuple[Moves, ...]:
-    """Motion of a platform by a unit: through its acceleration, (axes, 3, cases) [m/s²/unit], and through an arm."""
+    """Motion of a platform per unit of a sensor error, through its acceleration error and through a lever arm.
+
+    `directions` (axes, 3, cases) is the acceleration error per unit. [m/s²/unit]
+    """
     ways, half = directions[:, :, None], seen.exact.half
     if arm is None or kind not in TILTS:
         courses = _courses(kind, len(seen.exact.times))
@@ -180,13 +185,19 @@ _inertial_phases: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.in
 
 
 def _at_mid_aperture(mission: Mission, index: int, along: PerCase) -> tuple[PerCase, ...]:
-    """Quadratic phase, cubic phase and rest by a unit with the component `along` the line of sight. [rad]"""
+    """Quadratic phase, cubic phase and remaining phase per unit, in the published model. [rad]
+
+    `along` is the component of the unit error along the line of sight.
+    """
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
     return _inertial_phases(along, along, along, wavelength, T)[index]
 
 
 def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> tuple[PerCase, PerCase]:
-    """Sigmas of the displacement by a unit with the component `along` the line of sight of mid-aperture. [m]"""
+    """Sigmas of the displacement per unit of a sensor error, in the published model. [m]
+
+    `along` is the component of the unit error along the line of sight of mid-aperture.
+    """
     fit = seen.exact.fit[:2]
     if kind in SPREADING_NOISE:
         orders = fit @ _walk_of(kind, len(seen.exact.times)).at_nodes @ fit.T
@@ -198,10 +209,10 @@ def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> tuple[PerCase,
 
 
 def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions: Floats) -> RandomEffect:
-    """Effect of a unit of the inertial sensor's figure `kind`, by the full model over the exact paths.
+    """Effect of one unit of the sensor error `kind`, in the full model along the exact paths.
 
-    `directions` (axes, 3, cases) is the acceleration error by a unit of the figure about, or along, each axis. The
-    motion error is computed for an aperture of 2 s. Its square is then scaled by a power of half the aperture time.
+    `directions` (axes, 3, cases) is the acceleration error per unit about, or along, each axis. The motion error is
+    computed for an aperture of 2 s. Its square is then scaled by a power of half the aperture time.
     """
     count, along = len(seen.exact.times), seen.range_errors(platform_index, directions[:, :, None])
     scale = seen.exact.half ** _GROWS[kind]
@@ -215,16 +226,19 @@ def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions
 
 
 def _walk_of(kind: str, count: int) -> "_Walks":
-    """Position error by the noise of a figure: a white acceleration, or a white tilt rate turning specific force."""
+    """Position error by the noise of a sensor, as integrals of white noise.
+
+    The noise is a white acceleration, or a white tilt rate that rotates the specific force.
+    """
     order = 1 if kind == "velocity_random_walk" else 2
     return _walks(order, order, count)
 
 
 @cache
 def _courses(kind: str, count: int) -> Floats:
-    """Independent courses of the position by a unit acceleration, or its noise, over 2 s, (courses, nodes). [m/unit]
+    """Independent variations of the position by a unit acceleration, or by its noise, over 2 s, (courses, nodes).
 
-    They are zero at mid-aperture.
+    They are zero at mid-aperture. [m/unit]
     """
     if kind in SPREADING_NOISE:
         return factor(_walk_of(kind, count).at_nodes).T
@@ -234,7 +248,7 @@ def _courses(kind: str, count: int) -> Floats:
 
 # ---------------------------------------------------------------------- lever arms
 def body_axes(state: PlatformState, times: Floats) -> Floats:
-    """Axes of a platform's body, along, cross and up of its velocity at slow times [s], (axes, 3, *times.shape)."""
+    """Body axes of a platform, along, cross and up of its velocity, at slow times [s], (axes, 3, *times.shape)."""
     u, v, w = (np.broadcast_to(component, times.shape) for component in state.at(times)[1])
     if np.any(state.is_still):
         u, v, w = (np.where(state.is_still, *both) for both in ((1.0, u), (0.0, v), (0.0, w)))
@@ -245,21 +259,21 @@ def body_axes(state: PlatformState, times: Floats) -> Floats:
 
 
 def arm_at(state: PlatformState, arm: Vectors, times: Floats) -> Floats:
-    """The arm at slow times [s] along the axes of the scene, (3, *times.shape). [m]"""
+    """Lever arm at slow times [s] in the axes of the scene, (3, *times.shape). [m]"""
     return np.asarray(sum(length * axis for length, axis in zip(arm, body_axes(state, times), strict=True)))
 
 
 def swung(axes: Floats, arm: Floats) -> Floats:
-    """Displacement of an arm by a unit of tilt about each of several axes, (axes, 3, times, cases). [m/rad]
+    """Displacement of the antenna by a unit of tilt about each of several axes, (axes, 3, times, cases). [m/rad]
 
-    The arm is (3, times, cases) [m], the axes are (axes, 3, cases).
+    The lever arm is (3, times, cases) [m], and the axes are (axes, 3, cases).
     """
     about = (axes[:, 0, None], axes[:, 1, None], axes[:, 2, None])
     return np.stack(cross(about, (arm[0], arm[1], arm[2])), axis=1)
 
 
 def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Errors of the attitude through a platform's arm, declared or not, and errors of the arm itself."""
+    """Errors of a platform's lever arm: attitude acting through the arm, declared or not, and the arm itself."""
     error = seen.error(name)
     lever: LeverArm | None = error.lever_arm
     if lever is None:
@@ -291,10 +305,10 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
 def _with_arm(
     seen: SensorCases, platform_index: int, kind: str, directions: Floats, about: Floats, arm: Floats
 ) -> tuple[RandomEffect, RandomEffect]:
-    """Effects by both models of a unit of tilt about axes (axes, 3, cases), or of its rate or noise, with an arm.
+    """Effects, in both models, of one unit of tilt, tilt rate or tilt noise of a platform with a lever arm.
 
-    `directions` (axes, 3, cases) is the acceleration by the tilt of the specific force [m/s²/unit]. `arm` is the arm
-    at the nodes. [m]
+    The tilt is about the axes `about` (axes, 3, cases). `directions` (axes, 3, cases) is the acceleration that the
+    tilted specific force causes. [m/s²/unit] `arm` is the arm at the nodes. [m]
     """
     state, times = seen.geometry.both[platform_index], seen.exact.times
     swings = swung(about, arm)
@@ -329,11 +343,12 @@ def _with_arm(
 
 
 class _Walks(NamedTuple):
-    """Two integrals of one white noise of density 1, from the middle of an aperture of 2 s on, each way.
+    """Covariance of two integrals of the same white noise of density 1 over an aperture of 2 s.
 
-    `at_nodes` is the covariance of the first integral with the second at the nodes, (nodes, nodes), by their Legendre
-    orders up to the last order that the nodes tell apart. `left` is the mean over the aperture of their product
-    beyond order 3, and `beyond` its mean beyond the last order.
+    Both integrals start at mid-aperture and run in both directions. `at_nodes` is the covariance of the first
+    integral with the second at the nodes, (nodes, nodes), in the Legendre orders that the nodes can distinguish.
+    `left` is the mean over the aperture of their product beyond order 3. `beyond` is its mean beyond the orders that
+    the nodes can distinguish.
     """
 
     at_nodes: Floats
@@ -343,13 +358,16 @@ class _Walks(NamedTuple):
 
 @cache
 def _walks(first: int, second: int, count: int) -> _Walks:
-    """The noise integrated `first` + 1 and `second` + 1 times, at `count` nodes; 0 is a walk."""
+    """Covariance of white noise integrated `first` + 1 times with the same noise integrated `second` + 1 times.
+
+    `count` is the number of nodes. One integration, given as 0, is a random walk.
+    """
     gauss_nodes, weights = np.polynomial.legendre.leggauss(2 * count)
     start, weight = (1 + gauss_nodes) / 2, weights / 2  # on one side of the middle
     number = np.arange(count)
 
     def order_of(times: int) -> Floats:
-        """Order n of the integral by a unit of noise at each start, (n, starts)."""
+        """Legendre order n of the integral of a unit impulse at each start time, (n, starts)."""
         ahead = start[:, None] + (1 - start[:, None]) * start
         grown = ((ahead - start[:, None]) ** times / math.factorial(times)) * weight * (1 - start[:, None])
         return np.asarray((2 * number[:, None] + 1) / 2 * np.einsum("snp,sn->ps", _legendre(ahead, count), grown))
@@ -365,10 +383,10 @@ def _walks(first: int, second: int, count: int) -> _Walks:
 
 @cache
 def _courses_of_both_walks(count: int) -> tuple[Floats, Floats]:
-    """Independent courses that make up a tilt's random walk over an aperture of 2 s, at the nodes.
+    """Independent variations that make up a tilt's random walk over an aperture of 2 s, at the nodes.
 
-    Returns the double integral of the walk, and the walk itself, each (courses, nodes). Course i of both comes from
-    the same noise.
+    Returns the double integral of the walk, and the walk itself, each (courses, nodes). Row i of both comes from the
+    same noise.
     """
     both = np.block([[_walks(a, b, count).at_nodes for b in (2, 0)] for a in (2, 0)])
     twice, once = np.split(factor(both).T, 2, axis=1)
@@ -390,22 +408,23 @@ def position_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def residual_subject(name: str) -> Subject:
-    """Subject of the residual that a smooth path leaves of a platform's log."""
+    """Subject of the residual of a platform's log about the smooth path."""
     return subject(name, "trajectory", "residual")
 
 
 def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Noise of the log of a platform whose processor flies the fixes as they are; empty for any other path.
+    """Noise of a platform's log if the processor uses the fixes without smoothing; empty for any other path.
 
-    The residual of the smooth path is a process with the covariance and the correlation of that residual. White fixes
-    joined by straight lines are correlated over half an interval. The process spreads, and has the part in the lower
-    orders that noise has.
+    The residual about the smooth path is a process with the covariance and correlation time of that residual. White
+    fixes joined by straight lines are correlated over half an interval. The process spreads, and its lower orders are
+    those of noise.
 
-    The grid of the fixes is an error that is uniform over a step, with the variance q²/12 along each coordinate.
-    Where the platform crosses many steps, the rounding differs from fix to fix, is in the residual, and hardly moves
-    the image. Where the platform crosses no step, rounding is one error for all of the aperture, which the residual
-    does not contain. The log does not tell which case applies, and between both any part of the variance may be
-    constant. So the variance is taken as constant, in addition to the residual.
+    The grid to which the fixes are rounded causes an error that is uniform over a step, with the variance q²/12 along
+    each coordinate. If the platform crosses many steps, the rounding differs from fix to fix. It is then part of the
+    residual, and hardly displaces the image. If the platform crosses no step, the rounding is one constant error over
+    the aperture, which the residual does not contain. The log does not show which of the two holds, and in
+    intermediate cases any fraction of the variance may be constant. The whole variance is therefore taken as
+    constant, in addition to the residual.
     """
     path: FlownPath | None = getattr(seen.mission.platforms, name).path
     log = None if path is None else path.log_noise
@@ -418,7 +437,10 @@ def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, PerCase]]:
-    """Sigmas (3, cases) [m], axes (3, 3, cases) and correlation time [s] of the residual, and of the grid."""
+    """Noise of a log, for the residual and for the rounding to a grid.
+
+    Each entry has sigmas (3, cases) [m], axes (3, 3, cases) and correlation time [s].
+    """
     residual, grid = (
         np.moveaxis(
             np.array([[np.broadcast_to(value, (cases,)) for value in row] for row in matrix], dtype=float), -1, 0
@@ -439,7 +461,7 @@ def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, Per
 
 
 def common_noise(seen: SensorCases) -> Iterator[RandomError]:
-    """Correlated noise that both platforms share: along each axis of its frame the effects on both legs add."""
+    """Correlated noise shared by both platforms. Along each axis of its frame the effects on both legs add."""
     error = seen.mission.common_motion_error
     for index, process in enumerate(() if error is None else error.random):
         axes = {name: seen.axes(name, error.frame) for name in PLATFORMS} if error is not None else {}
@@ -447,7 +469,7 @@ def common_noise(seen: SensorCases) -> Iterator[RandomError]:
 
 
 class _Process(NamedTuple):
-    """A Gauss-Markov process, its subject, and its sigmas [m]; numbers may be arrays (cases,)."""
+    """A Gauss–Markov process: its subject, sigmas [m] and correlation time [s]. Numbers may be arrays (cases,)."""
 
     subject: Subject
     sigma: Sequence[PerCase]
@@ -460,7 +482,10 @@ class _Process(NamedTuple):
 
 
 def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], path: KeyPath) -> RandomError:
-    """Noise along axes of the platforms that it moves, (axes, 3, cases) each."""
+    """Error of a Gauss–Markov process that moves one or both platforms.
+
+    `axes` gives the axes of the process for each platform that it moves, (axes, 3, cases).
+    """
     k = 2 * math.pi / seen.mission.radar.wavelength
     largest, sizes = parts_of_largest(seen.vector(process.sigma))
     moments = gauss_markov(seen.aperture_time, process.correlation_time)

@@ -1,15 +1,17 @@
-"""Oscillators under acceleration: phase by vibration and by turns of their platform.
+"""Oscillators under acceleration: phase errors by vibration and by turns of the platform.
 
-The fractional frequency of an oscillator changes by y = Γ·a, with its acceleration sensitivity Γ. Γ is a vector whose
-direction is unknown. The worst direction counts, that is, the length of Γ times the length of an acceleration.
+An acceleration a changes the fractional frequency of an oscillator by y = Γ·a, where Γ is its acceleration
+sensitivity. Γ is a vector of unknown direction. The worst direction counts, so Γ·a is the product of the lengths of
+both.
 
-- A tone of a at f has the peak phase f₀·Γ·a/f. It is a quarter of a turn away from the motion itself, so the powers
-  of the two add.
-- Random vibration has the phase S_φ = (Γ·f₀/f)²·S_a (Filler 1988).
-- A turn: specific force changes by the acceleration of the path against level flight, in which a clock is set. The
-  range error is c·∫Γ·a dτ = c·Γ·(v(τ) − v(0)). A constant acceleration is a frequency, which displaces; a change of
-  the acceleration within the aperture defocuses. The root-sum-square of the effects along three axes is the largest
-  effect of a Γ of that length in any direction. A platform that falls freely feels nothing.
+- A vibration with acceleration amplitude a at frequency f causes a tone with the peak phase f₀·Γ·a/f. It is a quarter
+  cycle away from the motion itself, so the powers of the two add.
+- Random vibration causes the phase spectrum S_φ = (Γ·f₀/f)²·S_a (Filler 1988).
+- In a turn, the specific force changes by the acceleration of the path, compared with the level flight in which a
+  clock is set. The range error is c·∫Γ·a dτ = c·Γ·(v(τ) − v(0)). A constant acceleration is a frequency offset, which
+  displaces the image; a change of the acceleration within the aperture defocuses it. The root-sum-square of the
+  effects along three axes is the largest effect that a Γ of that length has in any direction. A platform in free fall
+  has no specific force.
 """
 
 import math
@@ -37,7 +39,10 @@ _EXCHANGE_START_COUNT = 8  # beginnings of the exchanges within an interval, ove
 
 
 class Felt(NamedTuple):
-    """The vibration that an oscillator feels, stated for it or for its platform, and its sensitivity. [s²/m]"""
+    """Vibration that acts on an oscillator, and the oscillator's acceleration sensitivity. [s²/m]
+
+    `is_own` is true if the vibration is stated for the oscillator, and false if it is stated for the platform.
+    """
 
     vibration: Vibration | FeltVibration
     sensitivity: PerCase
@@ -45,7 +50,7 @@ class Felt(NamedTuple):
 
 
 def felt(mission: Mission, name: str) -> Felt | None:
-    """Vibration that the oscillator of a platform feels; None where the file states no sensitivity."""
+    """Vibration that acts on a platform's oscillator; None if the file states no sensitivity."""
     platform = getattr(mission.platforms, name)
     oscillator: Oscillator | None = platform.oscillator
     if oscillator is None or oscillator.acceleration_sensitivity is None:
@@ -56,7 +61,10 @@ def felt(mission: Mission, name: str) -> Felt | None:
 
 
 def lacks_a_spectrum(mission: Mission, name: str) -> PerCaseFlag:
-    """Cases in which an oscillator feels a wideband vibration: its phase f₀Γ·4π²·f·σ/g needs a frequency."""
+    """Cases in which a wideband vibration without a spectrum acts on an oscillator.
+
+    Its phase f₀Γ·4π²·f·σ/g cannot be computed, because the frequency f is unknown.
+    """
     felt_vibration = felt(mission, name)
     if (
         felt_vibration is None
@@ -69,7 +77,7 @@ def lacks_a_spectrum(mission: Mission, name: str) -> PerCaseFlag:
 
 
 def is_unshaken(mission: Mission, name: str) -> bool:
-    """Whether an oscillator is sensitive to acceleration, but the file has neither vibration nor turn for it."""
+    """Whether an oscillator is sensitive to acceleration, but the file states neither vibration nor turn for it."""
     felt_vibration = felt(mission, name)
     is_heard = name == "receiver" or not mission.has_direct_path
     if (
@@ -83,12 +91,16 @@ def is_unshaken(mission: Mission, name: str) -> bool:
 
 
 class AcceleratedTone(NamedTuple):
-    """A vibration as an oscillator's tone: platform, entry, frequency [Hz], amplitude of the acceleration [m/s²].
+    """Tone of an oscillator that a vibration causes.
 
-    `free` is the peak phase of a free oscillator by a unit of Γ [rad/(s²/m)]. `left` is the tone that the
-    synchronization leaves, and `echo` is the share of `left` that makes echoes. `in_quadrature` is the row of the
-    platform's vibration that makes the tone, from which the tone is a quarter of a turn away. It is None for a
-    vibration along several axes, and for a vibration that the file states for the oscillator alone.
+    `name` is the platform and `entry` the index of the vibration. `frequency` is in Hz, and `acceleration` is the
+    amplitude of the acceleration. [m/s²] `free` is the peak phase of a free oscillator per unit of the sensitivity Γ.
+    [rad/(s²/m)] `left` is the tone that the synchronization leaves, and `echo` is the share of `left` that makes
+    echoes.
+
+    `in_quadrature` is the row of the platform's vibration that causes the tone. The tone is a quarter cycle away from
+    that vibration. It is None for a vibration along several axes, and for a vibration that the file states for the
+    oscillator alone.
     """
 
     name: str
@@ -108,7 +120,7 @@ class AcceleratedTone(NamedTuple):
 
     @property
     def per_unit(self) -> PerCase:
-        """Peak phase of the tone's echo at the centre frequency by a unit of Γ. [rad/(s²/m)]"""
+        """Peak phase of the tone's echo at the centre frequency per unit of Γ. [rad/(s²/m)]"""
         return self.free * self.echo
 
     @property
@@ -118,9 +130,10 @@ class AcceleratedTone(NamedTuple):
 
 
 def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[AcceleratedTone]:
-    """Tones of vibrating oscillators. With a direct path as clock, only the receiver's tones count, heard twice.
+    """List the tones of oscillators that vibrate.
 
-    `geometry` holds many cases where numbers of the mission are arrays.
+    With a direct path as clock, only the receiver's tones count. They enter both the direct path and the echo.
+    `geometry` holds many cases if numbers of the mission are arrays.
     """
     tones = []
     for name in PLATFORMS[mission.has_direct_path :]:
@@ -144,9 +157,10 @@ def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None
 
 
 def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Random vibration of an oscillator, its tones below one cycle per aperture, and the turns of its platform.
+    """Error of an oscillator under acceleration.
 
-    The unit of the error is the unit of the sensitivity. Faster tones have rows of their own.
+    It contains random vibration, tones below one cycle per aperture, and turns of the platform. Its unit is the unit
+    of the sensitivity. Faster tones have rows of their own.
     """
     felt_vibration = felt(seen.mission, name)
     if felt_vibration is None:
@@ -165,7 +179,10 @@ def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomErro
 
 
 def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
-    """Parts of the range error by a unit of Γ: of a spectrum, and of slow tones in their worst phases. [m²/unit²]"""
+    """Parts of the range error per unit of Γ that vibration causes. [m²/unit²]
+
+    They are the parts of the vibration spectrum and of slow tones in their worst phases.
+    """
     mission, total = seen.mission, np.zeros((len(Parts._fields), seen.cases))
     if mission.has_direct_path and name == "transmitter":  # the transmitter's oscillator drops out
         return Parts(*total)
@@ -182,9 +199,9 @@ def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
 
 
 def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] | None:
-    """Effects by both models of a path's acceleration on the oscillator, for a unit of its sensitivity Γ.
+    """Effects, in both models, of a path's acceleration on the oscillator, per unit of its sensitivity Γ.
 
-    None for a path without acceleration, or in free fall: the oscillator then feels no acceleration.
+    None for a path without acceleration or in free fall, where no acceleration acts on the oscillator.
     """
     state: PlatformState = getattr(seen.geometry, name)
     if state.is_quadratic and not np.any(norm(state.acceleration) > _FELT_ACCELERATION_MPS2):
@@ -199,10 +216,10 @@ def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] 
 
 
 def turn_courses(state: PlatformState, moments: Floats, interval: PerCase | None = None) -> Floats:
-    """Time error by a unit of Γ along each axis, v(τ) − v(0), or its rest after exchanges, (n, moments, …).
+    """Time error per unit of Γ along each axis of the scene, v(τ) − v(0), (n, moments, …).
 
-    The axes are the axes of the scene. The exchanges begin anywhere in their interval. Each of several beginnings has
-    an equal part of the mean square.
+    With an `interval` of exchanges it is the remainder after synchronization. The exchanges may begin anywhere in
+    their interval. Each of several start times contributes an equal part of the mean square.
     """
 
     def gained(tau: PerCase) -> Floats:
@@ -226,19 +243,22 @@ def turn_courses(state: PlatformState, moments: Floats, interval: PerCase | None
 
 
 def _falls(mission: Mission, state: PlatformState) -> PerCaseFlag:
-    """Whether a platform falls freely: accelerometers measure less than the acceleration of its path."""
+    """Whether a platform is in free fall.
+
+    Accelerometers then measure less than the acceleration of its path.
+    """
     return norm(specific_force(mission, state)) < norm(state.acceleration)
 
 
 def flies_a_turn(mission: Mission, name: str) -> bool:
-    """Whether an oscillator feels a turn of its platform's path, in any case."""
+    """Whether a turn of its platform's path accelerates an oscillator in any case."""
     state: PlatformState = getattr(mission.geometry, name)
     bends = not state.is_quadratic or norm(state.acceleration) > _FELT_ACCELERATION_MPS2
     return bool(np.any(bends & ~np.asarray(_falls(mission, state))))
 
 
 def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
-    """Effect of two independent errors that grow with the same unit."""
+    """Combined effect of two independent errors that are proportional to the same unit."""
     quadratic, cubic, spread, east, north = (np.hypot(*both) for both in zip(first[:5], second[:5], strict=True))
     covariance = None
     if first.covariance is not None and second.covariance is not None:
@@ -248,7 +268,10 @@ def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
 
 
 def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
-    """Spectrum of an oscillator's phase by random vibration, per unit of Γ; may be empty. [rad²/Hz/unit²]"""
+    """Phase spectrum of an oscillator under random vibration, per unit of Γ. [rad²/Hz/unit²]
+
+    Empty if no spectrum acts on the oscillator.
+    """
     felt_vibration = felt(mission, name)
     is_heard = not mission.has_direct_path or name == "receiver"
     if felt_vibration is None or felt_vibration.vibration.spectrum is None or not is_heard:

@@ -1,9 +1,9 @@
 """Tones of oscillators: spurs, and the part of any tone that the synchronization leaves, by frequency.
 
 Exchanges every T_s sample a tone at f, and straight lines join the samples. These lines contain tones at f + m/T_s
-with sinc²((f + m/T_s)·T_s) of the amplitude. Less these lines, 1 − sinc²(fT_s) of the tone stays at f (m = 0); the
-lines with m ≠ 0 are the frequencies that the tone is folded to. The phases of the folded tones follow from the
-unknown instant of the exchange within its interval. Derived here.
+with sinc²((f + m/T_s)·T_s) of the amplitude. When the lines are subtracted, 1 − sinc²(fT_s) of the amplitude remains
+at f (m = 0). The tones with m ≠ 0 are the frequencies to which the tone is folded. The phases of the folded tones
+depend on the unknown instant of the exchange within its interval. Derived here.
 """
 
 import math
@@ -25,9 +25,10 @@ _NEIGHBOUR_RATE_COUNT = (
 
 
 class LeftTone(NamedTuple):
-    """The rest of a tone of amplitude 1: its own frequency first, then the frequencies that it is folded to. [Hz]
+    """The tones that synchronization leaves of a tone of amplitude 1.
 
-    `shares` are amplitudes, 0 for a frequency that does not occur.
+    `frequencies` has the tone's own frequency first, and then the frequencies to which it is folded. [Hz] `shares`
+    are the amplitudes, 0 for a frequency that does not occur.
     """
 
     frequencies: tuple[PerCase, ...]
@@ -39,7 +40,10 @@ class LeftTone(NamedTuple):
         return len(self.shares) > 1
 
     def echoes(self, aperture_time: PerCase) -> list[PerCase]:
-        """Amplitudes of the tones that make echoes, from one cycle per aperture on; the tone's own if not folded."""
+        """Amplitudes of the tones that make echoes, which are those with at least one cycle per aperture.
+
+        A tone that is not folded has its own amplitude at any frequency.
+        """
         if not self.is_folded:
             return [self.shares[0]]
         return [
@@ -48,7 +52,10 @@ class LeftTone(NamedTuple):
         ]
 
     def echo(self, mission: Mission) -> PerCase:
-        """Amplitude of the largest echo; without a PSLR requirement for tones, the root of the summed powers."""
+        """Amplitude of the largest echo.
+
+        Without a PSLR requirement it is the root of the sum of the powers of all echoes.
+        """
         echoes = self.echoes(mission.collection.aperture_time)
         if mission.requirements.pslr is None:
             together: PerCase = np.sqrt(sum(np.square(amplitude) for amplitude in echoes))
@@ -57,7 +64,10 @@ class LeftTone(NamedTuple):
         return largest
 
     def slowest_echo(self, aperture_time: PerCase) -> PerCase:
-        """Lowest frequency of an echo of at least 1 % of the amplitude; the tone's own if not folded. [Hz]"""
+        """Lowest frequency of an echo with at least 1 % of the amplitude. [Hz]
+
+        For a tone that is not folded it is the tone's own frequency.
+        """
         if not self.is_folded:
             return self.frequencies[0]
         seen = zip(self.frequencies, self.echoes(aperture_time), strict=True)
@@ -76,7 +86,7 @@ class LeftTone(NamedTuple):
     def slow_parts(self, aperture_time: PerCase) -> Parts:
         """Parts over the aperture of the tones below one cycle per aperture, each in its worst phase. [rad²]
 
-        The folded tones of one tone depend on each other, so their amplitudes add.
+        The folded tones of one tone are not independent, so their amplitudes add.
         """
         total: Floats = np.zeros((5, *np.broadcast_shapes(*map(np.shape, (aperture_time, *self.frequencies)))))
         for frequency, share in zip(self.frequencies, self.shares, strict=True):
@@ -92,7 +102,10 @@ class LeftTone(NamedTuple):
 
 
 def left_of_tone(frequency: PerCase, mission: Mission, geometry: BistaticGeometry) -> LeftTone:
-    """Tone that the synchronization leaves. A direct path leaves 2|sin(πfΔt)| of the receiver's tone."""
+    """Tones that the synchronization leaves of a tone of amplitude 1.
+
+    With a direct path, 2|sin(πfΔt)| of the receiver's tone remains, where Δt is the delay of the echo.
+    """
     sync = mission.synchronization
     if mission.has_direct_path:
         return LeftTone((frequency,), (2 * np.abs(np.sin(math.pi * frequency * geometry.echo_delay)),))
@@ -110,10 +123,10 @@ def left_of_tone(frequency: PerCase, mission: Mission, geometry: BistaticGeometr
 
 
 class Spur(NamedTuple):
-    """A tone of an oscillator: platform, entry by frequency, frequency [Hz], peak phase at centre frequency [rad].
+    """Spur of an oscillator: platform, index of its entry, and frequency [Hz].
 
-    `free` is the phase of a free oscillator, `left` is the tone that the synchronization leaves, and `echo` is the
-    share of `left` that makes echoes.
+    `free` is the peak phase of a free oscillator at the radar's centre frequency. [rad] `left` is the tone that the
+    synchronization leaves, and `echo` is the share of `left` that makes echoes.
     """
 
     name: str
@@ -134,16 +147,20 @@ class Spur(NamedTuple):
         return self.free * self.echo
 
     def slow_parts(self, aperture_time: PerCase) -> Parts | None:
-        """Parts over the aperture of the folded tones below one cycle per aperture; None without folding. [rad²]"""
+        """Parts over the aperture of the folded tones below one cycle per aperture. [rad²]
+
+        None if the synchronization does not fold the spur.
+        """
         if not self.left.is_folded:
             return None
         return self.left.slow_parts(aperture_time).times(np.square(self.free))
 
 
 def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Spur]:
-    """Tones that reach the image. With a direct path as clock, only the receiver's tones do: they are heard twice.
+    """List the spurs of oscillators that reach the image.
 
-    `geometry` holds many cases where numbers of the mission are arrays.
+    With a direct path as clock, these are the receiver's spurs only. They enter both the direct path and the echo.
+    `geometry` holds many cases if numbers of the mission are arrays.
     """
     spurs = []
     for name in PLATFORMS[mission.has_direct_path :]:

@@ -1,7 +1,7 @@
 """Oscillators: phase noise by a mask, an Allan deviation or a power law, and random errors of clocks.
 
-Spectra are one-sided. A link removes a part of the noise and adds noise of its own, depending on how the clocks are
-kept together.
+Spectra are one-sided. A synchronization link removes a part of the noise and adds noise of its own, depending on how
+the clocks are synchronized.
 """
 
 import math
@@ -44,7 +44,7 @@ class Noise(NamedTuple):
 
 
 def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
-    """Spectrum of an oscillator's phase, one-sided, shifted by the oscillator's level. [rad²/Hz]"""
+    """One-sided phase spectrum of an oscillator, scaled by the oscillator's level. [rad²/Hz]"""
     center_frequency *= 10 ** (oscillator.level / 20)  # the noise grows as its square
     if oscillator.phase_noise is not None:
         return _of_mask(oscillator, center_frequency, aperture_time)
@@ -92,7 +92,7 @@ def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: flo
 
 
 def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> tuple[PowerLawPiece, ...]:
-    """S_φ = f₀²·S_y/f²."""
+    """Phase spectrum of a power law of fractional frequency, S_φ = f₀²·S_y/f². [rad²/Hz]"""
     square = center_frequency**2
     return tuple(
         PowerLawPiece(0.0, bandwidth, square * h, slope)
@@ -102,7 +102,10 @@ def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> t
 
 
 def allan_variances(tau: float, bandwidth: float) -> tuple[float, ...]:
-    """Allan variance at an averaging time for h₋₂, h₋₁, h₀, h₁ and h₂ of 1, measured within `bandwidth`."""
+    """Allan variances at the averaging time `tau` for unit values of h₋₂, h₋₁, h₀, h₁ and h₂.
+
+    They are measured within `bandwidth`. [Hz]
+    """
     return (
         2 * math.pi**2 / 3 * tau,
         2 * math.log(2),
@@ -113,17 +116,17 @@ def allan_variances(tau: float, bandwidth: float) -> tuple[float, ...]:
 
 
 class Fit(NamedTuple):
-    """A power law fitted to an Allan deviation, and its largest misfit, as a fraction of a deviation."""
+    """Power law fitted to an Allan deviation, and its largest misfit as a fraction of the deviation."""
 
     misfit: float
     law: PowerLaw
 
 
 def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
-    """Fit h₋₂ … h₁, none negative, to an Allan deviation.
+    """Fit the coefficients h₋₂ … h₁ of a power law, none negative, to an Allan deviation.
 
-    The fit takes least squares of relative variances, with as few terms as describe the points. Among sets of terms
-    that describe the points equally well, it takes the set with the largest quadratic phase over the aperture.
+    It is a least-squares fit of relative variances, with as few terms as describe the points. Among sets of terms
+    that describe the points equally well, the set with the largest quadratic phase over the aperture is used.
     """
     per_term = evaluators.power_law_parts(aperture_time)[0]
 
@@ -141,7 +144,7 @@ def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
 
 @lru_cache(maxsize=64)
 def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
-    """Fit every choice of one term, of two terms and so on, none of them negative."""
+    """Fit every set of one term, of two terms and so on, without negative coefficients."""
     # White and flicker phase noise have nearly the same Allan variance: the fifth term is left out.
     term_count = 4
     variances = np.array([allan_variances(tau, bandwidth)[:term_count] for tau, _ in points])
@@ -156,9 +159,11 @@ def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
 
 
 def _least_squares(relative: Floats, terms: Sequence[int]) -> list[float] | None:
-    """Coefficients of all terms whose relative variances (points, terms) come nearest to 1, with some terms alone.
+    """Coefficients of the given terms in the least-squares fit of the relative variances to 1.
 
-    None if a coefficient is not positive or not unique, or if a variance is not positive, which a narrow band causes.
+    `relative` (points, terms) are the variances of all terms, relative to the stated variances. The result has the
+    coefficients of all terms, 0 for those that are not given. None if a coefficient is not positive or not unique, or
+    if a variance is not positive, as may happen for a narrow band.
     """
     columns = relative[:, terms]
     if (columns <= 0).any():
@@ -174,15 +179,15 @@ def _least_squares(relative: Floats, terms: Sequence[int]) -> list[float] | None
 
 
 def _misfit(relative: Floats, law: Sequence[float]) -> float:
-    """Largest misfit of the deviations of a law, as a fraction of the stated ones."""
+    """Largest misfit of the deviations of a power law, as a fraction of the stated deviations."""
     return max(float(np.abs(np.sqrt(relative @ law) - 1).max()), _EXACT_FIT_FRACTION)
 
 
 # ---------------------------------------------------------------------- errors of clocks
 def clocks_without_oscillator(mission: Mission) -> tuple[str, ...]:
-    """Platforms whose clocks were set and run free, and whose oscillators the file does not state.
+    """Platforms whose clocks run free after they were set, but whose oscillators the file does not state.
 
-    The drift of such a clock is unknown, so the location lacks half of its causes, or all.
+    The drift of such a clock is unknown, so the location budget lacks one or both of its clock contributions.
     """
     sync = mission.synchronization
     if sync is None or not sync.is_holdover:
@@ -191,10 +196,10 @@ def clocks_without_oscillator(mission: Mission) -> tuple[str, ...]:
 
 
 def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Random error of a platform's oscillator: its phase noise, and its spurs folded below one cycle per aperture.
+    """Random error of a platform's oscillator: phase noise, and spurs folded below one cycle per aperture.
 
-    Only the noise that the synchronisation of the clocks leaves in the data counts. An unstated oscillator yields
-    nothing.
+    Only the noise that the synchronization of the clocks leaves in the data counts. Without a stated oscillator
+    nothing is yielded.
     """
     mission = seen.mission
     oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
@@ -219,7 +224,7 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: PerCase) -> RandomEffect | None:
-    """Effect of the assumed noise below the first point of a mask; None where that noise hardly counts."""
+    """Effect of the assumed noise below the first point of a mask; None if that noise is negligible."""
     mask = oscillator.phase_noise
     if mask is None or np.all(mask[0][0] * seen.aperture_time <= COVERED_CYCLES):
         return None
@@ -229,7 +234,10 @@ def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: PerC
 
 
 def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Booleans:
-    """Cases in which the spectrum differs from the stated one: by another frequency of the mask, or by a poor fit."""
+    """Cases in which the spectrum used differs from the stated one.
+
+    The mask may be stated at another frequency, or the power law may fit the Allan deviation poorly.
+    """
     in_doubt = np.full(seen.cases, bool(oscillator.mask_at_frequency_of_part))
     if oscillator.allan_deviation is None:
         return in_doubt
@@ -240,17 +248,17 @@ def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Booleans:
 
 
 def states_both_terms(mission: Mission) -> bool:
-    """Whether the file states both terms of the clock, which then replace the terms of free oscillators."""
+    """Whether the file states both clock terms, which then replace those of free oscillators."""
     timing = mission.timing_error
     return not mission.has_direct_path and timing.constant is not None and timing.linear is not None
 
 
 def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:
-    """Effects by both models of a phase with these parts [rad²], with orders 0 and 1 where they are known.
+    """Effects, in both models, of a clock phase with the given parts [rad²].
 
-    Where the file states both terms of the clock, these terms replace orders 0 and 1 of a free oscillator, but not
-    orders 0 and 1 of its slow `tones`. As the line of sight turns, orders 2 and 3 displace the image, and defocus
-    less by that.
+    Orders 0 and 1 are included where they are known. If the file states both terms of the clock, these terms replace
+    orders 0 and 1 of a free oscillator, but not orders 0 and 1 of its slow `tones`. If the line of sight turns,
+    orders 2 and 3 also displace the image, which reduces the defocus they cause.
     """
     k, is_stated = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), states_both_terms(seen.mission)
     quadratic, cubic, spread = np.sqrt(noise.rows[:3] + tones.rows[:3])
@@ -271,14 +279,14 @@ def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffe
 
 
 def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_below_mask: bool = False) -> Floats:
-    """Parts of the phase at 1 Hz that an oscillator leaves over the aperture, (parts, cases); they grow as f₀².
+    """Parts of an oscillator's phase that remain over the aperture, for a centre frequency of 1 Hz, (parts, cases).
 
-    They are the parts of the whole spectrum or, with `is_below_mask`, of the spectrum below the first point of a
-    mask.
+    The parts grow as f₀². They are the parts of the whole spectrum or, with `is_below_mask`, of the spectrum below
+    the first point of a mask.
 
-    The parts depend on how the clocks are kept together: all of the noise, the noise that exchanged pulses leave, the
-    noise since the clocks were set, or, for a receiver that hears the transmitter, the noise between direct path and
-    echo.
+    The parts depend on how the clocks are synchronized. They are all of the noise for free clocks, the remaining
+    noise for exchanged pulses, and the noise since the setting for clocks that were set. For a receiver that uses the
+    direct path, they are the noise between direct path and echo.
     """
     sync, times = seen.mission.synchronization, seen.aperture_time
     remaining = np.zeros((len(Parts._fields), seen.cases))
@@ -298,7 +306,7 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_be
 def _left_of(
     pieces: Sequence[PowerLawPiece], interval: float | None, seen: SensorCases, cases_of_spectrum: Sequence[int]
 ) -> Parts:
-    """Parts that the synchronization leaves of a spectrum in some of the cases, (some,)."""
+    """Parts of a spectrum that the synchronization leaves in some of the cases, (some,)."""
     sync, aperture_time = seen.mission.synchronization, seen.aperture_time[cases_of_spectrum]
     if sync is None or interval is not None:
         return left_parts(pieces, aperture_time, interval)
@@ -313,7 +321,10 @@ def _left_of(
 
 
 def link_noise(seen: SensorCases) -> Iterator[RandomError]:
-    """Errors of the exchanges: each exchange has an independent error, and straight lines join the exchanges."""
+    """Errors of the synchronization exchanges.
+
+    Each exchange has an independent error, and straight lines join the exchanges.
+    """
     sync = seen.mission.synchronization
     if sync is None or sync.error is None:
         return

@@ -1,10 +1,10 @@
-"""Effects of random errors on the image: the effect of a unit, 1 sigma, of each error in each case.
+"""Effects of random errors on the image, for one unit (1 sigma) of each error in each case.
 
-A random error has a sigma and no sign. Orders 0 and 1 of its range error displace the image by Q⁻¹; orders from 2 on
-defocus it. The published model takes the line of sight of mid-aperture (`theory.random_errors`) and the Q of (25).
-The full model lets the line of sight turn, knows a direct path, and counts the phase that the displacement adds.
+A random error has a sigma and no sign. Orders 0 and 1 of its range error displace the image according to Q⁻¹; orders
+from 2 on defocus it. The published model uses the line of sight of mid-aperture (`theory.random_errors`) and the Q of
+(25). The full model includes the turn of the line of sight, a direct path, and the phase that the displacement adds.
 
-Numbers of a mission may be arrays (cases,). The geometry then holds the same cases.
+Numbers of a mission may be arrays (cases,). The geometry then has the same cases.
 """
 
 import math
@@ -48,15 +48,17 @@ Value = TypeVar("Value")  # a number, an array (cases,), or a tuple of them
 
 
 class RandomEffect(NamedTuple):
-    """Effect of a unit of an error: quadratic and cubic phase at the aperture edge, and spread phase. [rad/unit]
+    """Effect of one unit of a random error, as one sigma: phases, displacement, and their covariance.
 
-    `spread` is the rms of the phase left after the cubic. It is a mean power and includes no coverage factor. `east`
-    and `north` are the sigmas of the displacement [m/unit], NaN where the displacement is unknown, as for a free
-    oscillator. `covariance` (4, 4, ...) is the covariance of quadratic phase, cubic phase, and displacement east and
-    north, in the units of their products. It is None for the published model, which has only the sizes. `hidden` is
-    the quadratic phase of the loss that band and turn do not resolve, `ranges.exact_ranges`. [rad/unit] `rest` is the
-    phase that an error without noise, such as a bias, leaves beyond the cubic at one sigma. It spreads like the rest
-    of any error of motion. [rad/unit]
+    `quadratic` and `cubic` are the phases at the aperture edge. [rad/unit] `spread` is the rms phase beyond the
+    cubic. [rad/unit] It is a mean power and includes no coverage factor. `east` and `north` are the sigmas of the
+    displacement [m/unit]. They are NaN if the displacement is unknown, as for a free oscillator.
+
+    `covariance` (4, 4, ...) is the covariance of quadratic phase, cubic phase, and displacement east and north, in
+    the products of their units. It is None in the published model, which has only the sigmas. `hidden` is the
+    quadratic phase equivalent to the loss that band and turn of the line of sight do not resolve, see
+    `ranges.exact_ranges`. [rad/unit] `rest` is the phase beyond the cubic, at one sigma, of an error that is no
+    noise, such as a bias. It spreads like the rest of any error of motion. [rad/unit]
     """
 
     quadratic: Any
@@ -69,18 +71,18 @@ class RandomEffect(NamedTuple):
     rest: Any = 0.0
 
     def judged(self, gain: PerCase) -> PerCase:
-        """Phase that counts against a limit raised by the gain of autofocus: `Declared.judged`. [rad/unit]"""
+        """Phase that is compared with a limit raised by the gain of autofocus, see `Declared.judged`. [rad/unit]"""
         phase: PerCase = np.hypot(self.quadratic, gain * self.hidden)
         return phase
 
     @property
     def displacement(self) -> PerCase:
-        """Root-mean-square length of the displacement. [m/unit]"""
+        """Rms length of the displacement. [m/unit]"""
         length: PerCase = np.hypot(self.east, self.north)
         return length
 
     def of(self, case: int) -> "RandomEffect":
-        """The effect of one case in plain numbers; the covariance as (4, 4)."""
+        """Return the effect of one case in plain numbers, with a covariance (4, 4)."""
         covariance = self.covariance
         if covariance is not None:
             covariance = covariance[..., case if covariance.shape[-1] > 1 else 0]
@@ -89,7 +91,7 @@ class RandomEffect(NamedTuple):
         return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, beyond_cubic)
 
     def times(self, factor: PerCase) -> "RandomEffect":
-        """The same effect with phases and displacement multiplied by a coverage factor."""
+        """Multiply phases and displacement by a coverage factor. `spread` and `rest` stay as they are."""
         return RandomEffect(
             self.quadratic * factor,
             self.cubic * factor,
@@ -103,10 +105,12 @@ class RandomEffect(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """Motion of a platform by a random error: along each way and for each course, an independent size of 1 sigma.
+    """Motion of a platform by one sigma of a random error.
 
-    `ways` are (ways, 3, nodes or 1, cases) [m/unit]. `courses` are (courses, nodes, cases or 1), at the nodes of
-    `SensorCases.exact`. If an error has several `Moves`, the same way and course of each have the same random size.
+    Each combination of a direction in `ways` and a variation over the aperture in `courses` has an independent random
+    size of 1 sigma. `place` is the index of the platform. `ways` are (ways, 3, nodes or 1, cases) [m/unit]. `courses`
+    are (courses, nodes, cases or 1), at the nodes of `SensorCases.exact`. If an error has several `Moves`, the same
+    way and course of each have the same random size.
     """
 
     place: int
@@ -117,13 +121,15 @@ class Moves(NamedTuple):
 class RandomError(NamedTuple):
     """One error of a sensor, a clock or the air: its subject, its declared size and the effect of one unit.
 
-    `declared` is the largest of the axes, coverage factor included, and all axes grow with it. It is None where the
-    file declares no size. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `noise`
-    is the spectrum of an oscillator, for one case only. `spreads` tells noise from an error that changes within the
-    aperture by a few orders. `counted_in` is the id of a row whose error has this effect too, so that this error
-    counts nowhere else. `moves` is the motion of platforms by a unit, for the edge of a scene; it is empty for clocks
-    and the air. `continued` is the effect of the spectrum below the first point of an oscillator's mask, if the mask
-    does not reach far enough down. `is_in_doubt` marks the cases in which the spectrum of an oscillator differs from
+    `declared` is the largest size of all axes, coverage factor included. The sizes of all axes are proportional to
+    it. It is None if the file declares no size. The unit of an oscillator is `dB`, and its noise is declared as an
+    amplitude factor of 1. `noise` is the spectrum of an oscillator, for a single case only. `spreads` is true for
+    noise, and false for an error that changes within the aperture by a few orders only.
+
+    `counted_in` is the id of another row whose error already contains this effect, so this error counts nowhere else.
+    `moves` is the motion of platforms by one unit, used for the edge of a scene. It is empty for clocks and the air.
+    `continued` is the effect of the assumed spectrum below the first point of an oscillator's mask, if the mask does
+    not reach far enough down. `is_in_doubt` marks the cases in which the spectrum used for an oscillator differs from
     the spectrum that the file states.
     """
 
@@ -152,11 +158,14 @@ class RandomError(NamedTuple):
 
     @property
     def is_covered(self) -> bool:
-        """Whether the declared size or its effect includes the coverage factor: not for an effect from elsewhere."""
+        """Whether the declared size or its effect includes the coverage factor.
+
+        It does not for an error that is stated by its effect from elsewhere.
+        """
         return self.subject.kind != "other"
 
     def coverage(self, mission: Mission) -> PerCase:
-        """Coverage factor in the effect of the declared size."""
+        """Coverage factor that the effect of the declared size includes."""
         return mission.allocation.coverage_factor if self.is_covered else 1.0
 
     @property
@@ -166,16 +175,16 @@ class RandomError(NamedTuple):
 
     @property
     def displaces_unknown(self) -> PerCaseFlag:
-        """Cases in which the error displaces the image by an amount that the file leaves open."""
+        """Cases in which the error causes a displacement that the file does not determine."""
         return False if self.declared is None else (self.declared > 0) & np.isnan(self.full.displacement)
 
     def effect(self, model: str) -> RandomEffect:
-        """Effect of a unit by a model."""
+        """Effect of one unit in a model."""
         return self.full if model == "full" else self.published
 
 
 class SensorCases:
-    """Geometry and exact ranges of cases for sensors and clocks. Numbers are arrays (…, cases)."""
+    """Geometry and exact ranges of many cases, for the errors of sensors and clocks. Arrays are (…, cases)."""
 
     def __init__(self, mission: Mission, geometry: BistaticGeometry, cases: int) -> None:
         self.mission, self.geometry, self.cases = mission, geometry, cases
@@ -185,28 +194,28 @@ class SensorCases:
 
     @property
     def has_edge(self) -> bool:
-        """Whether effects at the edge of a scene are needed."""
+        """Whether the mission states a scene radius, so that effects at the edge of the scene are needed."""
         return self.mission.scene.radius is not None
 
     def vector(self, values: Sequence[PerCase]) -> Floats:
-        """Three numbers for each case, (3, cases)."""
+        """Vector with three components for each case, (3, cases)."""
         numbers = np.empty((3, self.cases))
         for row, value in zip(numbers, values, strict=True):
             row[:] = value
         return numbers
 
     def error(self, name: str) -> MotionError:
-        """The motion error of a platform."""
+        """Declared motion error of a platform."""
         motion_error: MotionError = getattr(self.mission.platforms, name).motion_error
         return motion_error
 
     def axes(self, name: str, frame: str = "") -> Floats:
-        """Axes of a platform's errors, or of another frame of it, (axes, 3, cases)."""
+        """Axes of the frame of a platform's errors, or of the given frame, (axes, 3, cases)."""
         path: PlatformState = getattr(self.geometry, name)
         return np.array([self.vector(axis) for axis in path.frame(frame or self.error(name).frame)])
 
     def along(self, name: str, directions: Floats) -> Floats:
-        """Root-sum-square of directions (axes, 3, cases) projected on the line of sight of mid-aperture."""
+        """Root-sum-square of the projections of directions (axes, 3, cases) on the mid-aperture line of sight."""
         look = self.vector(getattr(self.geometry, name).look)
         return np.asarray(np.sqrt(np.square((directions * look).sum(axis=1)).sum(axis=0)))
 
@@ -219,23 +228,30 @@ class SensorCases:
 
     @cached_property
     def weights(self) -> Floats:
-        """The weights of `effect_weights`."""
+        """Effects per metre of range error at each node, see `effect_weights`."""
         return effect_weights(self.exact)
 
     @cached_property
     def plane(self) -> ImagePlane:
-        """Q⁻¹ of the published model."""
+        """The matrix Q⁻¹ of the published model."""
         return published_planes(self.geometry)[0]
 
     def of_courses(self, courses: Floats, at_mid_aperture: Floats) -> tuple["RandomEffect", "RandomEffect"]:
-        """Effects by both models of independent range errors with one course each, for 1 sigma of a unit. [m/unit]
+        """Effects, in both models, of independent range errors that are constant in size, for 1 sigma of a unit.
+
+        Each range error varies over the aperture in a known way, and its size is random.
 
         Parameters
         ----------
         courses : (errors, nodes, cases)
-            Range errors with the line of sight as it turns, as the data contain them.
+            Range errors along the turning line of sight, as the data contain them. [m/unit]
         at_mid_aperture : (errors, nodes, cases)
-            Range errors with the line of sight held at mid-aperture, for the published model.
+            Range errors along the fixed line of sight of mid-aperture, for the published model. [m/unit]
+
+        Returns
+        -------
+        published, full : RandomEffect
+            Effect in the published and in the full model.
         """
         k, orders = self.exact.k, np.einsum("fn,enc->fec", self.exact.fit, at_mid_aperture)
         orders = np.where(
@@ -259,15 +275,14 @@ class SensorCases:
     def of_gauss_markov(
         self, courses: Floats, correlation_time: PerCase, *, is_phase_advanced: bool = False
     ) -> RandomEffect:
-        """Effect by the full model of independent range errors of variance 1 that change as Gauss–Markov processes.
+        """Effect, in the full model, of independent range errors that change as Gauss–Markov processes of variance 1.
 
         Parameters
         ----------
         courses : (errors, nodes, cases)
-            Range error by a unit of each process, with the line of sight as it turns, as the data contain it.
-            [m/unit]
+            Range error per unit of each process along the turning line of sight, as the data contain it. [m/unit]
         correlation_time : float or (cases,)
-            [s]
+            Correlation time of the processes. [s]
         is_phase_advanced : bool
             See `effects_of_gauss_markov`.
         """
@@ -277,7 +292,7 @@ class SensorCases:
         )
 
     def of_process(self, covariance: Floats, beyond: PerCase) -> RandomEffect:
-        """Effect, by the full model, of a random range error with a given covariance.
+        """Effect, in the full model, of a random range error with a given covariance.
 
         `covariance` (nodes, nodes, cases) and `beyond` (cases,) are arguments of `effects_of_process`. [m²]
         """
@@ -290,20 +305,23 @@ class SensorCases:
         return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
     def of_motion(self, platform_index: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
-        """Effects by both models of independent position errors of a platform, (errors, 3, nodes, cases). [m/unit]"""
+        """Effects, in both models, of independent position errors of a platform.
+
+        `moved` is (errors, 3, nodes, cases). [m/unit]
+        """
         look = self.vector(self.geometry.both[platform_index].look)
         return self.of_courses(self.range_errors(platform_index, moved), -np.einsum("ac,eanc->enc", look, moved))
 
     def range_errors(self, platform_index: int, moved: Floats) -> Floats:
-        """Range errors at the nodes by small position errors of a platform, (errors, 3, nodes or 1, cases). [m]"""
+        """Range errors at the nodes for small position errors of a platform, (errors, 3, nodes or 1, cases). [m]"""
         x, y, z = np.moveaxis(moved, 1, 0)
         return self.exact.along(platform_index, (x, y, z))
 
     def moved(self, constant: PerCase, linear: PerCase, both: PerCase = 0.0) -> tuple[PerCase, PerCase]:
-        """Sigmas of the displacement by (25). [m]
+        """Sigmas of the displacement east and north according to (25). [m]
 
-        `constant` and `linear` are mean squares of the two parts at the aperture edge; `both` is their mean product.
-        [m²]
+        `constant` and `linear` are the mean squares of these two parts of the range error at the aperture edge.
+        `both` is their mean product. [m²]
         """
         half = self.aperture_time / 2
         slope, product = linear / half**2, 2 * both / half
@@ -316,15 +334,18 @@ class SensorCases:
 
     @cached_property
     def orders(self) -> Floats:
-        """Orders 0 to 3 at the nodes over their values at the aperture edge, as in `LEGENDRE_LEADING`, (nodes, 4)."""
+        """Legendre orders 0 to 3 at the nodes, scaled to their leading term at the aperture edge, (nodes, 4).
+
+        The scale is that of `LEGENDRE_LEADING`.
+        """
         return orders_at(self.exact.sampling.places)
 
     def of_orders(self, covariance: Floats, along: PerCase = 1.0) -> tuple[Sequence[Floats], Floats]:
-        """`sigmas` of phases and displacement by orders 0 to 3 of independent range errors.
+        """Sigmas and covariance of phases and displacement, as in `sigmas`, by orders 0 to 3 of range errors.
 
-        `covariance` (4, 4, ...) is the covariance of each error at the aperture edge [m²]. `along` (errors, nodes,
-        cases) is the range change by a metre of the error. Higher orders defocus and displace only in second order of
-        a turning line of sight.
+        `covariance` (4, 4, ...) is the covariance of the orders of each independent error at the aperture edge. [m²]
+        `along` (errors, nodes, cases) is the range change per metre of the error. Higher orders defocus and displace
+        only by the second order of a turning line of sight.
         """
         covariance_of_cases = covariance if covariance.ndim == 3 else covariance[..., None]
         covariance_of_cases = np.broadcast_to(covariance_of_cases, (*covariance_of_cases.shape[:2], self.cases))
@@ -335,16 +356,20 @@ class SensorCases:
         return sigmas(total, np.einsum("ffc->fc", total))
 
     def courses(self, covariance: Floats) -> Floats:
-        """Independent courses that together have a covariance of these orders, (4, 4, ...); (4, nodes, ...)."""
+        """Independent variations over the aperture that together have a given covariance of orders 0 to 3.
+
+        `covariance` is (4, 4, ...). The result is (4, nodes, ...).
+        """
         of_orders = factor(np.moveaxis(covariance.reshape(4, 4, -1), 2, 0))
         return np.asarray(np.einsum("no,cof->fnc", self.orders, of_orders))
 
     def of_parts(self, noise: Parts, along: PerCase = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
-        """Effects by both models of a range error with these parts [m²], per metre of which the data have `along`.
+        """Effects, in both models, of an error whose variation over the aperture has the given parts. [m²]
 
-        `along` is (nodes, cases). Orders 0 to 3 defocus and displace, and the part beyond them spreads. Up to a turn
-        of 1 rad of a line of sight the result is right to 5 % and 0.5 dB. Over a full circle it is right too, with
-        two exceptions: for noise as steep as f⁻⁴ the spread is 1 dB off, and the location by free clocks is 8 % off
+        `along` (nodes, cases) is the range error in the data per metre of the error. Orders 0 to 3 defocus and
+        displace, and the part beyond them spreads. The result is accurate to 5 % and 0.5 dB for a line of sight that
+        turns by up to 1 rad. Over a full circle it has the same accuracy, with two exceptions: for noise as steep as
+        f⁻⁴ the spread is wrong by 1 dB, and the location error of free clocks is wrong by 8 %
         (`tests/effects/test_long_noise.py`).
         """
         k = 2 * math.pi / np.asarray(self.mission.radar.wavelength)
@@ -356,7 +381,10 @@ class SensorCases:
         return published, RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
     def alike(self, value: Value) -> Iterator[tuple[Value, Indices]]:
-        """Group the cases by the numbers in a value: the value of each group, and the indices of its cases."""
+        """Group the cases that have the same numbers in a value.
+
+        Yields the value of each group in plain numbers, and the indices of its cases.
+        """
         arrays = list(_arrays_in(value))
         if not arrays:
             yield value, np.arange(self.cases)
@@ -367,7 +395,11 @@ class SensorCases:
 
 
 def orders_at(slow_times: Floats) -> Floats:
-    """Orders 0 to 3 at slow times in half apertures, (times, 4), of size 1 at the aperture edge as in `Parts`."""
+    """Legendre orders 0 to 3 at slow times, (times, 4), scaled as in `Parts`.
+
+    The slow times are in units of half the aperture time. The scale gives the leading term of each order the size 1
+    at the aperture edge.
+    """
     return np.asarray(np.polynomial.legendre.legvander(slow_times, LEGENDRE_LEADING.size - 1) / LEGENDRE_LEADING)
 
 
@@ -380,7 +412,7 @@ def _arrays_in(value: object) -> Iterator[Floats]:
 
 
 def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
-    """The same value with numbers in place of its arrays."""
+    """Copy a value, with plain numbers in place of its arrays."""
     if isinstance(value, tuple):
         values = [_with_numbers(value_part, numbers) for value_part in value]
         return value._make(values) if hasattr(value, "_make") else tuple(values)
@@ -388,17 +420,21 @@ def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
 
 
 def parts_of_largest(values: Floats) -> tuple[Floats, Floats]:
-    """The largest of values (axes, cases), and each value over the largest; 1 where the largest is 0."""
+    """Largest of the values (axes, cases), and the ratio of each value to it.
+
+    The ratio is 1 where the largest value is 0.
+    """
     largest = values.max(axis=0)
     return largest, np.divide(values, largest, out=np.ones_like(values), where=largest > 0)
 
 
 def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]:
-    """Roots of the diagonal of a covariance (8, 8, cases) ordered like `SensorCases.weights`, and its first (4, 4).
+    """Sigmas of the effects, and covariance (4, 4, cases), from a covariance (8, 8, cases) of all effects.
 
-    The roots belong to quadratic and cubic phase, to east and north, and to the hidden phase, whose four parts add as
-    squares. Where terms cancel exactly, the remainder is rounding beside the squared magnitudes `sizes` (8, cases),
-    and would give a limit where none exists; it is set to 0.
+    The order of the effects is that of `SensorCases.weights`. The sigmas are those of quadratic phase, cubic phase,
+    displacement east and north, and hidden phase, which is the root-sum-square of its four parts. Where terms cancel
+    exactly, the remainder is rounding error, small compared with the squared magnitudes `sizes` (8, cases). It would
+    give a limit where none exists, so it is set to 0.
     """
     squares = np.einsum("ffc->fc", covariance)
     is_real = squares > _CANCELLED_SQUARE_FRACTION * sizes
@@ -408,7 +444,10 @@ def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]
 
 
 def factor(covariance: Floats) -> Floats:
-    """A matrix F with FFᵀ = C, (..., n, n), for a covariance that may be singular, and whose units may differ."""
+    """Factor F of a covariance C, with FFᵀ = C, (..., n, n).
+
+    The covariance may be singular, and its rows may have different units.
+    """
     sizes = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))[..., None]
     units = np.where(sizes > 0, sizes, 1.0)
     squares, ways = np.linalg.eigh(covariance / (units * np.swapaxes(units, -1, -2)))

@@ -1,8 +1,9 @@
-"""Every random error of sensors, clocks and the air that a mission names, in one case or in many.
+"""List of every random error of sensors, clocks and the air that a mission names, in one case or in many.
 
 The list also has the errors from elsewhere that the file states by their effect on the image: a cubic phase or a
-displacement. Neither has a sign, and a displacement has no direction: east and north each have half of its square. A
-quadratic phase, which has a sign, is listed in `sources`, and spread power in `analysis.spread`.
+displacement. Neither has a sign. A displacement has no direction either: the squares of its east and north component
+are each half of its square. A quadratic phase, which has a sign, is listed in `sources`, and spread power in
+`analysis.spread`.
 """
 
 import math
@@ -36,10 +37,11 @@ _UNIT_EFFECTS = {"cubic_phase_error": ("rad", _CUBIC_EFFECT), "location_error": 
 
 
 def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, cases: int = 1) -> list[RandomError]:
-    """List the errors of sensors, clocks and the air that a mission names, in a fixed order; empty for most missions.
+    """List the errors of sensors, clocks and the air that a mission names, in a fixed order.
 
-    For a platform with an inertial sensor every figure is listed, declared or not; for a platform with a lever arm
-    the attitude is listed. `geometry` is the geometry of many cases. Without it all numbers are floats.
+    The list is empty for most missions. For a platform with an inertial sensor, all errors of the sensor are listed,
+    declared or not. For a platform with a lever arm, the attitude acting through the arm is listed. `geometry` is the
+    geometry of many cases. Without it all numbers are floats.
     """
     seen = SensorCases(mission, geometry or mission.geometry, cases)
     errors = [error for name in PLATFORMS for error in vibration_spectrum(seen, name)]
@@ -57,7 +59,7 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
 
 
 def _stated_effects(mission: Mission) -> Iterator[RandomError]:
-    """Cubic phases and displacements from elsewhere that the file states."""
+    """Errors from elsewhere that the file states by their cubic phase or displacement."""
     for index, stated in enumerate(mission.other_errors):
         for key, (unit, effect) in _UNIT_EFFECTS.items():
             size = getattr(stated, key)
@@ -69,7 +71,7 @@ def _stated_effects(mission: Mission) -> Iterator[RandomError]:
 
 
 def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomError:
-    """An error in plain numbers: the numbers of one case with its mission, and with the noise of an oscillator."""
+    """Return an error in plain numbers for one case, given that case's mission, with the noise of an oscillator."""
     published, full = error.published.of(case), error.full.of(case)
     noise = None
     if error.subject.kind == "oscillator" and not error.subject.axis:

@@ -1,17 +1,19 @@
-"""Random range errors along lines of sight that turn, and their effects on the image.
+"""Random range errors along turning lines of sight, and their effects on the image.
 
-The range error is a course over the aperture times a random size, as for a bias, or a process that changes within the
-aperture: noise of a position, a walk, a delay of the air. Each effect on the image, a phase or a displacement, is an
-integral of weight times range error. So its variance is a double integral of the covariance of the range error.
+The range error is either a known variation over the aperture times a random size, as for a bias, or a process that
+changes within the aperture: noise of a position, a random walk, a delay of the air. Each effect on the image, a phase
+or a displacement, is an integral of a weight times the range error. Its variance is therefore a double integral of
+the covariance of the range error.
 
-A process is resolved into as many Legendre orders as the nodes tell apart. The weights are smooth and see no higher
-orders: the higher orders spread. Within the resolved orders, the part beyond the cubic spreads too, together with the
-part that the displacement of the image adds along a line of sight that turns.
+A process is resolved into as many Legendre orders as the nodes can distinguish. The weights are smooth and contain no
+higher orders, so the higher orders only spread. Of the resolved orders, the part beyond the cubic spreads too,
+together with the part that the displacement of the image adds along a turning line of sight.
 
 A Gauss–Markov process has variance 1 and correlation exp(−|t|/τ_c) = 1 + (exp(−|t|/τ_c) − 1). The first term is a
-constant error. The second term departs from it, and vanishes for a long correlation time without rounding.
+constant error. The second term is the departure from it. It goes to zero for a long correlation time without rounding
+error.
 
-Derived here. Time series check it in `tests/effects/test_changing_air.py`; draws and direct sums check it in
+Derived here. Time series check it in `tests/effects/test_changing_air.py`; random draws and direct sums check it in
 `tests/effects/test_long_noise.py`.
 """
 
@@ -30,10 +32,11 @@ _NODES_PER_OCTAVE = 20  # resolve the correlation within an octave of lags to 1e
 
 
 class RangeEffects(NamedTuple):
-    """Effects of range errors: covariance (8, 8, cases) in the order of `effect_weights`, and mean square left. [m²]
+    """Effects of random range errors.
 
-    `sizes` (8, cases) are squares of sums of magnitudes. A rest of cancelling terms that is small beside them is
-    rounding.
+    `covariance` (8, 8, cases) is the covariance of the effects, in the order of `effect_weights`. `left` (cases,) is
+    the mean square of the range error beyond the cubic. [m²] `sizes` (8, cases) are squares of sums of magnitudes. A
+    variance that is very small compared with them is a rounding error of terms that cancel.
     """
 
     covariance: Floats
@@ -42,15 +45,19 @@ class RangeEffects(NamedTuple):
 
 
 def effect_weights(exact: ExactRanges) -> Floats:
-    """Effects of a metre of range error at each node, (8, nodes, cases).
+    """Effects per metre of range error at each node, (8, nodes, cases).
 
-    Quadratic and cubic phase [rad], displacement east and north [m], and four parts of the hidden phase. [rad]
+    The effects are quadratic and cubic phase [rad], displacement east and north [m], and four parts of the hidden
+    phase. [rad]
     """
     return np.array((*exact.phase_weights, *exact.place_weights, *exact.hidden_weights))
 
 
 def effects_of_courses(exact: ExactRanges, weights: Floats, courses: Floats) -> RangeEffects:
-    """Effects of independent errors of variance 1, with one course each, (errors, nodes, cases). [m]"""
+    """Effects of independent range errors that have a known variation over the aperture and a random size.
+
+    `courses` (errors, nodes, cases) are the range errors at 1 sigma. [m]
+    """
     weighted = weights[:, None] * courses
     effects = weighted.sum(axis=2)
     sizes = np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
@@ -60,7 +67,7 @@ def effects_of_courses(exact: ExactRanges, weights: Floats, courses: Floats) -> 
 
 
 def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, beyond: PerCase) -> RangeEffects:
-    """Effects of a process.
+    """Effects of a random process of the range error.
 
     Parameters
     ----------
@@ -69,7 +76,7 @@ def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, 
     weights : (8, nodes, cases)
         The weights of `effect_weights`.
     covariance : (nodes, nodes, cases)
-        Covariance of the range error between the nodes, in the Legendre orders that the nodes tell apart. [m²]
+        Covariance of the range error between the nodes, in the Legendre orders that the nodes can distinguish. [m²]
     beyond : (cases,)
         Mean square of the range error in higher orders, which spread. [m²]
     """
@@ -90,19 +97,19 @@ def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, 
 def effects_of_gauss_markov(
     exact: ExactRanges, weights: Floats, courses: Floats, ratio: Floats, *, is_phase_advanced: bool
 ) -> RangeEffects:
-    """Effects of independent Gauss–Markov processes.
+    """Effects of independent Gauss–Markov processes of the range error.
 
     Parameters
     ----------
     exact, weights
         As for `effects_of_process`.
     courses : (errors, nodes, cases)
-        Range error by a unit of each process; for a delay, the range error of the group. [m]
+        Range error per unit of each process. For a delay it is the range error of the group. [m]
     ratio : (cases,)
-        Half the aperture time over the correlation time.
+        Half the aperture time divided by the correlation time.
     is_phase_advanced : bool
-        Whether the phase has the opposite sign of the group, as free electrons make it. Then the mean counts as in
-        the group, and everything else with the opposite sign.
+        Whether the phase error has the opposite sign of the group delay, as for free electrons. The mean over the
+        aperture then counts with the sign of the group, and everything else with the opposite sign.
     """
     ratios, ratio_index = np.unique(np.broadcast_to(ratio, exact.half.shape), return_inverse=True)
     departure = departure_at_nodes(len(exact.times), ratios)[..., ratio_index.ravel()]
@@ -122,16 +129,17 @@ def effects_of_gauss_markov(
 
 
 def departure_at_nodes(count: int, ratios: Floats) -> Floats:
-    """The correlation exp(−|t|/τ_c) − 1 between nodes, by as many Legendre orders as the nodes tell apart.
+    """The correlation exp(−|t|/τ_c) − 1 between nodes, in the Legendre orders that the nodes can distinguish.
 
-    The correlation has a bend at lag 0, which nodes would miss. Smooth weights see no higher orders than these.
+    The correlation has a kink at lag 0, which a plain evaluation at the nodes would miss. Smooth weights contain no
+    higher orders than these.
 
     Parameters
     ----------
     count : int
         Number of Gauss–Legendre nodes.
     ratios : (cases,)
-        Half the aperture time over the correlation time.
+        Half the aperture time divided by the correlation time.
 
     Returns
     -------
@@ -147,9 +155,10 @@ def departure_at_nodes(count: int, ratios: Floats) -> Floats:
 
 @cache
 def _lagged(count: int) -> tuple[Floats, Floats]:
-    """Lags u over 0 … 2, in half apertures, and ∫P_m(s)·P_n(s + u) ds for both signs of the lag, weighted for a sum.
+    """Lags u from 0 to 2, in half apertures, and the quadrature weights times ∫P_m(s)·P_n(s + u) ds at each lag.
 
-    Lags are denser towards 0, octave by octave, and so resolve correlation times of any length.
+    The integrals are added for both signs of the lag. Each octave of lags has the same number of nodes. They
+    therefore become denser towards 0, and resolve correlation times of any length.
     """
     x, w = np.polynomial.legendre.leggauss(_NODES_PER_OCTAVE)
     edges = np.concatenate(([0.0], 2.0 ** np.arange(1 - _LAG_OCTAVE_COUNT, 2)))

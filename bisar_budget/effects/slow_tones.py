@@ -1,14 +1,17 @@
-"""Vibrations below three cycles per aperture: their phases by exact ranges, in the worst phase of the motion.
+"""Vibrations below three cycles per aperture: their phases by exact ranges, for the worst phase of the motion.
 
-A vibration moves its platform by A·cos(2πfτ + ψ) along an axis, and its phase ψ is unknown. Its effects are computed
-for phases all around the circle, and the worst phase counts. The effects of a small vibration follow from a cosine
-and a sine; where the second order matters, the image point of exact ranges gives them. The line of sight turns
-meanwhile. So motion along the track counts too, and the image is displaced, which also defocuses. The squares of the
-resulting phases run over ψ as harmonics, for a small vibration as the second harmonic alone, so a few phases give the
-largest square. The axes may vibrate in any phase: their effects add.
+A vibration moves its platform by A·cos(2πfτ + ψ) along an axis, and its phase ψ is unknown. The effects are computed
+for values of ψ all around the circle, and the largest effect counts. The effects of a small vibration follow from
+those of a cosine and a sine. Where the second order matters, they follow from the image point of exact ranges. Since
+the line of sight turns, motion along the track also counts. The vibration also displaces the image, and this
+displacement adds phases.
 
-A vibration that the file states along the line of sight moves along the line of sight as it turns, and is all range
-error. Derived here; exact ranges in 36 phases check it (`tests/effects/test_slow_tones.py`).
+As a function of ψ, the squares of the resulting phases are a sum of harmonics; for a small vibration only the second
+harmonic occurs. A few values of ψ are therefore enough to find the largest square. The axes may vibrate in any phase,
+so their effects add.
+
+A vibration that the file states along the line of sight moves along the line of sight as it turns, and is entirely
+range error. Derived here. Exact ranges in 36 phases check it (`tests/effects/test_slow_tones.py`).
 """
 
 import math
@@ -46,7 +49,7 @@ MAX_LANE_COUNT = 1 << 12  # lanes in one search
 
 @dataclass(frozen=True, eq=False)
 class TonePhases:
-    """Effects of a vibration, one axis at a time, in phases all around the circle.
+    """Effects of a vibration along each axis, for phases of the vibration all around the circle.
 
     Each field is an array (axes, TONE_PHASE_COUNT, cases): quadratic and cubic phase at the aperture edge, hidden
     phase, and rms beyond the cubic. [rad]
@@ -58,39 +61,40 @@ class TonePhases:
     rests: Floats
 
     def axes(self) -> list["TonePhases"]:
-        """The phases of each axis alone."""
+        """Effects of each axis as a separate `TonePhases`."""
         phases = (self.quadratics, self.cubics, self.hiddens, self.rests)
         return [TonePhases(*(phase[[axis]] for phase in phases)) for axis in range(len(self.quadratics))]
 
     @cached_property
     def quadratic(self) -> Floats:
-        """Quadratic phase in the worst phases, (cases,). [rad]"""
+        """Quadratic phase for the worst phase of each axis, (cases,). [rad]"""
         return _worst(np.square(self.quadratics))
 
     @cached_property
     def cubic(self) -> Floats:
-        """Cubic phase in the worst phases, (cases,). [rad]"""
+        """Cubic phase for the worst phase of each axis, (cases,). [rad]"""
         return _worst(np.square(self.cubics))
 
     @cached_property
     def rest(self) -> Floats:
-        """Rms beyond the cubic in the worst phases, (cases,). [rad]"""
+        """Rms beyond the cubic for the worst phase of each axis, (cases,). [rad]"""
         return _worst(np.square(self.rests))
 
     def judged(self, gain: PerCase) -> Floats:
-        """Phase that counts against a limit raised by the gain of autofocus: `Declared.judged`, (cases,). [rad]"""
+        """Phase compared with a limit raised by the gain of autofocus, see `Declared.judged`, (cases,). [rad]"""
         return _worst(np.square(self.quadratics) + np.square(gain * self.hiddens))
 
     def hidden(self, gain: PerCase) -> Floats:
-        """Hidden phase that, with the worst quadratic phase, gives the judged phase, (cases,). [rad]"""
+        """Hidden phase that, together with the worst quadratic phase, gives the judged phase, (cases,). [rad]"""
         return np.asarray(np.sqrt(np.maximum(self.judged(gain) ** 2 - self.quadratic**2, 0.0)) / gain)
 
 
 class SlowTone(NamedTuple):
-    """A vibration of a row: the effect of a metre of range that the data hear, and of the declared vibration.
+    """A declared vibration and its effects.
 
+    `per_metre` is the effect per metre of range error, and `declared` the effect of the declared vibration.
     `is_there` marks the cases in which it has fewer than three cycles per aperture. `hears_part` marks a vibration
-    along three axes or beside a direct path: the range has only a part of it.
+    along three axes or with a direct path, of which the range contains only a part.
     """
 
     subject: Subject
@@ -101,7 +105,7 @@ class SlowTone(NamedTuple):
 
 
 def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict[str, SlowTone]:
-    """Every declared vibration with fewer than three cycles per aperture in any case, by the id of its row."""
+    """Declared vibrations with fewer than three cycles per aperture in any case, by the ids of their rows."""
     T, is_heard, slow = mission.collection.aperture_time, mission.has_direct_path, dict[str, SlowTone]()
     exact: ExactRanges | None = None
     for platform_index, name in enumerate(PLATFORMS):
@@ -130,7 +134,7 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
 
 
 def slow_phases(mission: Mission, slow: Mapping[str, SlowTone], gain: PerCase) -> list[DeclaredPhase]:
-    """Phases of the vibrations below one cycle per aperture, which count with the phases of other errors."""
+    """Phases of the vibrations below one cycle per aperture, which are combined with those of other errors."""
     T, phases = mission.collection.aperture_time, []
     for row_id, tone in slow.items():
         line = getattr(mission.platforms, tone.subject.owner).motion_error.vibration.sinusoidal[
@@ -148,16 +152,16 @@ def slow_phases(mission: Mission, slow: Mapping[str, SlowTone], gain: PerCase) -
 
 
 class _Tone:
-    """A frequency of a platform's motion in many cases."""
+    """Sinusoidal motion of a platform at one frequency, in many cases."""
 
     def __init__(self, exact: ExactRanges, platform_index: int, frequency: PerCase) -> None:
         self.exact, self.platform_index = exact, platform_index
         self.angle = 2 * math.pi * frequency * exact.times
 
     def of_range(self, size: PerCase) -> Floats:
-        """Effects of a range error of an amplitude, a number or (nodes, cases), to first order. [m]
+        """First-order effects of a sinusoidal range error of amplitude `size`, (4, TONE_PHASE_COUNT, cases). [rad]
 
-        The fields of `TonePhases` in all phases, (4, TONE_PHASE_COUNT, cases). [rad]
+        The rows are the fields of `TonePhases`. `size` is a number or (nodes, cases). [m]
         """
         exact = self.exact
         range_error = np.array((np.cos(self.angle), -np.sin(self.angle))) * size
@@ -168,10 +172,11 @@ class _Tone:
         return np.array((quadratic, cubic, hidden, beyond_cubic))
 
     def of(self, way: Vectors, size: PerCase) -> Floats:
-        """Effects of a motion of `size` [m] along the direction `way`, in the fields and shape of `of_range`. [rad]
+        """Effects of a motion of amplitude `size` [m] along the direction `way`, (4, TONE_PHASE_COUNT, cases). [rad]
 
-        Each component of `way` is (cases,) or (nodes, cases). The effects are linear in `size`, except in cases where
-        the second order matters: exact ranges give the effects of these cases.
+        Fields and shape are those of `of_range`. Each component of `way` is (cases,) or (nodes, cases). The effects
+        are linear in `size`, except in cases where the second order matters. Exact ranges give the effects in these
+        cases.
         """
         exact, cases = self.exact, self.exact.half.size
         small, size = (
@@ -192,9 +197,10 @@ class _Tone:
         return small
 
     def _of_large(self, way: Vectors, size: Floats, cases: Indices) -> Floats:
-        """The effects in some cases by exact ranges.
+        """Effects by exact ranges in some of the cases.
 
-        Where no ground point has the range history of a phase, the phase of the whole motion replaces each effect.
+        If no ground point has the range history for a phase of the vibration, the phase of the whole motion replaces
+        each effect.
         """
         case, turned = np.repeat(cases, TONE_PHASE_COUNT), np.tile(TONE_PHASES_RAD, cases.size)
         angle = self.angle[:, case] if self.angle.shape[1] > 1 else self.angle
@@ -212,7 +218,10 @@ def _of_case(component: PerCase, case: Indices) -> PerCase:
 
 
 def _worst(squares: Floats) -> Floats:
-    """Sum over axes of the roots of the largest squares around a circle, from (axes, TONE_PHASE_COUNT, cases)."""
+    """Sum over the axes of the root of the largest square around the circle, (cases,).
+
+    `squares` are (axes, TONE_PHASE_COUNT, cases).
+    """
     steps = TONE_PHASE_COUNT * VALUES_PER_PHASE
     around = np.fft.irfft(np.fft.rfft(squares, axis=1), steps, axis=1) * VALUES_PER_PHASE
     return np.asarray(np.sqrt(np.maximum(around.max(axis=1), 0.0)).sum(axis=0))

@@ -1,7 +1,7 @@
-"""Every error a mission can have, in one case or in many.
+"""List of every error a mission can have, in one case or in many.
 
-A check lists all of them, with the errors that the file does not declare, because a designer wants their allowable
-sizes. A sweep lists the declared errors, and the errors whose rows are asked for.
+A check lists all errors, including those that the file does not declare, because a designer wants to know their
+allowable sizes. A sweep lists only the declared errors, and the errors whose rows are requested.
 """
 
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
@@ -45,14 +45,17 @@ _FULL_UNIT = FullEffect(east=0.0, north=0.0, qpe=1.0, cubic=0.0)
 def exact_ranges(
     mission: Mission, geometry: BistaticGeometry, count: int | None = None, cases: int = 1
 ) -> ExactRanges:
-    """Exact ranges of a mission's cases at their scene centres, at `count` nodes or as many as the cases need."""
+    """Exact ranges of a mission's cases at their scene centres.
+
+    `count` is the number of nodes; None: as many as the cases need.
+    """
     T, is_heard = mission.collection.aperture_time, mission.has_direct_path
     count = count or int(nodes_for(geometry, T, has_direct_path=is_heard))
     return ExactRanges.of(geometry.both, mission.radar, T, count, cases, has_direct_path=is_heard)
 
 
 def distribution_of(mission: Mission, source: ErrorSource) -> str:
-    """Distribution of a declared error; a size that the file states without a distribution is a `bound`."""
+    """Distribution of a declared error. A size without a stated distribution is a `bound`."""
     if source.clock is not None:
         # A clock's values are one sigma: the coverage factor multiplies them.
         return "normal"
@@ -68,7 +71,7 @@ _published_motion: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.p
 
 
 class ErrorListing:
-    """The errors of cases of one mission, as their file states them. `DeclaredErrors` documents the parameters."""
+    """List of the errors of a mission's cases, as the file states them. See `DeclaredErrors` for the parameters."""
 
     def __init__(
         self, mission: Mission, geometry: BistaticGeometry, exact: ExactRanges, shown: Container[str] | None = None
@@ -78,7 +81,7 @@ class ErrorListing:
         self._legs: dict[tuple[int, str], tuple[list[Effect], list[FullEffect]]] = {}
 
     def listed(self) -> Iterator[ErrorSource]:
-        """Every position, velocity, acceleration, clock and other error, in the order of the contract."""
+        """Yield every position, velocity, acceleration, clock and other error, in the order of the contract."""
         for platform_index, name in enumerate(PLATFORMS):
             for kind, unit in MOTION_UNITS.items():
                 yield from self._of_motion(platform_index, name, kind, unit)
@@ -100,7 +103,10 @@ class ErrorListing:
         ]
 
     def legs(self, platform_index: int, kind: str) -> tuple[list[Effect], list[FullEffect]]:
-        """Effects of a unit of a kind of error of one platform along x, y, z, by Tables I and II and in full."""
+        """Effects of one unit of a kind of error of one platform along x, y and z, in both models.
+
+        The first result follows from Tables I and II, the second from the full model.
+        """
         if (platform_index, kind) not in self._legs:
             first = 3 * list(MOTION_UNITS).index(kind)
             published = [Effect._make(row) for row in self._published[platform_index][first : first + 3]]
@@ -112,7 +118,10 @@ class ErrorListing:
 
     @cached_property
     def _motions(self) -> list[Any]:
-        """Motion of each platform by unit errors of its state, (3, 3, 3, nodes, cases); None without free fall."""
+        """Motion of each platform by unit errors of its state, (3, 3, 3, nodes, cases).
+
+        None for a platform that is not in free fall.
+        """
         exact = self.exact
         return [
             path.fall and path.fall.motions(path, exact.half, exact.sampling.places) for path in self.geometry.both
@@ -121,24 +130,25 @@ class ErrorListing:
     def _flown(
         self, kind: str, directions: Mapping[int, Vectors], frame: str
     ) -> tuple[FullEffect, tuple[VectorArrays, VectorArrays], tuple[Vectors, Vectors] | None] | None:
-        """Effect of a unit of an error of platforms in free fall; None if no platform of the error is in free fall.
+        """Effect of one unit of an error whose platforms are in free fall.
 
-        A platform in free fall follows the dynamics of its orbit. The velocity of `ric` is that against the stars: a
-        position error without a velocity error turns with nothing. In all other frames it turns with the Earth.
+        None if none of the platforms that have the error is in free fall. In free fall the error follows the dynamics
+        of the orbit. In the frame `ric`, velocities are relative to the stars: a position error without a velocity
+        error does not rotate. In all other frames it rotates with the Earth.
 
         Parameters
         ----------
         kind : str
             Position, velocity or acceleration.
         directions : mapping of int to Vectors
-            Direction of the error of each platform that has it, by its index.
+            Direction of the error for the index of each platform that has it.
         frame : str
             Frame in which the file states the error.
 
         Returns
         -------
         full : FullEffect
-            Effect of a small unit.
+            Effect per unit of a small error.
         shifts : two of Vectors
             Motions at the nodes, (nodes, cases). [m]
         rates : two of Vectors, optional
@@ -236,7 +246,10 @@ class ErrorListing:
             )
 
     def _of_clock(self) -> Iterator[ErrorSource]:
-        """Terms of the clock error, which a direct path removes; errors left by setting the clocks; aging."""
+        """Errors of the clocks: terms of the clock error, errors left by setting the clocks, and aging.
+
+        A direct path removes the terms of the clock error.
+        """
         sync, is_heard = self.mission.synchronization, not self.mission.has_direct_path
         is_set = sync is not None and sync.is_holdover
         for power, (term, unit) in enumerate(CLOCK_UNITS.items()):
@@ -267,7 +280,10 @@ class ErrorListing:
         evidence: str | None = None,
         is_heard: bool = True,
     ) -> ErrorSource:
-        """An error of the clock whose unit has these terms t̃₀ … t̃₃. The published model always hears it."""
+        """Clock error whose unit has the coefficients t̃₀ … t̃₃ given by `terms`.
+
+        In the full model the error has no effect unless `is_heard`. The published model always includes it.
+        """
         clock = terms if is_heard else (0.0,) * 4
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
         rows = evaluators.published_clock(SPEED_OF_LIGHT_MPS, wavelength, T)
@@ -289,7 +305,10 @@ class ErrorListing:
         )
 
     def _of_setting(self) -> Iterator[ErrorSource]:
-        """Time and frequency errors that remain after the clocks are set; in holdover also undeclared errors."""
+        """Time and frequency errors that remain after the clocks are set.
+
+        In holdover they are listed even if they are not declared.
+        """
         sync = self.mission.synchronization
         if sync is None:
             return
@@ -315,7 +334,10 @@ class ErrorListing:
 
     @property
     def _delay_of_the_echo(self) -> tuple[PerCase, ...]:
-        """Terms of the delay of the echo after the direct path, which a wrong clock measures wrong. [s]"""
+        """Polynomial coefficients of the delay of the echo after the direct path. [s]
+
+        A frequency error of the clock causes an error in the measurement of this delay.
+        """
         exact = self.exact
         seconds = (sum(exact.ranges) - exact.baselines) / SPEED_OF_LIGHT_MPS
         powers = np.vander(exact.sampling.places, 4, increasing=True)
@@ -325,10 +347,10 @@ class ErrorListing:
         )
 
     def _of_aging(self, name: str) -> Iterator[ErrorSource]:
-        """Drift D of an oscillator's frequency since the clocks were set: a time error of D·(H + τ)²/2.
+        """Error by a frequency drift D of an oscillator since the clocks were set: a time error of D·(H + τ)²/2.
 
-        Without an age only the quadratic term is known, and the location is not judged. A link removes all of the
-        drift.
+        H is the age of the setting. Without an age, only the quadratic term is known, and the location is not judged.
+        A synchronization link removes all of the drift.
         """
         oscillator, sync = getattr(self.mission.platforms, name).oscillator, self.mission.synchronization
         if oscillator is None:
@@ -357,12 +379,12 @@ class ErrorListing:
         )
 
     def _of_both_platforms(self) -> Iterator[ErrorSource]:
-        """Errors that both platforms share: the effects of both legs add with their signs.
+        """Errors that both platforms share. The effects of both legs add with their signs.
 
-        A bias of one GNSS service moves both measured paths by the same vector, along the axes of the scene. Along
-        the axes of another frame it moves each path by the same components in the path's own axes. The range error,
-        and with it Table I and the full model, is linear in the errors: the common effect is the sum of the effects
-        of both platforms.
+        A bias of one GNSS service moves both measured paths by the same vector along the axes of the scene. Along the
+        axes of another frame it moves each path by the same components in the axes of that path. The range error is
+        linear in the errors, and so are Table I and the full model. The common effect is therefore the sum of the
+        effects of both platforms.
         """
         error = self.mission.common_motion_error
         if error is None:
@@ -411,16 +433,19 @@ class ErrorListing:
 
     @staticmethod
     def _of_both(legs: Sequence[Sequence[AnyEffect]], axis: int, ways: Sequence[Vectors] | None) -> AnyEffect:
-        """Effect of one error of both platforms along an axis of the scene, or along a way for each platform."""
+        """Effect of one error of both platforms.
+
+        It is along an axis of the scene, or along a given direction of each platform.
+        """
         if ways is None:
             return _sum([effects[axis] for effects in legs])
         return _sum([_along(effects, way) for effects, way in zip(legs, ways, strict=True)])
 
     def _of_time_tags(self) -> Iterator[ErrorSource]:
-        """Time of the navigation against the radar's: of each platform, and of one clock for both.
+        """Errors of the navigation's time relative to the radar's, for each platform, and for one clock of both.
 
-        The path is measured where the platform is a little later: the error is p(τ + δt) − p(τ). For a small tag it
-        is v(τ)·δt; for any other tag exact ranges take the path itself.
+        The position is measured a time δt too late, so the error is p(τ + δt) − p(τ). For a small δt it is v(τ)·δt.
+        Otherwise exact ranges use the path itself.
         """
         for platform_index, name in enumerate(PLATFORMS):
             error: MotionError = getattr(self.mission.platforms, name).motion_error
@@ -467,13 +492,16 @@ class ErrorListing:
         )
 
     def _velocities(self, path: PlatformState) -> Vectors:
-        """Velocity of a path at the nodes, (nodes, cases) each. [m/s]"""
+        """Velocity of a path at the nodes, three components (nodes, cases). [m/s]"""
         times = self.exact.times
         u, v, w = (np.broadcast_to(component, times.shape) for component in path.at(times)[1])
         return (u, v, w)
 
     def _of_terrain(self) -> Iterator[ErrorSource]:
-        """A scene higher than the processor assumes: both platforms are measured too high by as much."""
+        """Error of a scene that is higher than the processor assumes.
+
+        It has the effect of measuring both platforms too high by the same amount.
+        """
         height = self.mission.scene.height_error
         if height is None:
             return
@@ -513,7 +541,7 @@ class ErrorListing:
 
 @cache
 def _scene_axes(name: str, kind: str) -> tuple[tuple[Subject, KeyPath, str, Note], ...]:
-    """Texts of the errors along the axes of the scene, by axis.
+    """Texts for the rows of errors along the axes x, y and z of the scene.
 
     Each item has the row's subject, the key path in the file, the equation, and the reason for a missing limit.
     """
@@ -531,10 +559,10 @@ def _scene_axes(name: str, kind: str) -> tuple[tuple[Subject, KeyPath, str, Note
 def _along_scene_axis(
     declared: Sequence[PerCase], axes: tuple[Vectors, Vectors, Vectors], axis: int, distribution: str
 ) -> PerCase:
-    """Size along one axis of the scene of errors stated along the axes of another frame.
+    """Size, along one axis of the scene, of three errors that are stated along the axes of another frame.
 
-    The three errors are independent, so one-sigma values add as squares and bounds add as magnitudes: a signed
-    rotation would let them cancel. The sign is the sign of the signed rotation.
+    The three errors are independent, so one-sigma values add as squares and bounds add as magnitudes. A rotation of
+    the signed values would let them cancel. The sign is that of the rotated signed values.
     """
     a, b, c = (value * direction[axis] for value, direction in zip(declared, axes, strict=True))
     size = np.sqrt(a * a + b * b + c * c) if distribution == "normal" else np.abs(a) + np.abs(b) + np.abs(c)
@@ -542,19 +570,22 @@ def _along_scene_axis(
 
 
 def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[PerCase]) -> PerCase:
-    """Sigma of position or velocity error along a direction in the frame's axes: √(dᵀCd)."""
+    """Sigma of the position or velocity error along a direction in the frame's axes: √(dᵀCd)."""
     parts = [sigma * along for sigma, along in zip(covariance.of(kind), direction, strict=True)]
     return np.sqrt(squared(covariance.block(kind), parts))
 
 
 def _along(effects: Sequence[AnyEffect], direction: Vectors) -> AnyEffect:
-    """Effect of a unit error along a direction: the projection of the three scene effects."""
+    """Effect of a unit error along a direction, as the projection of the effects along the three scene axes."""
     terms = [[part * way for part, way in zip(parts, direction, strict=True)] for parts in zip(*effects, strict=True)]
     return type(effects[0])(*map(_total, terms))
 
 
 def _of_both_platforms(vectors: Mapping[int, AnyVector]) -> tuple[AnyVector, AnyVector]:
-    """Vectors of both platforms from the vectors of the platforms that have an error: the other's is not used."""
+    """Vectors of both platforms, given those of the platforms that have the error.
+
+    The vector of a platform without the error is not used.
+    """
     first = next(iter(vectors.values()))
     return vectors.get(0, first), vectors.get(1, first)
 
@@ -564,7 +595,7 @@ def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:
 
 
 def _total(terms: Sequence[PerCase]) -> PerCase:
-    """Sum of terms. Where terms cancel exactly, the rest is rounding and would give a false limit: it becomes 0."""
+    """Sum of terms. If the terms cancel exactly, the rounding error is set to 0, as it would give a false limit."""
     total = sum(terms)
     return np.where(np.abs(total) > VECTOR_ROUNDING_FRACTION * sum(np.abs(term) for term in terms), total, 0.0)
 
@@ -581,7 +612,7 @@ def _axis_of(frame: str, axis: str) -> str:
 
 
 def _no_limit(kind: str, axis: str) -> Note:
-    """Reason for the case that an error has no QPE limit."""
+    """Note on why an error has no QPE limit."""
     if kind == "position":
         return phrases.note("no-quadratic-term-of-position")
     cause = "velocity" if kind == "velocity" else "line of sight"

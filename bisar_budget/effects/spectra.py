@@ -1,10 +1,10 @@
-"""Phase noise over an aperture: spectra as pieces of power laws, and their integrals with a tone's parts.
+"""Phase noise over an aperture: spectra as pieces of power laws, integrated with the Legendre parts of a tone.
 
-Spectra are one-sided, for phase at the radar's centre frequency. [rad²/Hz] A data sheet's L(f) is half of such a
+Spectra are one-sided, for phase at the radar's centre frequency. [rad²/Hz] The L(f) of a data sheet is half of such a
 spectrum.
 
-In the angle x = πfT the edges of panels are the same for every aperture time T, and so is the integral of a power law
-between two edges. Only the ends of a piece are integrated separately.
+In the angle x = πfT the edges of the integration panels are the same for every aperture time T, and so is the
+integral of a power law between two edges. Only the ends of a piece are integrated separately.
 """
 
 import math
@@ -24,11 +24,14 @@ SERIES_ANGLE_RAD = 0.5  # angle, or ratio; below it terms cancel and a series is
 
 
 class Parts(NamedTuple):
-    """Mean squares of a phase over the aperture [rad²]: quadratic, cubic, and the rest after the cubic.
+    """Mean squares of the parts of a phase over the aperture. [rad²]
 
-    `constant` and `linear` are the mean squares of the constant and the linear part at the aperture edge, which
-    displace. `constant_quadratic` and `linear_cubic` are mean products of two parts. These four are infinite where
-    slow noise has no bound. A phase that was set before the aperture has the last three mean products too. In any
+    `quadratic` and `cubic` are the mean squares of these parts at the aperture edge. `left` is the mean square of the
+    phase beyond the cubic. `constant` and `linear` are the mean squares of the constant and the linear part at the
+    aperture edge, which displace the image. `constant_quadratic` and `linear_cubic` are mean products of two parts.
+    These last four are infinite where slow noise has no bound.
+
+    The last three mean products are nonzero only for the phase of a clock that was set before the aperture. In any
     other phase, even and odd orders are uncorrelated.
     """
 
@@ -45,7 +48,7 @@ class Parts(NamedTuple):
 
     @property
     def covariance(self) -> Floats:
-        """Covariance of the constant, linear, quadratic and cubic part at the aperture edge, (4, 4, ...)."""
+        """Covariance of the constant, linear, quadratic and cubic part at the aperture edge, (4, 4, ...). [rad²]"""
         zero = np.zeros(np.shape(self.quadratic))
         both, to_cubic, to_quadratic = (
             product + zero for product in (self.constant_linear, self.constant_cubic, self.linear_quadratic)
@@ -59,27 +62,27 @@ class Parts(NamedTuple):
 
     @property
     def rows(self) -> Floats:
-        """All parts, (parts, ...)."""
+        """All parts as one array, (parts, ...)."""
         return np.array(np.broadcast_arrays(*self))
 
     def times(self, power: PerCase) -> "Parts":
-        """Parts of a phase with `power` times the power."""
+        """Multiply all parts by the factor `power`."""
         return Parts(*(mean_square * power for mean_square in self))
 
     @property
     def of_high_orders(self) -> "Parts":
-        """Parts of the phase without its constant and linear part."""
+        """Parts of the same phase without its constant and linear part."""
         nothing = 0.0 * self.quadratic
         return Parts(self.quadratic, self.cubic, self.left, *(nothing,) * (len(self) - 3))
 
     def without_constant(self) -> "Parts":
-        """Parts of a phase whose constant part moves nothing."""
+        """Parts of the same phase without its constant part, for a phase whose constant does not displace."""
         nothing = 0.0 * self.quadratic
         return self._replace(constant=nothing, constant_quadratic=nothing)
 
 
 def gauss_markov(aperture_time: PerCase, correlation_time: PerCase) -> Parts:
-    """Parts of a stationary process of variance 1 and correlation exp(−|t|/τ_c)."""
+    """Parts of a stationary Gauss–Markov process with variance 1 and correlation exp(−|t|/τ_c)."""
     ratio = np.asarray(aperture_time / (2 * correlation_time))
     (slow,) = evaluators.gauss_markov_parts_slow(np.minimum(ratio, SERIES_ANGLE_RAD))
     fast = np.maximum(ratio, SERIES_ANGLE_RAD)
@@ -88,10 +91,10 @@ def gauss_markov(aperture_time: PerCase, correlation_time: PerCase) -> Parts:
 
 
 def tone(angle: PerCase) -> Floats:
-    """Amplitudes of the parts of a tone of amplitude 1, each in its worst phase, and the power share of the rest.
+    """Amplitudes of the parts of a tone of amplitude 1, each in its worst phase, and its power beyond the cubic.
 
-    `angle` is πfT. The rows are quadratic phase, cubic phase, the share of the tone's power beyond the cubic,
-    constant part and linear part.
+    `angle` is πfT. The rows are quadratic phase, cubic phase, fraction of the tone's power beyond the cubic, constant
+    part, and linear part.
     """
     angle = np.asarray(angle)
     slow = np.array(*evaluators.tone_parts_slow(np.minimum(angle, SERIES_ANGLE_RAD)))  # type: ignore[arg-type]
@@ -101,7 +104,10 @@ def tone(angle: PerCase) -> Floats:
 
 
 def held(step: PerCase) -> PerCase:
-    """Spectrum of samples joined by straight lines, over the spectrum of white noise of their variance: sinc⁴."""
+    """Spectrum of samples joined by straight lines relative to that of white noise with their variance: sinc⁴.
+
+    `step` is 2π times frequency times sampling interval.
+    """
     return np.sinc(step / (2 * math.pi)) ** 4
 
 
@@ -130,7 +136,10 @@ _MAX_PANEL_COUNT = 4096  # panels in one integration
 
 
 def _tone_edges(aperture_time: float) -> list[float]:
-    """Edges of frequency panels, rising; within a panel the parts of a tone are smooth in frequency. [Hz]"""
+    """Edges of the frequency panels, in rising order. [Hz]
+
+    Within a panel the parts of a tone are smooth functions of frequency.
+    """
     scale = math.pi * aperture_time
     edges = [_FIRST_POWER_ANGLE_RAD / scale * _OCTAVE_RATIO**n for n in range(4)]
     return edges + [math.pi * n / scale for n in range(1, _FOLLOWED_TURN_COUNT + 1)]
@@ -140,7 +149,7 @@ _EDGES = np.array(_tone_edges(1 / math.pi))  # angles
 
 
 class PowerLawPiece(NamedTuple):
-    """Part of a spectrum: density·f^(−slope) from `low` to `high`. [Hz]"""
+    """Piece of a spectrum: density·f^(−slope) [rad²/Hz] from `low` to `high`. [Hz]"""
 
     low: float
     high: float
@@ -148,11 +157,14 @@ class PowerLawPiece(NamedTuple):
     slope: float
 
     def at(self, f: PerCase) -> PerCase:
-        """Density of the power law at frequencies. [rad²/Hz]"""
+        """Density of the power law at the frequencies `f` [Hz], also outside the piece. [rad²/Hz]"""
         return self.density * f**-self.slope
 
     def integral(self, low: float, high: float) -> float:
-        """Integral of the spectrum between two frequencies; `low` may be zero where it converges."""
+        """Integral of the power law between two frequencies [Hz]. [rad²]
+
+        `low` may be zero if the integral converges.
+        """
         exponent = 1 - self.slope
         if abs(exponent) < 1e-9:
             return self.density * math.log(high / low)
@@ -160,7 +172,7 @@ class PowerLawPiece(NamedTuple):
 
 
 def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
-    """Density of a spectrum at frequencies [Hz]; 0 outside its pieces. [rad²/Hz]"""
+    """Density of a spectrum at frequencies [Hz]; 0 outside all pieces. [rad²/Hz]"""
     total = np.zeros_like(frequency)
     for piece in pieces:
         is_in = (piece.low <= frequency) & (frequency < piece.high)
@@ -169,16 +181,16 @@ def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
 
 
 def parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, above: PerCase = 0.0) -> Parts:
-    """Integrate a spectrum with the parts of a tone, to 1e-4.
+    """Integrate a spectrum weighted with the squared parts of a tone, accurate to 1e-4.
 
     Parameters
     ----------
     pieces : sequence of PowerLawPiece
         Pieces of a one-sided spectrum. [rad²/Hz]
     aperture_time : float or (cases,)
-        [s]
+        Aperture time. [s]
     above : float or (cases,)
-        Frequency from which on the spectrum counts. [Hz]
+        Frequency above which the spectrum counts. [Hz]
     """
     scale = math.pi * np.atleast_1d(aperture_time)
     total = np.zeros((_INTEGRAL_COUNT, *scale.shape))
@@ -190,19 +202,22 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, above: PerCas
 
 
 def left_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval: float | None) -> Parts:
-    """Parts over apertures (cases,) of a spectrum, or of its rest after pulses are exchanged every `interval`."""
+    """Parts over apertures (cases,) of a spectrum, or of what remains of it after synchronization.
+
+    `interval` is the interval of the exchanged pulses [s]; None: no synchronization.
+    """
     times, time_index = np.unique(aperture_time, return_inverse=True)
     parts_of_times = parts(pieces, times) if interval is None else synchronized_parts(pieces, times, interval)
     return Parts(*parts_of_times.rows[:, time_index])
 
 
 def _like(total: Floats, aperture_time: PerCase) -> Parts:
-    """Parts as numbers or as arrays, like the aperture times."""
+    """Convert the array of parts to `Parts` of numbers or of arrays, as `aperture_time` is."""
     return Parts(*total) if np.ndim(aperture_time) else Parts(*total[:, 0].tolist())
 
 
 def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of x^(−slope) between two angles."""
+    """Parts of a spectrum x^(−slope) between two angles."""
     first = np.searchsorted(_EDGES, low * _SAME_EDGE_RATIO, side="right")
     last = np.searchsorted(_EDGES, high / _SAME_EDGE_RATIO, side="left")
     has_edge = last > first
@@ -215,13 +230,16 @@ def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
 
 @lru_cache(maxsize=256)
 def _between_edges(slope: float) -> Floats:
-    """Parts of x^(−slope) from the first edge to each, (parts, edges)."""
+    """Parts of a spectrum x^(−slope) from the first edge to each edge, (parts, edges)."""
     panels = _power_panels(slope, _EDGES[:-1], _EDGES[1:])
     return np.concatenate((np.zeros((len(panels), 1)), np.cumsum(panels, axis=1)), axis=1)
 
 
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of a panel at the end of a piece, which may be slow or fast; 0 for a panel without length."""
+    """Parts of a power law within a panel at the end of a piece.
+
+    Slow and fast tones have their own formulas. The result is 0 for a panel without length.
+    """
     total = np.zeros((_INTEGRAL_COUNT, low.size))
     is_slow = high <= _FIRST_POWER_ANGLE_RAD * _SAME_EDGE_RATIO
     is_fast = (low >= _FAST / _SAME_EDGE_RATIO) & (high > low + _RESOLVED_TURN_COUNT * math.pi)
@@ -237,26 +255,26 @@ def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def _integral(exponent: float, low: Floats, high: Floats) -> Floats:
-    """Integral of x^exponent; infinite from zero on where the integral does not converge."""
+    """Integral of x^exponent between two angles; infinite if it starts at zero and does not converge."""
     power = exponent + 1
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(high / low) if abs(power) < 1e-9 else (high**power - low**power) / power)
 
 
 def _slow(slope: float, low: Floats, high: Floats) -> Floats:
-    """Tones so slow that their parts are their first powers: x²/2, x³/6, x⁸/99225, 1 and x."""
+    """Parts of a power law for slow tones, from their leading powers x²/2, x³/6, x⁸/99225, 1 and x."""
     powers = ((4, 4), (6, 36), (8, 99225), (0, 1), (2, 1), (2, -2), (4, -6))
     return np.array([_integral(power - slope, low, high) / divisor for power, divisor in powers])
 
 
 def _fast(slope: float, low: Floats, high: Floats) -> Floats:
-    """Tones so fast that terms turning with them are averaged."""
+    """Parts of a power law for fast tones, with the terms that oscillate with the tone averaged."""
     (means,) = evaluators.tone_parts_fast(*(_integral(-power - slope, low, high) for power in (0, 2, 4, 6, 8)))  # type: ignore[arg-type]
     return np.array(means)
 
 
 def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of x^(−slope) over panels (n,), by their nodes."""
+    """Parts of a spectrum x^(−slope) over panels (n,), by Gauss–Legendre quadrature."""
     span = np.log(high / low)
     x = low * np.exp(span * _LEGENDRE_NODES)
     power = x**-slope * x * span * _LEGENDRE_WEIGHTS
@@ -264,10 +282,11 @@ def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def squares(angle: Floats) -> Floats:
-    """Squares of a tone's parts, the power share of its rest, and products of parts, in the order of `Parts`.
+    """Squares of a tone's parts, its power beyond the cubic, and products of parts, in the order of `Parts`.
 
-    They are means of a tone of power 1, or the values of a tone of amplitude 1 with each part in the phase where the
-    part is largest. Order n of a tone turns by n quarters: orders that are two apart have opposite signs.
+    These are means for a tone of power 1. They are also the values for a tone of amplitude 1 in which each part has
+    its worst phase. The phase of order n is shifted by n quarter cycles, so orders that differ by two have opposite
+    signs.
     """
     quadratic, cubic, spread, constant, linear = tone(angle)
     both = -constant * quadratic, -linear * cubic
@@ -284,19 +303,21 @@ _GRID_AGES_CYCLES = np.concatenate(
 
 
 def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Floats, averaging: Floats) -> Parts:
-    """Integrate the part of a spectrum that a clock set before the aperture has, (cases,).
+    """Integrate a spectrum for the phase of a clock that was set before the aperture, (cases,).
 
-    A line fitted to the clock's phase over the averaging, `age` before mid-aperture, is subtracted. It leaves a tone
-    with A₀ = j₀(x) − e^(−iθ)·[j₀(y) + H·(6i/t_c)·j₁(y)] and A₁ = 3i·j₁(x) − (T/2)·e^(−iθ)·(6i/t_c)·j₁(y) of orders 0
-    and 1 at the aperture edge, x = πfT, y = πft_c, θ = 2πfH. Higher orders are those of the free clock. Derived here;
-    bounded for slopes to f⁻⁴. Beyond 24 cycles within the age, setting and aperture are uncorrelated.
+    Setting the clock subtracts a line that is fitted to the clock's phase over the averaging time, at an age H before
+    mid-aperture. With x = πfT, y = πft_c and θ = 2πfH, a tone then has order 0, A₀ = j₀(x) − e^(−iθ)·[j₀(y) +
+    H·(6i/t_c)·j₁(y)], and order 1, A₁ = 3i·j₁(x) − (T/2)·e^(−iθ)·(6i/t_c)·j₁(y), at the aperture edge. Higher orders
+    are those of the free clock. Derived here. The result is bounded for slopes to f⁻⁴. Above 24 cycles within the
+    age, the phases of setting and aperture count as uncorrelated.
 
     Parameters
     ----------
     pieces : sequence of PowerLawPiece
         Pieces of a one-sided spectrum. [rad²/Hz]
     aperture_time, age, averaging : (cases,)
-        T, H from the middle of the averaging to mid-aperture, at least (t_c + T)/2, and t_c. [s]
+        Aperture time T, age H, and averaging time t_c. The age runs from the middle of the averaging to mid-aperture,
+        and is at least (t_c + T)/2. [s]
     """
     beyond = _RESOLVED_AGE_CYCLES / age
     times, above = (aperture_time, aperture_time, averaging), (0.0 * beyond, beyond, beyond)
@@ -333,9 +354,10 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
 
 
 def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Floats) -> Iterator[Floats]:
-    """Mean squares and products of the orders of a tone of amplitude 1, less the line fitted to set the clock.
+    """Mean squares and products of the orders of a tone of amplitude 1, for a clock that was set.
 
-    Yields Re(A_m·A_n*), in the shape of `f` [Hz], for the pairs of orders mn = 00, 11, 01, 02, 03, 12, 13.
+    The line that was fitted to set the clock is subtracted. Yields Re(A_m·A_n*), in the shape of `f` [Hz], for the
+    pairs of orders mn = 00, 11, 01, 02, 03, 12, 13.
     """
     quadratic, cubic, _, constant, linear = tone(math.pi * f * aperture_time)
     *_, mean, slope = tone(math.pi * f * averaging)
@@ -355,14 +377,14 @@ _FOLLOWED_DELAY_CYCLES = 12  # turns of a tone within the delay up to which pane
 
 
 def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: PerCase) -> Parts:
-    """Integrate the difference of a clock's phase between two times, `delay` apart: S·4 sin²(πfΔt).
+    """Integrate the spectrum of the phase difference of a clock between two times: S·4 sin²(πfΔt).
 
     Parameters
     ----------
     pieces : sequence of PowerLawPiece
         Pieces of a one-sided spectrum. [rad²/Hz]
     aperture_time, delay : float or (cases,)
-        T and Δt. [s]
+        Aperture time T, and time Δt between the two times. [s]
     """
     times, delays = np.broadcast_arrays(np.atleast_1d(aperture_time), np.atleast_1d(delay))
     end = max((piece.high for piece in pieces), default=0.0)
@@ -383,12 +405,13 @@ def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: 
 
 # ---------------------------------------------------------------------- synchronisation
 def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, interval: float) -> Parts:
-    """Integrate the rest of a spectrum after synchronisation: the phase less the straight lines between its samples.
+    """Integrate the spectrum that remains after synchronization.
 
-    Straight lines pass sinc²(f·T_s) of a tone, and fold every tone at a distance of m/T_s onto it. They leave of a
-    spectrum S the spectrum S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines begin anywhere in the interval.
-    Pieces may be narrow or steep, and begin and end anywhere. The result is right to 1e-4, except for tones that turn
-    more than 24 times within the aperture: their phases are means over their turns.
+    The remaining phase is the phase less the straight lines between its samples. The lines contain sinc²(f·T_s) of a
+    tone's amplitude at its own frequency, and fold onto it every tone at a distance of m/T_s. A spectrum S becomes
+    S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines may begin at any instant within the interval. Pieces may
+    be narrow or steep, and may begin and end anywhere. The result is accurate to 1e-4, except for tones of more than
+    24 cycles within the aperture, whose parts are averaged over their cycles.
     """
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     scale = math.pi * times
@@ -404,7 +427,10 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, 
 
 
 def link_parts(aperture_time: PerCase, interval: float) -> Parts:
-    """Parts of samples of variance 1 with straight lines between: one-sided 2·T_s·sinc⁴(f·T_s), ⅔ in all."""
+    """Parts of samples of variance 1 that straight lines join, from their spectrum 2·T_s·sinc⁴(f·T_s).
+
+    The spectrum is one-sided. Its total power is ⅔.
+    """
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     edges = [_exchange_edges(T, rate) for T in times.tolist()]
     last = np.full(times.shape, _FOLLOWED_IMAGE_COUNT * rate)
@@ -420,7 +446,10 @@ def _over_panels(
     high: Floats,
     scale: Floats,
 ) -> Floats:
-    """Integrate a density, a function of frequencies and cases, with a tone's parts, from 0 Hz on between edges."""
+    """Integrate a density, weighted with the squared parts of a tone, over panels from 0 Hz on.
+
+    `density` is a function of frequencies and cases. `edges` are the edges of the panels of each case.
+    """
     panels = [
         (low, top, case)
         for case, (of_case, end) in enumerate(zip(edges, high.tolist(), strict=True))
@@ -438,7 +467,10 @@ def _over_panels(
 
 
 def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scale: Floats, times: float) -> None:
-    """Add `times` a spectrum beyond the last frequencies, where terms that turn with a tone are averaged."""
+    """Add the parts of a spectrum above the last frequencies, multiplied by `times`, to the total.
+
+    The terms that oscillate with a tone are averaged.
+    """
     for piece in pieces:
         to_angle = times * piece.density * scale ** (piece.slope - 1)
         low, high = np.maximum(piece.low, last) * scale, piece.high * scale
@@ -447,7 +479,7 @@ def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scal
 
 
 def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, scale: Floats) -> Floats:
-    """Parts of panels (n,)."""
+    """Parts of a density over panels (n,), by Gauss–Legendre quadrature."""
     is_first = low == 0
     span = np.log(high / np.where(is_first, high, low))
     f = np.where(is_first, high * _LEGENDRE_NODES, low * np.exp(span * _LEGENDRE_NODES))
@@ -461,7 +493,7 @@ def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, s
 
 
 def _unjoined(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats:
-    """Spectrum that straight lines between samples leave, at nodes of panels (nodes, n). [rad²/Hz]"""
+    """Spectrum that remains after synchronization, at the nodes of panels (nodes, n). [rad²/Hz]"""
     _, once, again = np.unique(f[0] + 1j * f[-1], return_index=True, return_inverse=True)  # cases share panels
     f = f[:, once]
     density_here, passed = density(pieces, f), np.sinc(f / rate) ** 2
@@ -476,10 +508,10 @@ def _unjoined(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats
 
 
 def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
-    """Sum of a piece at m·rate ± start, m = 1, 2 …; `start` is at most half a rate. [rad²/Hz]
+    """Sum of the density of a piece at m·rate ± start, for m = 1, 2 … [rad²/Hz]
 
-    Aliases where the power law bends within a rate are added one by one. The formula of Euler and Maclaurin gives the
-    sum of the farther aliases.
+    `start` is at most half the sampling rate. Aliases where the power law changes much within one rate are added one
+    by one. The Euler–Maclaurin formula gives the sum of all farther aliases.
     """
     far = math.ceil(_NEAR_ALIAS_COUNT + abs(piece.slope) / 2)
     first, end = max(1, math.floor(piece.low / rate)), min(far, math.ceil(piece.high / rate) + 1)
@@ -495,10 +527,11 @@ def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
 
 
 def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: float) -> list[PowerLawPiece]:
-    """Mean of the images beyond the images that are followed, (2/T_s³)·∫ S·sin⁴(πfT_s) df/(πf)⁴, as pieces.
+    """Mean spectrum of the images beyond those computed singly, (2/T_s³)·∫ S·sin⁴(πfT_s) df/(πf)⁴, as pieces.
 
-    They lie x rates from whole rates. By Euler and Maclaurin the mean lacks B₂(x) times the slope where the images
-    begin. Beginnings half a rate before and half a rate behind replace that term.
+    The images lie at x sampling rates from multiples of the rate. According to the Euler–Maclaurin formula, the mean
+    lacks the term B₂(x) times the slope at its lower end. Pieces that begin half a rate below and half a rate above
+    replace that term.
     """
     low, high = np.array(list(_panels(rate / 2, [rate / 4, *edges]))).T
     f = low + (high - low) * _LEGENDRE_NODES
@@ -514,10 +547,10 @@ def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: f
 
 
 def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) -> Floats:
-    """Sum of a power law at steps from `low` to `high`, both included, by Euler and Maclaurin. [rad²/Hz]
+    """Sum of a power law at steps from `low` to `high`, both included, by the Euler–Maclaurin formula. [rad²/Hz]
 
-    The sum is the integral over the step, plus half of both ends, plus B₂ₖ/(2k)!·step^(2k−1) times the difference of
-    odd derivatives between the ends: the first, the third and the fifth.
+    The sum is the integral divided by the step, plus half of the values at both ends, plus B₂ₖ/(2k)!·step^(2k−1)
+    times the difference of odd derivatives between the ends. The first, third and fifth derivative are used.
     """
     slope, density, derivatives = piece.slope, [], []
     for f in (low, high):
@@ -532,7 +565,10 @@ def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) 
 
 
 def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
-    """Frequencies between which a tone's parts, and the share that straight lines pass, are smooth. [Hz]"""
+    """Edges of frequency panels for synchronized phases. [Hz]
+
+    Within a panel, the parts of a tone and the share of a tone that straight lines contain are smooth.
+    """
     edges = [*_tone_edges(aperture_time), rate / 4, *(rate * n / 2 for n in range(1, 2 * _FOLLOWED_IMAGE_COUNT + 1))]
     octave = _FOLLOWED_TURN_COUNT / aperture_time
     while octave < rate / 4:
@@ -542,7 +578,10 @@ def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
 
 
 def _image_edges(ends: Sequence[float], rate: float) -> list[float]:
-    """Frequencies between which a spectrum with such ends, and its images, are smooth. [Hz]"""
+    """Edges of frequency panels for a spectrum whose pieces have the given ends, and for its images. [Hz]
+
+    Within a panel, the spectrum and its images are smooth.
+    """
     starts = {abs(end - round(end / rate) * rate) for end in ends}
     images = [
         abs(n * rate + sign * start) for start in starts for n in range(_FOLLOWED_IMAGE_COUNT + 1) for sign in (1, -1)
@@ -553,7 +592,7 @@ def _image_edges(ends: Sequence[float], rate: float) -> list[float]:
 
 
 def _ends(piece: PowerLawPiece) -> Iterator[float]:
-    """Ends of a piece, and frequencies at which a steep piece has fallen by a few powers of e. [Hz]"""
+    """Ends of a piece, and frequencies where a steep piece has fallen by a few powers of e. [Hz]"""
     yield from (piece.low, piece.high)
     if abs(piece.slope) > _STEEP_EXPONENT:
         dense = piece.low if piece.slope > 0 else piece.high
@@ -562,9 +601,10 @@ def _ends(piece: PowerLawPiece) -> Iterator[float]:
 
 
 def _panels(high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
-    """Neighbouring edges from 0 Hz on. Two computations of the same edge count as one edge.
+    """Pairs of neighbouring edges, from 0 Hz to `high`.
 
-    Between the two a tone would be folded on 0 Hz, where a spectrum has no value.
+    Two edges that differ only by rounding count as one. Between them, a tone would be folded onto 0 Hz, where a
+    spectrum has no value.
     """
     kept = [0.0]
     for edge in sorted(edges):

@@ -1,24 +1,25 @@
-"""Declared vibrations: their paired echoes, components along the line of sight, slow phases, and spectra.
+"""Declared vibrations: paired echoes, components along the line of sight, slow phases, and spectra.
 
-For a receiver that hears the transmitter the data hold ranges less the direct path. There a vibration counts by its
-change of this difference.
+For a receiver that uses the direct path as its clock, the data contain ranges less the direct path. A vibration then
+counts with its effect on this difference.
 
 A vibration of peak phase φ and n < 1 cycles per aperture makes no echoes. Its largest Legendre parts over the
-aperture are 5·j₂(πn)·φ and 7·j₃(πn)·φ; at the aperture edge the phases are 3/2 and 5/2 of these parts. Its sign and
-phase are unknown, so it counts like any other error: alone against a limit, and in sums and root-sum-squares.
+aperture are 5·j₂(πn)·φ and 7·j₃(πn)·φ; the phases at the aperture edge are 3/2 and 5/2 of these parts. Its sign and
+phase are unknown. It counts like any other error: alone against a limit, and in sums and root-sum-squares.
 
 A vibration of n > 1 cycles per aperture and peak phase φ makes echoes at n cells from the response. An echo has φ/2
-of the amplitude of the response and the same shape: for a uniform aperture sinc(x) = sin(πx)/(πx), whose sidelobes
-reach the next echo. The phases of vibrations are unknown. At a position x the worst case of several echoes is in
-phase, Σ φ_k/2·|sinc(x − n_k)|, and the position with the largest sum counts. Derived here; within 0.5 dB of
-transforms of the phasor in its worst phases, from three cycles per aperture on (`tests/effects/test_echoes.py`). The
-echoes at −n_k are left out: they add up to 0.3 dB at three cycles, and less beyond.
+of the amplitude of the response and the same shape. For a uniform aperture this is sinc(x) = sin(πx)/(πx), whose
+sidelobes reach the next echo. The phases of vibrations are unknown. In the worst case, several echoes add in phase at
+a position x, Σ φ_k/2·|sinc(x − n_k)|, and the position with the largest sum counts. Derived here. From three cycles
+per aperture on, this agrees within 0.5 dB with transforms of the phasor for the worst phases
+(`tests/effects/test_echoes.py`). The echoes at −n_k are left out; they add up to 0.3 dB at three cycles, and less
+beyond.
 
-A spectrum S_a of acceleration is a spectrum S_x = S_a/(2πf)⁴ of displacement. Its quadratic phase, cubic phase,
-spread and displacement are the integrals of `spectra`, so motion slower than the aperture counts as the phase that it
-is.
+A spectrum S_a of acceleration corresponds to the spectrum S_x = S_a/(2πf)⁴ of displacement. Its quadratic phase,
+cubic phase, spread and displacement are the integrals of `spectra`. Motion slower than the aperture is therefore
+included as the phase that it causes.
 
-Numbers of a mission may be arrays (cases,). The geometry then holds these cases; otherwise it is the mission's own.
+Numbers of a mission may be arrays (cases,). The geometry then has the same cases; otherwise it is the mission's own.
 """
 
 import math
@@ -59,17 +60,21 @@ _STEEP_PIECE_COUNT = 16  # flat pieces in place of a steep piece, which is narro
 
 # ---------------------------------------------------------------------- echoes that add
 class Worst(NamedTuple):
-    """Lines in their worst phases: the amplitude of one line with an echo as high, and the position of that echo."""
+    """Several tones in their worst phases.
+
+    `amplitude` is the amplitude of a single tone with an equally high echo, and `cycles` is the position of that
+    echo.
+    """
 
     amplitude: PerCase
     cycles: PerCase
 
 
 def near_groups(cycles: Floats) -> NDArray[np.intp]:
-    """Group lines, (n, cases), that follow each other within 2.5 cycles per aperture, two or more to a group.
+    """Group tones (n, cases) whose neighbours in frequency are within 2.5 cycles per aperture of each other.
 
-    Groups of a case are numbered from the lowest frequency on. A line outside all groups has -1, as has every line
-    slower than one cycle per aperture.
+    A group has two or more tones. The groups of a case are numbered in order of frequency. Tones outside all groups,
+    and tones below one cycle per aperture, have the number -1.
     """
     order = np.argsort(cycles, axis=0, kind="stable")
     placed = np.take_along_axis(cycles, order, axis=0)
@@ -84,7 +89,7 @@ def near_groups(cycles: Floats) -> NDArray[np.intp]:
 
 
 def near_lines(cycles: Sequence[float]) -> list[tuple[int, ...]]:
-    """Indices of the lines of each group of one mission, by frequency."""
+    """Indices of the tones in each group of one mission, in order of frequency."""
     if not cycles:
         return []
     number = near_groups(np.array(cycles)[:, None])[:, 0]
@@ -94,22 +99,23 @@ def near_lines(cycles: Sequence[float]) -> list[tuple[int, ...]]:
 def worst_phases(
     amplitudes: Sequence[PerCase] | Floats, cycles: Sequence[PerCase] | Floats, is_member: Booleans | None = None
 ) -> Worst:
-    """Find the height of the echoes of several lines together in their worst phases.
+    """Height of the echo of several tones together, in their worst phases.
 
     Parameters
     ----------
     amplitudes : (n,) or (n, cases)
-        0 to peak, in any unit.
+        Amplitudes, 0 to peak, in any unit.
     cycles : same shape
         Cycles per aperture.
     is_member : same shape, optional
-        Which lines count, at least one in each case; all lines if omitted.
+        Tones that count, at least one in each case; all tones if omitted.
 
     Returns
     -------
     Worst
-        Amplitude of one line whose echo is as high, in the unit of `amplitudes`. It is at least the largest
-        amplitude, and the sum of all amplitudes where all lines have one frequency.
+        Amplitude of a single tone with an equally high echo, in the unit of `amplitudes`, and position of the echo.
+        The amplitude is at least the largest amplitude. If all tones have one frequency, it is the sum of all
+        amplitudes.
     """
     sizes, frequencies = np.asarray(amplitudes, dtype=float), np.asarray(cycles, dtype=float)
     count, *shape = sizes.shape
@@ -142,7 +148,10 @@ def worst_phases(
 
 
 def _highest(sizes: Floats, frequencies: Floats, starts: Floats) -> Floats:
-    """Highest starts, each once, by the sum of the amplitudes of the lines within a cell of the start."""
+    """Starting points with the highest expected echo, without duplicates.
+
+    The points are ranked by the sum of the amplitudes of the tones within one cell of the point.
+    """
     summed = np.concatenate((np.zeros((1, sizes.shape[1])), np.cumsum(sizes, axis=0)))
     before, until = (_count(frequencies, starts, reach) for reach in (-1, 1))
     around = np.take_along_axis(summed, until, axis=0) - np.take_along_axis(summed, before, axis=0)
@@ -152,7 +161,10 @@ def _highest(sizes: Floats, frequencies: Floats, starts: Floats) -> Floats:
 
 
 def _count(frequencies: Floats, starts: Floats, reach: int) -> NDArray[np.intp]:
-    """Number of lines below each start less a cell, or up to each start plus a cell; both arrays are sorted."""
+    """Number of tones below each starting point less one cell, or up to each starting point plus one cell.
+
+    `reach` is -1 or 1, respectively. Both arrays are sorted.
+    """
     ends = starts + reach
     both = (frequencies, ends) if reach > 0 else (ends, frequencies)
     order = np.argsort(np.concatenate(both), axis=0, kind="stable")
@@ -163,7 +175,7 @@ def _count(frequencies: Floats, starts: Floats, reach: int) -> NDArray[np.intp]:
 
 
 def _searched(sizes: Floats, frequencies: Floats, starts: Floats) -> tuple[Floats, Floats]:
-    """Height and position of the highest echo at the starts and in steps around them."""
+    """Height and position of the highest echo, by a search in steps around each starting point."""
     best = starts
     for step in _SEARCH_STEPS_CELLS:
         tried = best + step * _REACH
@@ -176,7 +188,7 @@ def _searched(sizes: Floats, frequencies: Floats, starts: Floats) -> tuple[Float
 
 
 def _heights(sizes: Floats, frequencies: Floats, x: Floats) -> Floats:
-    """Height of all echoes together, in phase, at positions (…, cases)."""
+    """Height of the sum of all echoes in phase, at positions (…, cases)."""
     return np.asarray((sizes * np.abs(np.sinc(x[..., None, :] - frequencies))).sum(axis=-2))
 
 
@@ -184,7 +196,8 @@ def _heights(sizes: Floats, frequencies: Floats, x: Floats) -> Floats:
 class Line(NamedTuple):
     """One sinusoid: amplitude along the line of sight, 0 to peak [m], and frequency [Hz].
 
-    `per_metre` is the size of a metre of it in the unit of its row: (2πf)² where the file states its acceleration.
+    `per_metre` is the size of one metre in the unit of the sinusoid's row. It is (2πf)² if the file states the
+    acceleration.
     """
 
     amplitude: PerCase
@@ -193,7 +206,10 @@ class Line(NamedTuple):
 
 
 def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> Vectors:
-    """Range, or range less the direct path, that a metre of a platform's motion removes. [-]"""
+    """Sensitivity of the range to a platform's motion, as a vector: reduction of range per metre. [-]
+
+    With a direct path it is that of the range less the direct path.
+    """
     sights = (geometry or mission.geometry).sights(has_direct_path=mission.has_direct_path)
     return sights[PLATFORMS.index(name)]
 
@@ -201,10 +217,11 @@ def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = No
 def seen_of_axes(
     mission: Mission, name: str, *, is_vector: bool, geometry: BistaticGeometry | None = None
 ) -> list[PerCase]:
-    """Share of a metre along each axis of a platform's error that the range contains, rms over the aperture. [-]
+    """Part of a metre along each axis of a platform's error that the range contains, rms over the aperture. [-]
 
-    The line of sight turns. The rms bounds the height of every echo, and gives the spread. A vibration that is no
-    vector runs along the line of sight: the range contains all of it, and the range less the direct path a part.
+    The line of sight turns over the aperture. The rms is an upper bound for the height of every echo, and gives the
+    spread. A vibration that is no vector is along the line of sight. The range contains all of it, while the range
+    less the direct path contains a part.
     """
     geometry, is_heard = geometry or mission.geometry, mission.has_direct_path
     if not is_vector and not is_heard:
@@ -231,10 +248,10 @@ def counted(
     metric: str,
     geometry: BistaticGeometry | None = None,
 ) -> PerCase:
-    """Amplitude (`pslr`) or rms (`islr`) of a platform's vibration along the line of sight, by `seen_of_axes`. [m]
+    """Amplitude (`pslr`) or rms (`islr`) of a platform's vibration along the line of sight. [m]
 
-    Projections of amplitudes add, because the axes may vibrate in any phase. Rms values count as independent and add
-    as squares.
+    The projections follow from `seen_of_axes`. Projected amplitudes add, because the axes may vibrate in any phase.
+    Rms values are independent and add as squares.
     """
     sizes = value if isinstance(value, tuple) else (value,)
     seen = seen_of_axes(mission, name, is_vector=isinstance(value, tuple), geometry=geometry)
@@ -248,7 +265,7 @@ def counted(
 
 
 def lines_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> list[Line]:
-    """Sinusoids of one platform, along the line of sight."""
+    """Sinusoids of one platform, projected on the line of sight."""
     error: MotionError = getattr(mission.platforms, name).motion_error
     lines = error.vibration.sinusoidal
     return [
@@ -258,7 +275,7 @@ def lines_of(mission: Mission, name: str, geometry: BistaticGeometry | None = No
 
 
 def unit_of_line(mission: Mission, name: str, entry: int) -> str:
-    """Unit of the row of a sinusoid: the unit of acceleration where the file states the acceleration."""
+    """Unit of a sinusoid's row: m/s^2 if the file states its acceleration, m otherwise."""
     lines = getattr(mission.platforms, name).motion_error.vibration.sinusoidal
     return "m/s^2" if entry < len(lines) and isinstance(lines[entry], AcceleratedSinusoid) else "m"
 
@@ -266,10 +283,11 @@ def unit_of_line(mission: Mission, name: str, entry: int) -> str:
 def projected(
     mission: Mission, value: float | Vector, error: MotionError, along: float, *, is_slow: bool = False
 ) -> tuple[Note, ...]:
-    """Note on a vibration along three axes: its component along the line of sight; empty for any other vibration.
+    """Note on the component of a vibration along the line of sight; empty if the vibration is stated along it.
 
-    With a direct path the note gives, for either vibration, the component in the range less the direct path. A
-    vibration that `is_slow` has the same effect as its component.
+    With a direct path there is a note for every vibration, which gives the component in the range less the direct
+    path. For a slow vibration (`is_slow`) the note gives the component along the line of sight that has the same
+    effect.
     """
     says = phrases.does_as_much_as_along_the_sight if is_slow else phrases.seen_of_vibration
     if not isinstance(value, tuple):
@@ -284,26 +302,31 @@ def projected(
 
 # ---------------------------------------------------------------------- below one cycle per aperture
 def quadratic_part(cycles: PerCase) -> PerCase:
-    """Worst quadratic phase at the aperture edge of a sinusoid, over its peak phase: 7.5·j₂(π·cycles).
+    """Worst quadratic phase of a sinusoid at the aperture edge, relative to its peak phase: 7.5·j₂(π·cycles).
 
-    It is the least-squares quadratic of cos(πnx) over the aperture. Where n is small it is the Taylor term (πn)²/2.
+    It is the least-squares quadratic of cos(πnx) over the aperture, with n cycles. For small n it is the Taylor term
+    (πn)²/2.
     """
     phase: PerCase = np.abs(tone(math.pi * cycles)[0])
     return phase
 
 
 def cubic_part(cycles: PerCase) -> PerCase:
-    """Worst cubic phase at the aperture edge: 17.5·j₃(π·cycles), the least-squares cubic of sin(πnx)."""
+    """Worst cubic phase of a sinusoid at the aperture edge, relative to its peak phase: 17.5·j₃(π·cycles).
+
+    It is the least-squares cubic of sin(πnx) over the aperture, with n cycles.
+    """
     phase: PerCase = np.abs(tone(math.pi * cycles)[1])
     return phase
 
 
 class DeclaredPhase(NamedTuple):
-    """Phases of one declared error, which sums count: row id, owner, quadratic and cubic phase. [rad]
+    """Quadratic and cubic phase of one declared error, as used in sums. [rad]
 
-    A pure quadratic phase has no cubic phase: None. `is_there` marks the cases in which a vibration is slow; in all
-    other cases its phases are 0. `coverage` is the coverage factor in both phases. The `hidden` phase is the part of
-    a loss that band and turn do not resolve, and counts with the quadratic phase. [rad]
+    `cubic_rad` is None for a pure quadratic phase. `is_there` marks the cases in which a vibration is slow; in all
+    other cases its phases are 0. `coverage` is the coverage factor that both phases include. `hidden_rad` is the
+    quadratic phase equivalent to the loss that band and turn of the line of sight do not resolve, and counts with the
+    quadratic phase. [rad]
     """
 
     row_id: str
@@ -315,14 +338,15 @@ class DeclaredPhase(NamedTuple):
     hidden_rad: PerCase = 0.0
 
     def judged(self, gain: PerCase) -> PerCase:
-        """Magnitude of the phase that counts against a limit raised by autofocus' gain: `Declared.judged`. [rad]"""
+        """Magnitude of the phase compared with a limit raised by autofocus, see `Declared.judged`. [rad]"""
         return np.hypot(self.qpe_rad, gain * self.hidden_rad)
 
 
 def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
-    """Motion of a platform by each vibration below one cycle per aperture: along each axis, as cosine and as sine.
+    """Motion of a platform by each vibration below one cycle per aperture. [m]
 
-    A vibration stated along the line of sight moves along the line of sight of the scene centre. [m]
+    Each axis moves as a cosine and as a sine. A vibration stated along the line of sight moves along the line of
+    sight of the scene centre.
     """
     for name in PLATFORMS:
         for index, line in enumerate(seen.error(name).vibration.sinusoidal):
@@ -342,14 +366,15 @@ def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
 
 # ---------------------------------------------------------------------- by a spectrum
 def power_of(vibration: Vibration | FeltVibration) -> PerCase:
-    """Factor of power by which `spectrum_level` shifts a spectrum."""
+    """Power factor of `spectrum_level`, by which a spectrum is scaled."""
     return 1.0 if vibration.spectrum_level is None else 10 ** (np.asarray(vibration.spectrum_level) / 10)
 
 
 def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -> tuple[PowerLawPiece, ...]:
-    """A spectrum of acceleration [(m/s²)²/Hz] as pieces of power laws, times factor·f^(−slope) of a law.
+    """Convert a spectrum of acceleration [(m/s²)²/Hz] to pieces of power laws.
 
-    A spectrum of displacement enters as the spectrum of its acceleration, (2πf)⁴ times as large. Numbers only.
+    The spectrum is multiplied by `law`, factor·f^(−slope). A spectrum of displacement is first converted to that of
+    acceleration, which is (2πf)⁴ times as large. The spectrum must consist of plain numbers.
     """
     factor, slope = law
     if not spectrum.is_accelerated:
@@ -381,11 +406,11 @@ def spectrum_parts(
     interval: float | None = None,
     delay: PerCase | None = None,
 ) -> Parts:
-    """Parts over the aperture of a spectrum times a law, (cases,) each, see `spectrum_pieces`.
+    """Parts over the aperture of a spectrum multiplied by a law, (cases,) each, see `spectrum_pieces`.
 
-    `interval` is the interval of exchanged pulses: the parts are the rest after the exchanges. `delay` is the time
-    between two moments of which only the difference counts. Densities, intervals and delays may differ from case to
-    case.
+    `interval` is the interval of exchanged pulses; the parts are then those that remain after synchronization.
+    `delay` is the time between two moments; only the difference of the phase between them then counts. Densities,
+    intervals and delays may differ from case to case.
     """
     total = np.zeros((len(Parts._fields), seen.cases))
     for (of_group, exchanged), cases in seen.alike((spectrum, interval)):
@@ -399,7 +424,10 @@ def spectrum_parts(
 
 
 def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Vibration of a platform by its spectrum. Its unit is the unit of noise, a factor of amplitude, declared 1."""
+    """Error of a platform's vibration that is stated by a spectrum.
+
+    Its unit is that of noise: the declared size is an amplitude factor of 1.
+    """
     vibration = seen.error(name).vibration
     if vibration.spectrum is None:
         return
@@ -422,13 +450,13 @@ def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def displacement_rms(spectrum: Spectrum, power: float = 1.0) -> float:
-    """Root mean square of the displacement, all frequencies together. [m]"""
+    """Rms displacement of a vibration spectrum over all its frequencies. [m]"""
     pieces = spectrum_pieces(spectrum, DISPLACED)
     return math.sqrt(power * math.fsum(piece.integral(piece.low, piece.high) for piece in pieces))
 
 
 def pieces_of_vibration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
-    """Spectrum of a platform's vibration as phase along the line of sight, one way. [rad²/Hz]"""
+    """Phase spectrum of a platform's vibration along the line of sight, one way. [rad²/Hz]"""
     vibration = getattr(mission.platforms, name).motion_error.vibration
     k = 2 * math.pi / mission.radar.wavelength * float(counted(mission, name, 1.0, "islr"))
     factor, slope = DISPLACED

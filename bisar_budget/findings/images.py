@@ -1,7 +1,7 @@
-"""Findings of images, as frozen data: verdicts on limits, and the pictures behind them.
+"""Results of forming images, as frozen data: verdicts on the limits of rows, and pictures of the images.
 
-Field names of verdicts come from the JSON contract of `verify`. Pictures have the axes of the rotated image: x′ along
-the bistatic look direction φ_b, y′ across it, counter-clockwise.
+The field names of verdicts are those of the JSON contract of `verify`. Pictures have the axes of the rotated image:
+x′ is along the bistatic look direction φ_b, and y′ is across it, counter-clockwise.
 """
 
 from typing import NamedTuple
@@ -16,14 +16,15 @@ CHIP_FLOOR_DB = -40.0  # relative to the error-free peak: black in a chip
 
 
 class Verdict(NamedTuple):
-    """Verdict of the image on one limit. A value that does not exist is None; `reason` gives the reason.
+    """Verdict of the image on the limit of one row; values that do not exist are None.
 
-    Phases are magnitudes at the aperture edge [rad]: by Table II, by the full model's closed form, predicted from
-    exact ranges, and measured; `…_inside` and `…_beyond` are at 0.9 and 1.1 times the limit. Displacements are on the
-    ground (east, north) [m]: `displacement_m` by exact ranges, `…_published_m` by (25), `…_full_m` by the full
-    model. The smear azimuth is the direction of a line, from 0 to π; `…_published_rad` by (31). For vibration and
-    noise `measured_db` is compared with `requirement_db`; for noise it has a standard error and an interval at 95 %.
-    With autofocus the image is formed again at `boundary_autofocus` and refocused.
+    Phases are magnitudes at the aperture edge [rad]: `published_…` by Table II, `full_…` by the closed form of the
+    full model, `predicted_…` from exact ranges, and `measured_…` in the image. `…_inside` and `…_beyond` are measured
+    at 0.9 and 1.1 times the limit. Displacements are on the ground (east, north) [m]: `displacement_m` by exact
+    ranges, `…_published_m` by (25), and `…_full_m` by the full model. The smear azimuth is the direction of a line,
+    from 0 to π; `…_published_rad` is by (31). For vibration and noise `measured_db` is compared with
+    `requirement_db`; for noise it has a standard error and a 95 % interval. With autofocus a second image is formed
+    at the limit `boundary_autofocus`, and refocused. `reason` and `reason_autofocus` explain the verdicts.
     """
 
     id: str
@@ -65,9 +66,9 @@ class Verdict(NamedTuple):
 
     @property
     def judged_phases_rad(self) -> tuple[float | None, float | None]:
-        """The phase that the budget limits: predicted by exact ranges, and measured in the image. [rad]
+        """Phase that the budget limits, as predicted by exact ranges and as measured in the image. [rad]
 
-        The cubic phase if the row limits it, else the quadratic phase of equal loss.
+        It is the cubic phase if the row limits it, otherwise the quadratic phase with the same loss of the peak.
         """
         if self.measured_cubic_rad is not None:
             return self.predicted_cubic_rad, self.measured_cubic_rad
@@ -77,14 +78,14 @@ class Verdict(NamedTuple):
 
     @property
     def of_equal_loss(self) -> str:
-        """Words that name the judged phase if its quadratic part is less than 0.99."""
+        """Addition to the name of the judged phase, ` of equal loss`, if less than 0.99 of it is quadratic phase."""
         phase, quadratic = self.measured_equal_loss_qpe_rad, self.measured_qpe_rad
         is_more = self.measured_cubic_rad is None and phase is not None and (quadratic or 0.0) < 0.99 * phase
         return " of equal loss" if is_more else ""
 
 
 class VerifiedMission(NamedTuple):
-    """The verdicts on one mission's limits; `conditions` describes the images.
+    """Verdicts of images on the limits of one mission; `conditions` describes how the images were formed.
 
     `changes` are values that options put in place of the file's values. `overrides` are all influences from outside
     the file on the verdicts.
@@ -99,9 +100,10 @@ class VerifiedMission(NamedTuple):
 
     @property
     def status(self) -> str:
-        """`fail` if a limit of the gating model is optimistic, with or without autofocus.
+        """Status of the verification: `fail`, `not_evaluated` or `pass`.
 
-        `not_evaluated` if no limit got a verdict: nothing was verified, which is not a pass. Else `pass`.
+        `fail` if a limit of the gating model is optimistic, with or without autofocus. `not_evaluated` if no limit
+        has a verdict, because then nothing was verified. Otherwise `pass`.
         """
         verdicts = {row.verdict for row in self.rows} | {row.verdict_autofocus for row in self.rows}
         if "optimistic" in verdicts:
@@ -110,20 +112,20 @@ class VerifiedMission(NamedTuple):
 
     @property
     def doubt(self) -> Note:
-        """Note that no limit got a verdict; empty if any limit did."""
+        """Note that no limit has a verdict; empty if any limit has one."""
         if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
             return NOTHING
         return phrases.note("nothing-verified", rows=len(self.rows))
 
 
 class PointImage(NamedTuple):
-    """Image of the point with an error, its cut along y′, and the cut without error at the same place.
+    """Image of a point target with an error, its cut along y′, and the cut of the error-free image at the same place.
 
-    `chip` holds `columns` × `rows` bytes. Rows run from the largest y′ to the smallest, columns from the smallest x′
-    to the largest. The value 0 is `CHIP_FLOOR_DB` or less, 255 the peak without error. `pixel_m` are the steps of the
-    chip along x′ and y′. A pixel along y′ represents `thinned` samples; a resolution cell has as many samples along
-    y′ as along x′. The cuts are powers over the error-free peak [dB], `step_m` apart, with y′ = 0 at index
-    `len // 2`.
+    `chip` has `columns` × `rows` bytes. Rows run from the largest y′ to the smallest, columns from the smallest x′
+    to the largest. The value 0 is `CHIP_FLOOR_DB` or less, and 255 is the peak without error. `pixel_m` are the pixel
+    spacings along x′ and y′. A pixel along y′ represents `thinned` samples; a resolution cell has as many samples
+    along y′ as along x′. The cuts are powers relative to the error-free peak [dB]. Their samples are `step_m` apart,
+    and y′ = 0 is at index `len // 2`.
     """
 
     columns: int
@@ -142,7 +144,7 @@ class PointImage(NamedTuple):
 
 
 class ImageEvidence(NamedTuple):
-    """The images of one verdict: at the limit, and at the limit with autofocus, before and after autofocus."""
+    """Images behind one verdict: at the limit, and at the limit with autofocus before and after refocusing."""
 
     file: str
     verdict: Verdict

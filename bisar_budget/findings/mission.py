@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 class FileWarning(NamedTuple):
     """A warning about the mission file.
 
-    Most warnings change no verdict. A warning with `is_doubt` doubts the checked mission: the status is `warn` at
-    least. `is_of_options` marks the warning that names the options that changed the mission.
+    Most warnings do not change the verdict. A warning with `is_doubt` questions whether the checked mission is right,
+    so the status is at least `warn`. `is_of_options` marks the warning about options that changed the mission.
     """
 
     line: int | None
@@ -37,10 +37,10 @@ class FileWarning(NamedTuple):
 
 
 class MissionFindings(NamedTuple):
-    """Findings about one mission file that can be used.
+    """Findings of the check of one usable mission file.
 
-    `analysis` is the analysis of the check, for further computations. It is None if a run has many missions: a
-    thousand analyses would fill memory.
+    `analysis` is the analysis of the check, for further computations. It is None if a run has many missions, because
+    a thousand analyses would fill the memory.
     """
 
     analysis: "Analysis | None"
@@ -99,21 +99,21 @@ class MissionFindings(NamedTuple):
 
     @property
     def is_empty(self) -> bool:
-        """Whether the file declares no error: nothing was judged."""
+        """Whether the file declares no error, so that nothing was judged."""
         return all(row.status == "not_declared" or row.is_of_declare for row in self.rows)
 
     @property
     def status(self) -> str:
-        """Worst status of the mission."""
+        """Status of the mission: the worst of its `statuses`."""
         return worst(self.statuses)
 
     @property
     def statuses(self) -> frozenset[str]:
-        """Statuses of the rows, of the requirements and of doubts about the mission.
+        """All statuses of the mission: of its rows, of its requirements, and of doubts about it.
 
-        They include `not_evaluated` if nothing was judged, or if images were formed and no image gave a verdict. They
-        include `warn` if a warning doubts the checked mission. A strict run needs all statuses: a waived mission may
-        also have a warning.
+        `not_evaluated` is included if nothing was judged, or if images were required and none gave a verdict. `warn`
+        is included if a warning questions the checked mission. A strict run needs all statuses, because a waived
+        mission may also have a warning.
         """
         doubts = ["not_evaluated"] if self.is_unverified or self.is_empty else []
         doubts += ["warn" for warning in self.warnings if warning.is_doubt]
@@ -121,13 +121,13 @@ class MissionFindings(NamedTuple):
 
     @property
     def waived_by(self) -> tuple[AppliedWaiver, ...]:
-        """Waivers that cover rows or requirements, in the order of the file."""
+        """Valid waivers that cover rows or requirements of the mission, in the order of the file."""
         of_requirements = (waiver for one in self.requirements for waiver in one.waived_by)
         return in_order([*(waiver for row in self.rows for waiver in row.waived_by), *of_requirements])
 
     @property
     def summary(self) -> dict[str, int]:
-        """Number of rows of each status that occurs."""
+        """Number of rows with each status; statuses without a row are left out."""
         found: dict[str, int] = {}
         for row in self.rows:
             found[row.status] = found.get(row.status, 0) + 1
@@ -151,8 +151,8 @@ class UnusableMission(NamedTuple):
 class Report(NamedTuple):
     """The findings about all mission files of a run.
 
-    `options` are the options of the run that bear on it. `day` is the date that the user gave, or on which waivers
-    were judged; None if no verdict depends on the date.
+    `options` are the options of the run that affect its results. `day` is the date that the user gave, or on which
+    waivers were judged; None if no verdict depends on the date.
     """
 
     version: str

@@ -1,4 +1,4 @@
-"""Findings of the draws of a Monte Carlo."""
+"""Findings of a Monte Carlo, as frozen data."""
 
 from typing import NamedTuple
 
@@ -6,13 +6,14 @@ from bisar_budget.phrases import Note
 
 
 class Requirement(NamedTuple):
-    """How often one requirement holds.
+    """Result of the draws for one requirement: how often it is met.
 
-    `sum` and `rss` are the values that these rules of `allocation.combine` would compare with the limit, by the full
-    model with the coverage factor; None if a declared error leaves no image. `sigma_rss` is the standard uncertainty
-    by root-sum-square. `sigma` is the standard uncertainty of the draws with an image, None without such a draw. For
-    displacements both are rms lengths. `probability` comes from the draws, with the ends of its Wilson interval.
-    `probability_normal` comes from a normal distribution with `sigma_rss`. `dominant` is the error with the largest
+    `sum` and `rss` are the combined errors by these rules of `allocation.combine`, by the full model and with the
+    coverage factor; None if a declared error leaves no image. `sigma_rss` is the standard uncertainty by
+    root-sum-square. `sigma` is the standard uncertainty of the draws with an image, None without such a draw. For
+    displacements both are rms lengths. `probability` is the fraction of draws that meet the requirement;
+    `probability_low` and `probability_high` are the ends of its Wilson interval. `probability_normal` is the
+    probability for a normal distribution with the variances of the errors. `dominant` is the error with the largest
     share of the variance.
     """
 
@@ -33,10 +34,10 @@ class Requirement(NamedTuple):
 
 
 class MonteCarlo(NamedTuple):
-    """Result of the draws.
+    """Result of a Monte Carlo of one mission.
 
-    `probability` is the probability that all requirements hold at once; None without a requirement. `is_exact`: exact
-    ranges computed every draw, because the errors are too large for sums of effects.
+    `probability` is the probability that all requirements are met at once; None without a requirement. `is_exact`
+    tells whether every draw was computed by exact ranges, because the errors are too large for the linear model.
     """
 
     draws: int

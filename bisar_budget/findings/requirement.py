@@ -1,4 +1,4 @@
-"""The table of requirements: the limit of each, the value reached, and the row that decides."""
+"""The table of requirements: for each one its limit, the value that the mission reaches, and the deciding row."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -19,11 +19,12 @@ REQUIREMENT_NAMES = {
 
 @dataclass(frozen=True, kw_only=True)
 class DecidingShare:
-    """A share of a requirement that decides in place of the full requirement, in its unit, without gain.
+    """A share of a requirement that decides in place of the full requirement.
 
-    `owner` is the platform or the clock that has the share. It is `autofocus` if the pull-in range of autofocus
-    limits the sum of all phases, `scene` if the requirement limits the difference at the scene's edge, and `band` for
-    the phase of dispersion over the band.
+    `allowed` and `reached` are in the unit of the requirement, without the gain of autofocus. `owner` is the platform
+    or the clock that has the share. `owner` is `autofocus` if the pull-in range of autofocus limits the sum of all
+    phases, `scene` if the requirement limits the difference at the scene's edge, and `band` for the phase of
+    dispersion over the band.
     """
 
     owner: str
@@ -33,15 +34,17 @@ class DecidingShare:
 
 
 class JudgedRequirement(NamedTuple):
-    """A judged requirement of the mission. Numbers in SI, radians and decibel; None if a value does not exist.
+    """A requirement of the mission, with its verdict.
 
-    `value` and `allowed` are the requirement as the file, or the default, states it. `reached` is the total of the
-    mission, with `combine: each` the value of the largest row. `utilization` is the ratio of `reached` and `allowed`,
-    or the utilization of `share` if a share decides. `autofocus_gain` is the factor by which quadratic phases may
-    exceed the requirement and the platforms' shares with autofocus; None for requirements on anything else. `row` is
-    the row that decides the status, `use_row` the row with the utilization, and `rows` are all rows that judge the
-    requirement. `reason` says why the requirement cannot be judged, or why it is not met. `waivers` cover the
-    requirement or rows that judge it; empty unless it is waived. `is_unjudged`: it cannot be judged, waived or not.
+    Numbers are in SI, radians and decibel; None if a value does not exist. `value` and `allowed` are the requirement
+    as the file states it, or its default. `reached` is the total of the mission; with `combine: each` it is the value
+    of the largest row. `utilization` is the ratio of `reached` to `allowed`, or the utilization of `share` if a share
+    decides. `autofocus_gain` is the factor by which quadratic phases may exceed the requirement and the shares of the
+    platforms with autofocus; None for requirements on other quantities. `row` is the row that decides the status,
+    `use_row` is the row with the utilization, and `rows` are all rows that judge the requirement. `reason` tells why
+    the requirement cannot be judged, or why it is not met. `waivers` are the waivers that cover the requirement or
+    its rows; empty unless the requirement is waived. `is_unjudged` tells whether it cannot be judged, even if it is
+    waived.
     """
 
     key: str
@@ -74,18 +77,18 @@ class JudgedRequirement(NamedTuple):
 
     @property
     def id(self) -> str:
-        """Name of the requirement in waivers and reports: the id of the mission's own row, if there is such a row."""
+        """Id of the requirement in waivers and reports; the row for the whole mission, if any, has the same id."""
         return f"mission.{self.key}"
 
     @property
     def name(self) -> str:
-        """Name of the requirement in a sentence."""
+        """Name of the requirement for use in a sentence."""
         return REQUIREMENT_NAMES[self.key]
 
 
 @dataclass(frozen=True)
 class ShiftedFigure:
-    """Figures of a kind of error that the file shifts by a level from the values of their source."""
+    """Figures of one kind of error that the file shifts by a level, relative to the values of their source."""
 
     kind: str
     key: str
@@ -94,22 +97,22 @@ class ShiftedFigure:
 
     @property
     def level(self) -> str:
-        """The level in a sentence."""
+        """Text of the level, with its unit."""
         return f"{self.level_db:g} dB"
 
     @property
     def off(self) -> str:
-        """Words for the origin of the shift: the source of the figures."""
+        """Words for the source of the figures, from which the level shifts them."""
         if self.source is not None:
             return f"off {printable(self.source)}"
         return "off the file's own spectrum" if self.key.endswith("spectrum_level") else "off the data sheet"
 
 
 class DeclaredKinds(NamedTuple):
-    """Kinds of error that a mission can declare, by the names of `requirements.declare` with their owner.
+    """Kinds of error that a mission can declare, with the names of `requirements.declare` and their owners.
 
     `declared` and `missing` together are all kinds. `without_source` are the declared kinds that state no source.
-    `shifted` are the figures that a level shifts from their source.
+    `shifted` are the figures that a level shifts, relative to their source.
     """
 
     declared: tuple[str, ...] = ()
@@ -119,12 +122,12 @@ class DeclaredKinds(NamedTuple):
 
     @property
     def in_all(self) -> int:
-        """Number of all kinds."""
+        """Number of all kinds of error, declared or missing."""
         return len(self.declared) + len(self.missing)
 
 
 class Override(NamedTuple):
-    """An influence from outside the file on the verdict: its name, its value and its origin."""
+    """An influence on the verdict that is not in the mission file: its name, its value and its origin."""
 
     name: str
     value: str
@@ -132,7 +135,7 @@ class Override(NamedTuple):
 
 
 class Outside(NamedTuple):
-    """Influences on all missions of a run: options that the user gave, and the origin of the day for waivers."""
+    """Influences from outside the files on all missions of a run: options, and the origin of the day for waivers."""
 
     options: tuple[Override, ...] = ()
     day_origin: str = "the caller"

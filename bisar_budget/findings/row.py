@@ -1,4 +1,4 @@
-"""One row of a budget: its subject, its numbers, its status."""
+"""Rows of a budget, with their subject, numbers, status and waivers."""
 
 from collections.abc import Iterable, Sequence
 from datetime import date
@@ -17,10 +17,10 @@ SPECIFICATION = "specification"  # the metric of rows that compare declared erro
 
 
 class AppliedWaiver(NamedTuple):
-    """A waiver that names a failing row or requirement; expired if its last day is over.
+    """A waiver that names a failing row or requirement.
 
-    It has its line in the file, last day, reason, and `id` as written in the file. `place` is its index among the
-    file's waivers.
+    `line` is its line in the file, `until` is its last day, and `id` is written as in the file. `is_expired` tells
+    whether the last day is over. `place` is its index among the waivers of the file.
     """
 
     line: int | None
@@ -32,32 +32,33 @@ class AppliedWaiver(NamedTuple):
 
     @property
     def words(self) -> Note:
-        """The waiver in a sentence."""
+        """Note about the waiver, as a sentence."""
         return phrases.waived(self.line, self.until, self.reason, self.is_expired, self.id)
 
 
 def in_order(waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaiver, ...]:
-    """Each waiver once, in the order of the file."""
+    """Sort waivers in the order of the file, and remove duplicates."""
     return tuple(sorted(dict.fromkeys(waivers), key=lambda waiver: waiver.place))
 
 
 def holding(status: str, waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaiver, ...]:
-    """Valid waivers of a row or requirement with a status; empty if the status is not `waived`."""
+    """Select the waivers of a row or requirement that have not expired; empty if its status is not `waived`."""
     return tuple(waiver for waiver in waivers if not waiver.is_expired) if status == "waived" else ()
 
 
 class Row(NamedTuple):
-    """One line of the budget. Numbers in SI and radians; None if a value does not exist.
+    """One row of the budget.
 
-    `is_independent` marks the rows that sums count: errors as the file states them. Further rows repeat an error of
-    another frame along the scene's axes; sums do not count these rows. `qpe_exact_rad` is equal to `qpe_full_rad`,
-    which comes from exact ranges. `published_margin_db` is the margin of the published rule of a vibration to first
-    principles. `binding_requirement` is the requirement that sets `allowable`. `cubic_rad` is the magnitude of the
-    declared error's cubic phase at the aperture edge. `islr_db` is the ISLR that a declared random error adds.
-    `equal_loss_qpe_rad` is the quadratic phase with the same loss of the peak as `qpe_full_rad` together with the
-    phase that band and turn do not resolve. `rest_rad` is the rms phase beyond the cubic. `model` is the model that
-    gives these numbers. `waivers` name the row while it fails, valid or expired. `refuted` names the images that
-    refute the limit of the row.
+    Numbers are in SI and radians; None if a value does not exist. `is_independent` marks rows that are included in
+    sums: errors as the file states them. Other rows repeat an error of another frame along the scene's axes, and are
+    not included. `qpe_exact_rad` is equal to `qpe_full_rad`, which comes from exact ranges. `published_margin_db` is
+    the margin of the published rule for a vibration relative to first principles. `binding_requirement` is the
+    requirement that sets `allowable`. `cubic_rad` is the magnitude of the declared error's cubic phase at the
+    aperture edge. `islr_db` is the ISLR that a declared random error adds. `equal_loss_qpe_rad` is the quadratic
+    phase with the same loss of the peak as `qpe_full_rad` together with the phase that band and turn do not resolve.
+    `rest_rad` is the rms phase beyond the cubic. `model` is the model that gives these numbers. `waivers` are the
+    waivers, valid or expired, that name the row while it fails. `refuted` names the images that refute the limit of
+    the row.
     """
 
     subject: Subject
@@ -104,7 +105,7 @@ class Row(NamedTuple):
 
     @property
     def owner(self) -> str:
-        """Owner of the share that the row counts against: transmitter, receiver, clock or mission."""
+        """Owner of the share to which the row belongs: transmitter, receiver, clock or mission."""
         return self.subject.owner
 
     @property
@@ -127,29 +128,29 @@ class Row(NamedTuple):
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """All notes besides the reason."""
+        """All notes on the row except the reason for its status."""
         if not (self.waivers or self.refuted):
             return self.remarks
         return (*self.remarks, *(waiver.words for waiver in self.waivers), *self.refuted)
 
 
 def where_ids_are(file: str) -> str:
-    """The command that lists the ids of a mission's rows."""
+    """Words with the command that lists the ids of a mission's rows."""
     from shlex import quote
 
     return f"`bisar-budget check {quote(printable(file))} --all` lists them"
 
 
 def unknown_id(row_id: str, known: Iterable[str], file: str, of_what: str = "row") -> str:
-    """Sentence on an id that a mission does not have, with the command that lists the ids and the nearest id."""
+    """Message about an unknown id, with the command that lists the ids, and the most similar known id."""
     problem = f"no {of_what} has this id; {where_ids_are(file)}"
     return sentences(problem, did_you_mean(row_id, tuple(known)))
 
 
 def worst_first(rows: Sequence[Row]) -> list[Row]:
-    """Sort rows by status, then by utilization, the highest first; equal rows keep their order.
+    """Sort rows from worst to best, by status and then by utilization; equal rows keep their order.
 
-    A specification that is met comes after all rows that pass: an error may use its full specification.
+    A specification that is met comes after all other rows that pass, because an error may use its full specification.
     """
 
     def use(row: Row) -> float:

@@ -1,4 +1,4 @@
-"""The sheet of specifications that hold together: the values to order, and the errors that use each limit."""
+"""The sheet of specifications: values to order that together meet every requirement, and the errors in each limit."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 
 class Specification(NamedTuple):
-    """The largest size of one error, and the value to order.
+    """Specification of one error: its largest size, and the value to order.
 
-    `value` is the computed size, `ordered` the size rounded down, and `text` the ordered value as written in a file;
-    None and empty if no requirement limits the error. `found_text` is `value` in the same unit. `remark` explains the
-    number to a supplier. `declared` is the declared size in the file, the largest of three axes. `shares` are the
-    error's shares of each requirement, by the row of the requirement in which the error uses most. `parts` are the
-    parts of the catalogue that meet the ordered value.
+    `value` is the computed size, `ordered` is this size rounded down, and `text` is the ordered value as written in a
+    mission file. They are None and empty if no requirement limits the error. `found_text` is the text of `value` in
+    the same unit. `remark` explains the number to a supplier. `declared` is the declared size in the file, the
+    largest of three axes. `shares` has the share of the error in each requirement, in the row where it is largest.
+    `parts` are the parts of the catalogue that meet the ordered value.
     """
 
     key: str
@@ -35,7 +35,7 @@ class Specification(NamedTuple):
     remark: str = ""
 
     def holds(self, value: float | None) -> bool:
-        """Whether a size meets the specification. True without an ordered value, False without a declared size."""
+        """Whether a size meets the specification; True if no value is ordered, else False for a size of None."""
         if self.ordered is None:
             return True
         if value is None:
@@ -45,12 +45,12 @@ class Specification(NamedTuple):
 
 
 class RowUse(NamedTuple):
-    """Use of one row that can fail by the computed sizes.
+    """Utilization of one row with the computed sizes, and the shares of the errors in it.
 
-    `requirement` judges the row; None: the effect has no requirement and must stay negligible. `used` is the
-    utilization of the row, `allowed` its limit. `fixed` is the share of the limit that all errors without a
-    specification use, `shares` are the shares of the specified errors. `multiplier` is the price of the row: the
-    weight of each error is Σ multiplier·share over rows.
+    `requirement` is the requirement that judges the row; None if the effect has no requirement and must stay
+    negligible. `used` is the utilization of the row, and `allowed` is its limit. `fixed` is the share of the limit
+    that all errors without a specification use, and `shares` are the shares of the specified errors. `multiplier`
+    tells how strongly the row limits the sizes: the weight of each error is the sum of multiplier·share of all rows.
     """
 
     id: str
@@ -66,9 +66,10 @@ MIN_ROOM_FRACTION = 1e-6  # of a limit, that errors without a specification must
 
 
 class Broken(NamedTuple):
-    """A row in which errors without a specification leave no room, by its requirement, with their utilization.
+    """A row in which the errors without a specification leave no room for specified errors.
 
-    `used` is None if these errors leave no image.
+    `used` is the utilization by these errors; None if they leave no image. `requirement` is the requirement of the
+    row.
     """
 
     id: str
@@ -78,12 +79,12 @@ class Broken(NamedTuple):
 
 
 class SpecificationSheet(NamedTuple):
-    """Specifications of one mission that hold together.
+    """Specifications for the errors of one mission that together meet every requirement.
 
-    `status` is the status of the check with the ordered values in place, and `requirements` are the requirements as
-    judged by that check. `rows` are the rows that limit a specification. `broken` are the rows without room: with
-    such a row there are no values. `reserve` is the part of every limit that is kept free. `notes` name the
-    differences from the file. `findings` are the findings of the check.
+    `findings` are the findings of a check with the ordered values, `status` is its status, and `requirements` are the
+    requirements as judged by it. `rows` are the rows that limit a specification. `broken` are the rows without room;
+    if there is such a row, the specifications have no values. `reserve` is the fraction of every limit that is kept
+    free. `notes` name the differences from the mission file.
     """
 
     file: str
@@ -109,5 +110,5 @@ class SpecificationSheet(NamedTuple):
 
     @property
     def ordered(self) -> tuple[SetValue, ...]:
-        """The values to set in the mission file, so that `check` uses the ordered values."""
+        """Changes of the mission file with which `check` uses the ordered values."""
         return (*self.is_equal, *(SetValue(one.key, one.text) for one in self.specifications if one.text))

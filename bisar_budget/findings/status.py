@@ -1,6 +1,6 @@
-"""The statuses of rows, missions and runs: the verdicts that each gates, and its words in every format.
+"""The statuses of rows, missions and runs, with their effect on the verdict and their words in every format.
 
-A new status needs one line here, and the rule that gives it (`budget.judged_rows`).
+A new status needs one entry here, and a rule that assigns it (`budget.judged_rows`).
 """
 
 from collections.abc import Container, Iterable, Mapping
@@ -8,14 +8,15 @@ from typing import NamedTuple
 
 
 class Status(NamedTuple):
-    """One status, with a field for each format: no format has a list of statuses of its own.
+    """One status, with the fields that all formats need, so that no format has its own list of statuses.
 
-    `gates`: a mission can have the status. `fails` and `fails_strict`: the status breaks a run. `is_judged`: a number
-    was compared with a requirement, or could not be. `is_met`: the requirement is met. `is_explained`: the reason of
-    the status decides something. `sarif` and `github` are levels; empty: not a finding in that format. `junit` is the
-    outcome of a test case: failure, skipped, passed, or passed with a remark. `verdict` is the verdict on a mission
-    in a compliance report. `sgr` is the colour on a terminal (ECMA-48), `color` the colour on a page, and `symbol`
-    the mark before the status.
+    `gates` tells whether a mission can have the status. `fails` and `fails_strict` tell whether the status breaks a
+    run, or a strict run. `is_judged` tells whether a number was to be compared with a requirement, even if that was
+    not possible. `is_met` tells whether the requirement is met. `is_explained` tells whether the reason for the
+    status is decisive. `sarif` and `github` are levels of findings; if one is empty, the status is no finding in that
+    format. `junit` is the outcome of a test case: failure, skipped, passed, or passed with a remark. `verdict` is the
+    verdict on a mission in a compliance report. `sgr` is the colour on a terminal (ECMA-48), `color` is the colour on
+    a page, and `symbol` is the mark before the status.
     """
 
     name: str
@@ -38,12 +39,12 @@ class Status(NamedTuple):
 
     @property
     def is_held(self) -> bool:
-        """Whether a number was compared with a limit and decides: neither waived nor without a value."""
+        """Whether a number was compared with a limit, and the result counts: it is evaluated and not waived."""
         return self.is_judged and not self.junit_words
 
     @property
     def complies(self) -> bool:
-        """Whether everything was judged and is met, with or without warnings; a waiver meets no requirement."""
+        """Whether everything was judged and is met, with or without warnings; a waived status does not comply."""
         return self.is_held and not self.fails
 
 
@@ -99,17 +100,23 @@ STATUSES = tuple(sorted(STATUS, key=lambda name: not STATUS[name].gates))
 
 
 def worst(statuses: Iterable[str]) -> str:
-    """Return the worst of the statuses that gate; `pass` without such a status."""
+    """Return the worst of the statuses that a mission can have; `pass` if there is none of them."""
     return min((name for name in statuses if STATUS[name].gates), key=RANK.__getitem__, default="pass")
 
 
 def complying(counts: Mapping[str, int]) -> int:
-    """Number of missions that comply, from the number of missions of each status; waived missions do not comply."""
+    """Number of missions that comply; `counts` has the number of missions with each status.
+
+    Waived missions do not comply.
+    """
     return sum(count for name, count in counts.items() if STATUS[name].complies)
 
 
 def exit_code(statuses: Container[str], strict: bool) -> int:
-    """Return 2 if a file is unusable, 1 if a requirement is broken or not judged, else 0; `strict`: on doubt too."""
+    """Return the exit code of a run: 2 if a file is unusable, 1 if a requirement is broken or not judged, else 0.
+
+    With `strict` the code is 1 also for warnings.
+    """
     if "error" in statuses:
         return 2
     breaks = (one.name for one in _STATUSES_WORST_FIRST if one.fails or (strict and one.fails_strict))

@@ -1,4 +1,4 @@
-"""Contents of a plot of a sweep, as arrays: one axis for each key that varies."""
+"""Data for the plot of a sweep: arrays with one axis for each varied key."""
 
 from collections.abc import Mapping
 from datetime import date
@@ -14,10 +14,11 @@ Floats = NDArray[np.float64]
 
 
 class Axis(NamedTuple):
-    """A key that varies.
+    """One varied key of a plot.
 
-    `values` (n,) rise, in `unit`; one `unit` is `scale` in SI. For a key with words, `values` are the indices of
-    `words`, from 0. `own` is the mission's own value, None without a value or if the value is not in `words`.
+    `values` (n,) are in `unit` and in rising order; `scale` is the SI value of one `unit`. For a key with words,
+    `values` are the indices of `words`, from 0. `own` is the value of the mission itself; None if it has no value, or
+    if its word is not in `words`.
     """
 
     key: str
@@ -35,7 +36,7 @@ class Axis(NamedTuple):
 
     @property
     def edges(self) -> Floats:
-        """Ends of the cells around the values, half way to the next: (n + 1,)."""
+        """Edges of the cells around the values, (n + 1,): midpoints between neighbours, of logarithms if `is_log`."""
         values = np.log(self.values) if self.is_log else self.values
         middle = (values[1:] + values[:-1]) / 2
         edges = np.concatenate(([2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]))
@@ -43,10 +44,10 @@ class Axis(NamedTuple):
 
 
 class Trade(NamedTuple):
-    """A sweep over one or two keys: arrays with one axis for each, in the order of `axes`.
+    """Results of a sweep over one or two keys: arrays with one axis for each key, in the order of `axes`.
 
-    `column` names the column that a heat map shows, `heading` is its name and unit; both are empty if the map shows
-    the status. `fixed` are the keys with a single value.
+    `column` is the column that a heat map shows, and `heading` is its name and unit; both are empty if the map shows
+    the status. `fixed` are the keys that have a single value.
     """
 
     axes: tuple[Axis, ...]
@@ -62,13 +63,13 @@ class Trade(NamedTuple):
 
 
 class TradeStudy(NamedTuple):
-    """A sweep that a report of the mission shows.
+    """A sweep that the report of a mission shows.
 
-    `asked` is the text after each option. `rows` are the utilizations, over the single key that varies, of the rows
-    that are the worst at any value. The sweep has `cases`: `complying` of them meet every requirement, `waived` are
-    waived, by `waived_by`, `unevaluated` have no complete evaluation or no declared error, and `missing` give no
-    usable mission. `model` is the model that an option put in place of the mission's own model, `day` the date on
-    which waivers were judged.
+    `asked` are the texts of the options. `rows` are the utilizations of all rows that are the worst at any value, as
+    functions of the key if a single key varies. `cases` is the number of all cases. Of these, `complying` cases meet
+    every requirement, `waived` cases are waived by the waivers `waived_by`, `unevaluated` cases could not be
+    evaluated completely or declare no error, and `missing` cases give no usable mission. `model` is the model that
+    an option put in place of the mission's own model. `day` is the date on which waivers were judged.
     """
 
     asked: tuple[str, ...]

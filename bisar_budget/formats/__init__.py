@@ -1,4 +1,4 @@
-"""Radar formats in and out: CPHD, CRSD and SICD become missions, simulated phase histories become CPHD."""
+"""Import of missions from CPHD, CRSD and SICD files, and export of simulated phase histories as CPHD."""
 
 # What other rooms may use.
 __all__ = [

@@ -1,13 +1,15 @@
 """A collection as a file states it (scene, band, aperture, both paths, errors), and its mission file.
 
 Slow time is the time at which a pulse is at the scene point. The pulse leaves the transmitter R_t/c earlier and
-reaches the receiver R_r/c later. Each position of a path is the position of the platform at the platform's own time.
-The range sum of a mission at a slow time is then the range sum of the pulse.
+reaches the receiver R_r/c later, where R_t and R_r are the slant ranges. The position of a path at a slow time is the
+position of the transmitter at transmission, or of the receiver at reception. The range sum of a mission at a slow
+time is then the range sum of the pulse.
 
 Errors follow `ErrorParameters` of CPHD 1.1.0 and `ErrorStatistics` of SICD, volume 1: sigmas of position and
 velocity, P1 to V3, with their correlations. CRSD 1.0 and the bistatic part of SICD have covariances. Frames follow
-SICD, volume 3: ECF; RIC_ECF, radial, in-track and cross-track by the velocity over the turning Earth; RIC_ECI by the
-velocity against the stars, which is `ric` of a mission.
+SICD, volume 3. ECF is fixed to the Earth. RIC_ECF has radial, in-track and cross-track axes that follow from the
+velocity relative to the turning Earth. RIC_ECI follows from the velocity relative to the stars; it is `ric` of a
+mission.
 """
 
 import json
@@ -48,15 +50,16 @@ _BETTER_FIT_FRACTION = 0.9  # of the residual; an order with a larger residual f
 
 
 class NoPathError(ValueError):
-    """Positions to which no path can be fitted."""
+    """No path can be fitted to the positions of a file."""
 
 
 @dataclass(frozen=True)
 class DeclaredMotionError:
-    """Errors of the measured path of one platform, one sigma, along the axes of a frame of the mission.
+    """Standard deviations of the measured path of one platform, along the axes of a frame of the mission.
 
-    `position` [m] and `velocity` [m/s] are sigmas, None if not declared; `correlation` is (6, 6). `acceleration`
-    [m/s²] is in the same frame. `distribution` is a distribution of the mission file.
+    `position` [m] and `velocity` [m/s] are one sigma for each axis, None if not declared. `correlation` is (6, 6), or
+    empty without correlations. `acceleration` [m/s²] is in the same frame. `distribution` is a distribution of the
+    mission file.
     """
 
     frame: str
@@ -68,7 +71,7 @@ class DeclaredMotionError:
 
     @property
     def is_isotropic(self) -> bool:
-        """Whether the error is the same along all directions."""
+        """Whether the error is the same in all directions and has no correlations."""
         return not self.correlation and all(
             kind is None or max(kind) - min(kind) <= 1e-9 * max(kind) for kind in (self.position, self.velocity)
         )
@@ -76,7 +79,7 @@ class DeclaredMotionError:
 
 @dataclass(frozen=True)
 class ReferenceGeometry:
-    """Both slant ranges [m] and the bistatic angle [rad] at the file's reference vector, at a slow time. [s]"""
+    """Slant ranges [m] and bistatic angle [rad] at the reference vector of a file, and its slow time. [s]"""
 
     slow_time: float
     transmitter_range: float
@@ -86,7 +89,10 @@ class ReferenceGeometry:
 
 @dataclass(frozen=True)
 class FileErrors:
-    """Errors of both platforms, or common to both; clock terms of a mission; and remarks without a mission key."""
+    """Errors that a file declares: motion errors of the platforms, or of both in common, and clock terms.
+
+    `remarks` are facts for which a mission has no key. `at` is the XML path of the errors.
+    """
 
     transmitter: DeclaredMotionError | None = None
     receiver: DeclaredMotionError | None = None
@@ -101,8 +107,8 @@ class FileErrors:
 class Imported:
     """A collection as a file states it.
 
-    If `is_monostatic`, transmitter and receiver are one platform, whose errors are the same on both ways and are
-    common errors. `remarks` are for the reader of the mission file; each is one fact. `unused` is a remark on vectors
+    If `is_monostatic`, transmitter and receiver are one platform, so that its errors are the same for transmission
+    and reception. `remarks` are for the reader of the mission file; each is one fact. `unused` is a remark on vectors
     that are not used, or empty.
     """
 
@@ -127,7 +133,7 @@ class Imported:
 
 @dataclass(frozen=True)
 class Seen:
-    """Paths of both platforms in the form of a mission, and the scene's axes."""
+    """Fitted paths of both platforms, as a mission states them, and the axes of the scene."""
 
     transmitter: Fitted
     receiver: Fitted
@@ -135,25 +141,27 @@ class Seen:
 
 
 def reference_of(seen: Seen, slow_time: float) -> ReferenceGeometry:
-    """Ranges and bistatic angle at a slow time."""
+    """Compute the slant ranges [m] and the bistatic angle [rad] at a slow time. [s]"""
     t, r = (track.state.at(slow_time)[0] for track in (seen.transmitter, seen.receiver))
     angle = math.atan2(norm(cross(unit(t), unit(r))), dot(unit(t), unit(r)))
     return ReferenceGeometry(slow_time, float(norm(t)), float(norm(r)), angle)
 
 
 def fitted(times: Floats, positions: Floats, aperture_time_s: float, wavelength_m: float) -> Fitted:
-    """Path through positions within the aperture by least squares, of the lowest order with a negligible phase error.
+    """Fit a polynomial path to the positions within the aperture, by least squares.
 
-    The order rises until all positions are within a thousandth of the wavelength of the path, to the fourth at most:
-    a mission states position, velocity, acceleration, jerk and snap. If no order reaches that, the result is the
-    lowest order that no higher order improves clearly: the residuals are noise of the positions, or faster motion.
+    The order is the lowest for which all positions are within a thousandth of the wavelength of the path, so that the
+    phase error is negligible. The highest order is 4, because a mission states position, velocity, acceleration, jerk
+    and snap. If no order is sufficient, the result has the lowest order that no higher order improves clearly. The
+    residuals are then noise of the positions, or faster motion.
 
     Slow times (n,) are in seconds, positions (n, 3) in metres along the scene's axes.
 
     Raises
     ------
     NoPathError
-        Fewer than five positions within the aperture, or positions or an aperture beyond the limits of a mission.
+        There are fewer than five positions within the aperture, or the positions or the aperture exceed the limits of
+        a mission.
     """
     if not 0 < aperture_time_s <= MAX_APERTURE_S:
         raise NoPathError(f"an aperture of {aperture_time_s:g} s is none; accepted: up to {MAX_APERTURE_S:g} s")
@@ -199,7 +207,7 @@ _EIGENVALUE_TOLERANCE_FRACTION = 2.5e-6  # of an eigenvalue of correlations that
 
 
 def sigmas_and_correlations(element: Element) -> Floats:
-    """Covariance (6, 6) of a `PosVelErr`. [m², m²/s, m²/s²]"""
+    """Read the covariance (6, 6) of position and velocity from a `PosVelErr` element. [m², m²/s, m²/s²]"""
     sigmas = np.array([element.number(kind) for kind in SIGMA_NAMES])
     if sigmas.min() < 0:
         raise element.fault("has a negative sigma")
@@ -218,14 +226,17 @@ def sigmas_and_correlations(element: Element) -> Floats:
 
 
 def _require_size(sigmas: Floats, element: Element) -> None:
-    """Refuse sigmas (6,) that are too large for a motion error, before they are squared."""
+    """Raise an error if sigmas (6,) are too large for a motion error; call this before they are squared."""
     for kind, largest, written in zip((sigmas[:3], sigmas[3:]), _MAX_SIGMAS, ("m", "m/s"), strict=True):
         if kind.max() > largest:
             raise element.fault(f"has a sigma of {kind.max():.3g} {written}, more than {largest:g} {written}")
 
 
 def correlated(covariance: Floats) -> tuple[Floats, Floats]:
-    """Sigmas (n,) and correlations (n, n) of a covariance; correlations of an error that is zero are zero."""
+    """Split a covariance (n, n) into sigmas (n,) and correlations (n, n).
+
+    Correlations of an error whose sigma is 0 are 0.
+    """
     sigmas = np.sqrt(np.clip(np.diag(covariance), 0, None))
     scale = np.outer(sigmas, sigmas)
     return sigmas, np.clip(covariance / np.where(scale > 0, scale, 1.0), -1, 1)
@@ -234,11 +245,11 @@ def correlated(covariance: Floats) -> tuple[Floats, Floats]:
 def declared(
     covariance: Floats, frame: Element, state: PlatformState, axes: SceneAxes, owner: str
 ) -> tuple[DeclaredMotionError, list[str]]:
-    """Turn a covariance (6, 6) from a file's frame into the frame of a mission, with remarks on the changes.
+    """Turn a covariance (6, 6) from the frame of a file into a frame of a mission, with remarks on the changes.
 
-    ECF becomes the scene's axes, RIC_ECI is `ric`, and RIC_ECF is turned into `ric` about the radial axis; for a
-    platform in free fall its velocities become those against the stars. Without
-    correlations the turned covariance becomes its sigmas.
+    ECF becomes the axes of the scene. RIC_ECI is `ric`. RIC_ECF is turned about the radial axis into `ric`; for a
+    platform in free fall, velocities then become relative to the stars. If the turned errors have no correlations,
+    only sigmas are returned.
     """
     name = frame.text()
     _require_size(np.sqrt(np.abs(covariance).max(axis=1)), frame)
@@ -278,7 +289,7 @@ def declared(
 
 
 def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
-    """Axes of a file's frame along the scene's axes."""
+    """Unit vectors of a frame of a file, in the axes of the scene."""
     if name == "ECF":
         x, y, z = zip(*axes.axes, strict=True)
         return x, y, z
@@ -290,7 +301,7 @@ def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
 
 
 def of_sigmas(parameters: Element | None, seen: Seen, *, is_monostatic: bool) -> FileErrors:
-    """Errors from CPHD's `ErrorParameters`, or from SICD's `ErrorStatistics` with components."""
+    """Read the errors from `ErrorParameters` of CPHD, or from `ErrorStatistics` of SICD if it has components."""
     if parameters is None:
         return FileErrors(remarks=("The file declares no errors (ErrorParameters).",))
     mono = parameters.maybe("Monostatic") or (parameters.maybe("Components") if is_monostatic else None)
@@ -326,7 +337,11 @@ def _of_monostatic(mono: Element, seen: Seen) -> FileErrors:
 
 
 def _common(declared_error: DeclaredMotionError, remarks: list[str]) -> FileErrors:
-    """Errors of one platform that transmits and receives."""
+    """Errors of a single platform that transmits and receives.
+
+    Errors that are the same along all axes become common errors. Other errors are stated for both platforms, with a
+    remark on how to combine them.
+    """
     if declared_error.is_isotropic:
         remarks.append(
             "One platform transmits and receives, with the same error: it is that of common_motion_error. Its frame "
@@ -382,7 +397,10 @@ def _of_bistatic(bistatic: Element, seen: Seen) -> FileErrors:
 def _with_added(
     bistatic: Element, declared_errors: dict[str, DeclaredMotionError | None]
 ) -> tuple[dict[str, DeclaredMotionError | None], list[str]]:
-    """Apply parameters of an exported file: kinds that are not declared, accelerations, distributions."""
+    """Apply the parameters that this program added to an exported file.
+
+    They state which errors are not declared, accelerations and distributions. Other parameters become remarks.
+    """
     remarks = []
     for parameter in bistatic.all("AddedParameters/Parameter"):
         program, _, key = parameter.node.get("name", "").partition(" ")
@@ -412,11 +430,11 @@ def _with_added(
 def of_matrices(
     parameters: Element | None, seen: Seen, names: tuple[str, str], clocks: tuple[int, int]
 ) -> FileErrors:
-    """Errors from CRSD's `ErrorParameters/SARImage`, or from SICD's `ErrorStatistics` with bistatic components.
+    """Read the errors from `ErrorParameters/SARImage` of CRSD, or from `ErrorStatistics` of SICD if it is bistatic.
 
-    `parameters` has `Monostatic` or `Bistatic`, or is the bistatic part itself. `names` are the names of the element
-    with covariances and of the element with times and frequencies. `clocks` are the rows of both clocks' frequencies
-    in the matrix of the latter.
+    `parameters` contains `Monostatic` or `Bistatic`, or is the bistatic part itself. `names` are the names of two
+    elements: the element with the covariances, and the element with times and frequencies. `clocks` are the rows of
+    the frequencies of both clocks in the matrix of the second element.
     """
     if parameters is None:
         return FileErrors(remarks=("The file declares no errors (ErrorParameters).",))
@@ -488,7 +506,7 @@ _BENDS = (
 
 
 def mission_tree(imported: Imported) -> JsonObject:
-    """Return the keys of a mission with their values as a person writes them, without comments."""
+    """Return the content of the mission file as a tree: keys with values in usual units, without comments."""
     tree: JsonDocument = {
         "schema_version": 1,
         "name": imported.name,

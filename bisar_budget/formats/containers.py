@@ -1,8 +1,8 @@
-"""Radar files: header, XML and the parameters of every pulse. The signal is never read.
+"""Reading of radar files: the header, the XML and the parameters of every pulse. The signal is never read.
 
 CPHD 1.1.0 (NGA.STND.0068-1) and CRSD 1.0 (NGA.STND.0080-2) begin with a header of text lines, which gives the byte at
 which each block begins. SICD (NGA.STND.0024) has its XML in a segment of a NITF file. XML is read without entities
-and references. Its elements know their paths, so that each fault names one.
+and references. Elements know their paths in the document, so that every fault can name the path.
 """
 
 import math
@@ -29,7 +29,7 @@ _INCLUDE = "{http://www.w3.org/2001/XInclude}"
 
 
 class FormatError(Exception):
-    """A file of a radar format that cannot be used. The message names the file, and its byte or XML path."""
+    """A radar file cannot be used. The message names the file, and the byte or the XML path of the problem."""
 
     def __init__(self, file: str, problem: str) -> None:
         super().__init__(f"{printable(file)}: {problem}")
@@ -52,7 +52,7 @@ def check_extra() -> None:
 
 
 class Element:
-    """An element of an XML document, which knows its file and its path in the document.
+    """An element of an XML document, with its file and its path in the document.
 
     Paths are in the syntax of ElementPath without namespaces: `Channel/Parameters/FxC`. A step may have a condition
     on a child, `Parameters[Identifier='1']`.
@@ -68,7 +68,7 @@ class Element:
 
     @property
     def namespace(self) -> str:
-        """Namespace of the element's name."""
+        """Namespace of the element."""
         return str(self.node.tag).rpartition("}")[0].lstrip("{")
 
     @property
@@ -85,15 +85,15 @@ class Element:
         return "/" + "/".join(reversed(steps))
 
     def fault(self, problem: str, below: str = "") -> FormatError:
-        """An error at this element, or at a path below it."""
+        """Make an error about this element, or about a path below it."""
         return FormatError(self.file, f"{self.path}{'/' + below if below else ''} {problem}")
 
     def all(self, path: str) -> list["Element"]:
-        """Elements at a path."""
+        """All elements at a path."""
         return [Element(self.file, node) for node in self.node.findall(_any_namespace(path))]
 
     def maybe(self, path: str) -> "Element | None":
-        """First element at a path, or None; the element itself for an empty path."""
+        """First element at a path, or None if there is none; an empty path gives the element itself."""
         node = self.node.find(_any_namespace(path)) if path else self.node
         return None if node is None else Element(self.file, node)
 
@@ -105,17 +105,17 @@ class Element:
         return element
 
     def with_child(self, path: str, child: str, text: str) -> "Element | None":
-        """First element at a path that has a child with a text, or None."""
+        """First element at a path whose child `child` has the text `text`, or None."""
         return next(
             (element for element in self.all(path) if element.maybe(child) and element.text(child) == text), None
         )
 
     def text(self, path: str = "") -> str:
-        """Text at a path."""
+        """Text of the element at a path."""
         return (self.one(path).node.text or "").strip()
 
     def number(self, path: str = "") -> float:
-        """Finite number at a path."""
+        """Read the number at a path; raises `FormatError` if it is not finite."""
         text = self.text(path)
         try:
             value = float(text)
@@ -126,19 +126,19 @@ class Element:
         return value
 
     def whole(self, path: str = "") -> int:
-        """Integer of at least 0 at a path."""
+        """Read the integer at a path; raises `FormatError` if it is below 0."""
         text = self.text(path)
         if not (text.isascii() and text.isdigit() and len(text) < 19):
             raise self.fault(f"must be a whole number from 0 on (got {shown(text)!r})", path)
         return int(text)
 
     def vector(self, path: str = "") -> Vector:
-        """X, Y and Z at a path."""
+        """Read the vector with components X, Y and Z at a path."""
         node = self.one(path)
         return (node.number("X"), node.number("Y"), node.number("Z"))
 
     def polynomial(self, path: str = "", variables: int = 1) -> Floats:
-        """Coefficients of a polynomial of one or more variables, (order1 + 1, …)."""
+        """Read the coefficients of a polynomial of one or more variables, (order1 + 1, …)."""
         node = self.one(path)
         numbers = range(1, variables + 1)
         coefficients = np.zeros([node._attribute(f"order{number}", _MAX_POLYNOMIAL_ORDER) + 1 for number in numbers])
@@ -150,13 +150,16 @@ class Element:
         return coefficients
 
     def path_polynomial(self, path: str) -> Floats:
-        """Coefficients of a position over time, (order + 1, 3)."""
+        """Read the polynomial of a position as a function of time; returns the coefficients, (order + 1, 3)."""
         axes = [self.one(path).polynomial(axis) for axis in "XYZ"]
         most = max(axis.size for axis in axes)
         return np.stack([np.pad(axis, (0, most - axis.size)) for axis in axes], axis=1)
 
     def matrix(self, path: str, size: int) -> Floats:
-        """Symmetric matrix of `Entry` elements. A missing pair is zero; one entry of a pair is enough."""
+        """Read a symmetric matrix (size, size) from `Entry` elements.
+
+        One entry of each symmetric pair is enough. Pairs without an entry are 0.
+        """
         entries = np.full((size, size), np.nan)
         for entry in self.one(path).all("Entry"):
             row, column = (entry._attribute(name, size) - 1 for name in ("index1", "index2"))
@@ -179,7 +182,7 @@ def _any_namespace(path: str) -> str:
 
 
 def parse(file: str, data: bytes, start: int = 0) -> Element:
-    """Read an XML document, which begins at a byte of a file, without document type, entities or references.
+    """Read an XML document; `start` is the byte of the file at which it begins.
 
     Raises
     ------
@@ -221,9 +224,9 @@ _ROOTS = {"CPHD": "CPHD", "CRSDsar": "CRSD", "CRSDtx": "CRSD", "CRSDrcv": "CRSD"
 
 @dataclass(frozen=True)
 class Container:
-    """Parts of a file that are read: its format, its XML, and the position of each block.
+    """The readable parts of a radar file: its format, its XML, and the position of each block.
 
-    `blocks` are (first byte, length) by name; empty if the file is only XML.
+    `blocks` has the first byte and the length of each block, by name; it is empty if the file is only XML.
     """
 
     file: str
@@ -234,11 +237,11 @@ class Container:
 
     @property
     def has_vectors(self) -> bool:
-        """Whether the file has parameters of pulses in addition to the XML."""
+        """Whether the file contains the parameters of pulses, and not only XML."""
         return "PVP" in self.blocks
 
     def vectors(self, block: str, offset: int, count: int, dtype: np.dtype[np.void]) -> Records:
-        """Parameters of `count` vectors of a block, from an offset in bytes. Only these bytes are read."""
+        """Read the parameters of `count` vectors of a block, from an offset in bytes; no other bytes are read."""
         start, length = self.blocks[block]
         needed = count * dtype.itemsize
         if offset + needed > length or needed > _MAX_VECTOR_BYTES:
@@ -253,7 +256,7 @@ class Container:
 
 
 def open_container(file: str) -> Container:
-    """Read header and XML of a file; a `FormatError` if it is unreadable, of another format, or cut off."""
+    """Read the header and the XML of a file; raises `FormatError` if it is unreadable, unknown or cut off."""
     try:
         if not stat.S_ISREG(os.stat(file).st_mode):  # a pipe would wait for ever
             raise FormatError(file, "is no regular file")

@@ -1,9 +1,10 @@
-"""A simulated phase history as CPHD 1.1.0 (NGA.STND.0068-1): true ranges in the signal, measured positions with it.
+"""Export of a simulated phase history as CPHD 1.1.0 (NGA.STND.0068-1).
 
-The domain is frequency, and SGN is −1: a point whose echo comes ΔTOA after that of the reference point gives
-exp(−j2π fx ΔTOA), the standard's signal model. The reference point (SRP) is the scene centre. Declared errors are the
-difference between the signal and the positions, as in recorded data: an image formed with the positions is displaced
-and defocused.
+The signal follows from the true ranges, and the file states the measured positions. The difference is the declared
+errors, as in recorded data: an image that is formed with the stated positions is displaced and defocused. The signal
+is in the frequency domain, and SGN is −1. A point whose echo arrives ΔTOA later than the echo of the reference point
+has the signal exp(−j2π fx ΔTOA), as in the signal model of the standard. The reference point (SRP) is the scene
+centre.
 """
 
 import hashlib
@@ -64,9 +65,9 @@ _VECTOR_WORDS = (
 
 @dataclass(frozen=True)
 class Exported:
-    """Content of a CPHD file, and the numbers that describe it.
+    """Content of an exported CPHD file, and numbers for its description.
 
-    `half` is half the side of its image area [m]; `remarks` name details that the mission does not state.
+    `half` is half the side length of the image area [m]. `remarks` name details that the mission does not state.
     """
 
     data: bytes
@@ -79,9 +80,11 @@ class Exported:
 
 @dataclass(frozen=True)
 class _Plan:
-    """Size of the record: pulses, samples (frequencies), delay swath to each side [s], half side of the area [m].
+    """Dimensions of the phase history.
 
-    `cell` is the resolution in range and across. [m]
+    `pulses` and `samples` are the numbers of pulses and of frequencies. `delay` is the largest delay to each side of
+    the reference point [s]. `half` is half the side length of the image area [m]. `cell` are the resolutions in range
+    and cross-range. [m]
     """
 
     pulses: int
@@ -92,15 +95,15 @@ class _Plan:
 
 
 def export_phase_history(mission: Mission, targets: Targets) -> Exported:
-    """Record targets with the declared errors of a mission, and return the phase history as CPHD.
+    """Simulate the phase history of targets with the declared errors of a mission, and return it as CPHD.
 
-    Clutter is one random scatterer for each resolution cell of the image area.
+    Clutter has one random scatterer for each resolution cell of the image area.
 
     Raises
     ------
     SimulationError
-        Too few pulses for the scene, or more memory than `simulation.memory_limit`. Both are checked before data are
-        formed.
+        There are too few pulses for the scene, or more memory is needed than `simulation.memory_limit`. Both are
+        checked before data are computed.
     MissingExtraError
         The extra `formats` is not installed.
     """
@@ -148,7 +151,7 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
 
 
 def _plan(mission: Mission, targets: Targets, collection: PointCollection, errors: Errors) -> _Plan:
-    """Choose the image area, and the samples that keep it from repeating in range and in Doppler."""
+    """Choose the image area, and enough samples and pulses to avoid ambiguities in range and Doppler."""
     T, radar = mission.collection.aperture_time, mission.radar
     try:
         effect = collection.effect(errors.still())
@@ -179,7 +182,7 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
 
 
 def _scene(mission: Mission, targets: Targets, plan: _Plan) -> tuple[Floats, NDArray[np.complex128]]:
-    """Positions (n, 3) [m] and amplitudes (n,) of targets and clutter."""
+    """Positions (n, 3) [m] and complex amplitudes (n,) of all targets and clutter scatterers."""
     positions = [(target.east, target.north, 0.0) for target in targets.points]
     amplitudes = [10 ** (target.level_db / 20) for target in targets.points]
     if targets.clutter_db is None:
@@ -200,11 +203,12 @@ def _scene(mission: Mission, targets: Targets, plan: _Plan) -> tuple[Floats, NDA
 def _vectors(
     mission: Mission, slow_time: Floats, flown: Flight, smooth: Flight, axes: SceneAxes, plan: _Plan
 ) -> tuple[Records, float]:
-    """Parameters of each vector, and the time of the file at the middle of the aperture. [s]
+    """Compute the parameters of each vector, and the time of the file at the middle of the aperture. [s]
 
-    A pulse is at the scene centre at its slow time. It left the transmitter R_t/c earlier and is received R_r/c
-    later, by the measured positions; so the reference time of section 6.5.1 (5) is that slow time. A platform's own
-    time runs by 1 ∓ Ṙ/c of slow time, so its velocity is divided by this factor.
+    A pulse is at the scene centre at its slow time. According to the measured positions it leaves the transmitter
+    R_t/c earlier and is received R_r/c later, so the reference time of section 6.5.1 (5) is the slow time. While slow
+    time advances by 1 s, the time of transmission advances by 1 − Ṙ_t/c and the time of reception by 1 + Ṙ_r/c.
+    Velocities with respect to slow time are therefore divided by these factors.
     """
     dtype = np.dtype(
         [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR_WORDS]
@@ -260,7 +264,7 @@ def _document(
     offset: float,
     remarks: list[str],
 ) -> "_ElementTree":
-    """XML of the file as an lxml tree, with the reference geometry that sarkit computes from the vectors."""
+    """Make the XML of the file as an lxml tree; sarkit computes the reference geometry from the vectors."""
     etree = import_module("lxml.etree")
     skcphd = import_module("sarkit.cphd")
     low, high = float(vectors["FX1"][0]), float(vectors["FX2"][0])
@@ -328,7 +332,10 @@ def _document(
 
 
 def _grow(etree: ModuleType, root: "_Element", leaves: _Leaves) -> None:
-    """Add elements below the root. A step of a path may have an attribute; a polynomial has only its constant."""
+    """Add an element below the root for each path in `leaves`, with the value as its text.
+
+    A step of a path may have an attribute. Polynomials get only their constant term.
+    """
     elements = {"": root}
     for path, value in leaves.items():
         element_path = ""
@@ -357,7 +364,7 @@ def _degrees(path: str, point: Geodetic) -> _Leaves:
 
 
 def _scene_coordinates(plan: _Plan, axes: SceneAxes) -> _Leaves:
-    """Plane of the scene: x east, y north; its corners clockwise as seen from above."""
+    """Elements for the plane of the scene, with x east and y north; corners are clockwise as seen from above."""
     half = plan.half
     corners = [(-half, -half), (-half, half), (half, half), (half, -half)]
     reference_point = geodetic(axes.origin)
@@ -414,9 +421,10 @@ def _product(mission: Mission, targets: Targets, remarks: list[str]) -> _Leaves:
 
 # ---------------------------------------------------------------------- declared errors
 def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
-    """`ErrorParameters` of both platforms: one sigma as declared, without the coverage factor.
+    """Elements of `ErrorParameters` for both platforms: the declared sigmas, without the coverage factor.
 
-    The sigmas of each platform include errors that both share. Errors without an element are in `AddedParameters`.
+    The sigmas of each platform include errors that both platforms share. Errors for which the standard has no element
+    are in `AddedParameters`.
     """
     added: dict[str, str] = {}
     leaves: _Leaves = {}
@@ -438,7 +446,10 @@ def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
 
 
 def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, str]) -> tuple[Floats, str]:
-    """Covariance (6, 6) of one platform in a frame of the standard, and the name of the frame. [m², m²/s, m²/s²]"""
+    """Covariance (6, 6) of one platform in a frame of the standard, and the name of the frame. [m², m²/s, m²/s²]
+
+    Errors that the covariance cannot contain are put into `added`.
+    """
     error = getattr(mission.platforms, owner).motion_error
     state: PlatformState = getattr(mission.geometry, owner)
     common = mission.common_motion_error
@@ -484,7 +495,7 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
 
 
 def _along_scene(covariance: Floats, state: PlatformState, frame: str) -> Floats:
-    """A covariance (6, 6) along the axes of a frame, along those of the scene, with Earth-fixed velocities."""
+    """Turn a covariance (6, 6) from the axes of a frame to the axes of the scene, with Earth-fixed velocities."""
     axes = np.array(state.frame(frame), dtype=float)
     if frame == "ric" and state.fall is not None:
         covariance = with_rate(covariance, -axes @ np.array(state.fall.rotation))
@@ -502,7 +513,7 @@ def _pos_vel_err(path: str, covariance: Floats, frame: str) -> _Leaves:
 
 
 def _file(tree: "_ElementTree", vectors: Records, signal: NDArray[np.generic]) -> bytes:
-    """Content of a CPHD file, which sarkit writes from the metadata, the per-vector parameters and the signal."""
+    """Write a CPHD file with sarkit from the XML, the parameters of the vectors and the signal; return its bytes."""
     skcphd = import_module("sarkit.cphd")
     with tempfile.TemporaryFile() as stream:  # the writer needs a real file
         with skcphd.Writer(stream, skcphd.Metadata(xmltree=tree)) as writer:

@@ -1,4 +1,4 @@
-"""Import the collection of a file: CPHD and CRSD by the parameters of their pulses, SICD by its polynomials."""
+"""Import of collections: paths come from the parameters of pulses in CPHD and CRSD, from polynomials in SICD."""
 
 import hashlib
 import math
@@ -39,7 +39,7 @@ _MAX_GAP_FRACTION = 0.02  # of the aperture that may be without pulses at its en
 
 @dataclass(frozen=True, eq=False)
 class _Pulses:
-    """Vectors of a channel: times of transmission and reception [s], and Earth-fixed positions at these times [m]."""
+    """Pulses of a channel: times of transmission and reception [s], and Earth-fixed positions at these times [m]."""
 
     sent: Floats
     transmitter: Floats
@@ -58,7 +58,7 @@ class _Pulses:
 
 
 class _Aperture(NamedTuple):
-    """Middle of the dwell on the scene point, from the file's start, and length of the dwell. [s]"""
+    """Time during which the scene point is seen: its middle, from the start of the file, and its length. [s]"""
 
     middle: float
     length: float
@@ -85,7 +85,7 @@ def import_collection(file: str, channel: str | None = None) -> Imported:
 
 # ---------------------------------------------------------------------- CPHD
 def _cphd(container: Container, channel: str | None) -> Imported:
-    """CPHD 1.0.1 and 1.1.0 (NGA.STND.0068-1)."""
+    """Import CPHD 1.0.1 or 1.1.0 (NGA.STND.0068-1)."""
     xml = container.xml
     channel, parameters = _chosen(xml, channel, "Channel/Parameters", "Identifier")
     center, bandwidth = parameters.number("FxC"), parameters.number("FxBW")
@@ -125,7 +125,7 @@ def _cphd(container: Container, channel: str | None) -> Imported:
 
 
 def _dtype(xml: Element, block: str) -> np.dtype[np.void]:
-    """NumPy type of the parameters of a vector, or of a transmitted pulse, as the XML describes them."""
+    """Make the NumPy data type for the parameters of a vector, or of a transmitted pulse, from their XML."""
     module = import_module("sarkit.cphd" if xml.tag == "CPHD" else "sarkit.crsd")
     reads = module.get_ppp_dtype if block == "PPP" else module.get_pvp_dtype
     try:
@@ -173,7 +173,7 @@ def _pulses_of_cphd(container: Container, vectors: Records, parameters: Element)
 
 
 def _scene_time(pulses: _Pulses, axes: SceneAxes) -> Floats:
-    """Times at which pulses are at the scene point: reference time of CPHD 1.1.0, section 6.5.1 (5). [s]"""
+    """Compute the times at which pulses are at the scene point: the reference time of CPHD 1.1.0, 6.5.1 (5). [s]"""
     transmit_range = np.linalg.norm(pulses.transmitter - axes.origin, axis=1)
     receive_range = np.linalg.norm(pulses.receiver - axes.origin, axis=1)
     scene_time: Floats = pulses.sent + transmit_range / (transmit_range + receive_range) * (
@@ -183,7 +183,7 @@ def _scene_time(pulses: _Pulses, axes: SceneAxes) -> Floats:
 
 
 def _dwell(xml: Element, dwell: Element | None, identifiers: Element, point: Vector) -> _Aperture:
-    """Centre of dwell and dwell time at the scene point, section 6.5.1 (6) of CPHD 1.1.0."""
+    """Compute the centre of dwell and the dwell time at the scene point, by section 6.5.1 (6) of CPHD 1.1.0."""
     if dwell is None:
         raise xml.fault("is missing: nothing says how long the scene point is seen", "Dwell")
     times = []
@@ -200,7 +200,10 @@ def _dwell(xml: Element, dwell: Element | None, identifiers: Element, point: Vec
 
 
 def _image_coordinates(scene: Element, point: Vector) -> tuple[float, float]:
-    """IAX and IAY of a point: image area coordinates of CPHD, on a plane or on a surface of constant height. [m]"""
+    """Compute the image area coordinates IAX and IAY of a point, by the reference surface of CPHD. [m]
+
+    The surface is a plane, or a surface of constant height.
+    """
     planar = scene.maybe("ReferenceSurface/Planar")
     if planar is not None:
         offset = np.subtract(point, scene.vector("IARP/ECF"))
@@ -226,7 +229,7 @@ def _off_reference_point(xml: Element, point: Vector) -> list[str]:
 
 
 def _stated(xml: Element, axes: SceneAxes, is_monostatic: bool) -> Seen:
-    """Both platforms of CPHD's `ReferenceGeometry`."""
+    """Read the paths of both platforms from `ReferenceGeometry` of CPHD."""
     geometry = xml.one("ReferenceGeometry")
     paths = (
         ("Monostatic/ARP", "Monostatic/ARP") if is_monostatic else ("Bistatic/TxPlatform/", "Bistatic/RcvPlatform/")
@@ -241,7 +244,7 @@ def _stated(xml: Element, axes: SceneAxes, is_monostatic: bool) -> Seen:
 
 # ---------------------------------------------------------------------- CRSD
 def _crsd(container: Container, channel: str | None) -> Imported:
-    """CRSD 1.0 of a SAR collection (NGA.STND.0080-2): transmitted pulses and receive windows."""
+    """Import CRSD 1.0 of a SAR collection (NGA.STND.0080-2), from transmitted pulses and receive windows."""
     xml = container.xml
     if xml.tag != "CRSDsar":
         raise FormatError(container.file, f"/{xml.tag} is one way of a collection; accepted: CRSDsar, which has both")
@@ -281,10 +284,10 @@ def _crsd(container: Container, channel: str | None) -> Imported:
 def _pulses_of_crsd(
     container: Container, vectors: Records, transmit_vectors: Records, point: Vector, parameters: Element
 ) -> _Pulses:
-    """Pulses with the time at which the echo of the scene point is received.
+    """Find the pulses, and the time at which the echo of the scene point is received for each of them.
 
-    The file states the receiver's position at the start of its window. The velocity extrapolates it to the echo, less
-    than a millisecond later.
+    The file states the receiver's position at the start of the receive window. Its velocity extrapolates the position
+    to the time of the echo, less than a millisecond later.
     """
     xml = container.xml
     window_start, positions, velocities, index = _fields(
@@ -310,7 +313,7 @@ def _pulses_of_crsd(
 
 # ---------------------------------------------------------------------- SICD
 def _sicd(container: Container, channel: str | None) -> Imported:
-    """SICD (NGA.STND.0024-1): the platforms' polynomials over the aperture of the image."""
+    """Import SICD (NGA.STND.0024-1), from the polynomials of the platforms in the aperture of the image."""
     xml = container.xml
     if channel is not None:
         raise FormatError(container.file, f"a SICD is one image and has no channel {shown(channel)!r}")
@@ -325,7 +328,7 @@ def _sicd(container: Container, channel: str | None) -> Imported:
     transmitter_path, receiver_path = _polynomials_of_sicd(xml, is_monostatic)
 
     def pulses_at(times: Floats) -> _Pulses:
-        """Pulses that are at the scene point at `times`."""
+        """Compute the pulses that are at the scene point at `times`."""
         sent, received = times, times
         if not is_monostatic:  # a monostatic aperture reference point is at the time in between
             for _ in range(_LIGHT_TIME_STEPS):
@@ -351,7 +354,7 @@ def _sicd(container: Container, channel: str | None) -> Imported:
 
 
 def _over(polynomial: Floats, times: Floats) -> Floats:
-    """Positions (n, 3) of a path polynomial at times (n,)."""
+    """Evaluate a path polynomial at times (n,); returns the positions (n, 3)."""
     positions: Floats = np.asarray(np.polynomial.polynomial.polyval(times, polynomial).T, dtype=float)
     return positions
 
@@ -392,10 +395,12 @@ def _polynomials_of_sicd(xml: Element, is_monostatic: bool) -> tuple[Floats, Flo
 def _aperture_of_sicd(
     xml: Element, point: Vector, middle: float, center: float, pulses_at: Callable[[Floats], _Pulses]
 ) -> tuple[_Aperture, list[str]]:
-    """Aperture of a pixel at the scene point: the processed time, or less if the band of the image is smaller.
+    """Compute the aperture of a pixel at the scene point, with remarks on it.
 
-    The wave vector of the image moves by |d(u_t + u_r)/dt · col| f/c per second. The band ImpRespBW of a column is
-    its movement in the aperture. A stripmap is processed for longer than a point is seen.
+    The aperture is the processed time, or less if the image has a smaller band, since a stripmap is processed for
+    longer than a point is seen. The wave vector of the image moves by |d(u_t + u_r)/dt · col| f/c per second, where
+    u_t and u_r are unit vectors along the lines of sight. The band ImpRespBW of a column is this movement during the
+    aperture.
     """
     formation = xml.one("ImageFormation")
     begin, end = formation.number("TStartProc"), formation.number("TEndProc")
@@ -428,7 +433,7 @@ def _aperture_of_sicd(
 
 # ---------------------------------------------------------------------- all formats
 def _chosen(xml: Element, channel: str | None, path: str, key: str) -> tuple[str, Element]:
-    """Identifier and parameters of a channel."""
+    """Find the identifier and the parameters of a channel; without `channel` it is the reference channel."""
     name = xml.text("Channel/RefChId") if channel is None else channel
     parameters = xml.with_child(path, key, name)
     if parameters is None:
@@ -438,7 +443,7 @@ def _chosen(xml: Element, channel: str | None, path: str, key: str) -> tuple[str
 
 
 def _flown(container: Container, pulses: _Pulses, point: Vector, aperture: _Aperture, center: float) -> Seen:
-    """Paths of both platforms, fitted to the positions of the pulses in the aperture."""
+    """Fit the paths of both platforms to the positions of the pulses in the aperture; `center` is in Hz."""
     if not center > 0:
         raise FormatError(container.file, f"its centre frequency is {center:g} Hz")
     axes = axes_at(geodetic(point))
@@ -467,7 +472,7 @@ def _coverage(pulses: _Pulses, axes: SceneAxes, aperture: _Aperture) -> list[str
 
 
 def _names(xml: Element, path: str) -> tuple[str, list[str]]:
-    """Name of the collection, and a remark on its collector and illuminator."""
+    """Read the name of the collection, and a remark on its collector and illuminator."""
     elements = {key: xml.maybe(f"{path}/{key}") for key in ("CoreName", "CollectorName", "IlluminatorName")}
     core, collector, illuminator = (element.text() if element is not None else "" for element in elements.values())
     collected = f"Collected by {shown(collector)}" if collector else ""

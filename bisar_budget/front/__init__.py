@@ -1,4 +1,4 @@
-"""The front door of `import bisar_budget as bb`: questions of a mission, and answers that show themselves."""
+"""Functions of `import bisar_budget as bb`: questions about a mission, and answers that notebooks display."""
 
 # What other rooms may use.
 __all__ = ["checks", "imaging", "missions", "progress", "questions", "results", "sweeps"]

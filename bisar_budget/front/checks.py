@@ -1,4 +1,4 @@
-"""Checks of missions, and additions to their reports: draws, verdicts of images, studies, specifications."""
+"""Checks of missions, with the optional parts of reports: Monte Carlo, images, studies and specifications."""
 
 import datetime as dt
 import os
@@ -55,7 +55,7 @@ def day_of(date: str | dt.date | None) -> dt.date:
     Raises
     ------
     ValueError
-        The argument or the variable is no day.
+        The argument or the environment variable is not a day.
     """
     if isinstance(date, dt.datetime):
         return date.date()
@@ -76,14 +76,17 @@ def day_of(date: str | dt.date | None) -> dt.date:
 
 
 def day_origin(day: str | dt.date | None, giver: str) -> str:
-    """Origin of the day of waivers: the giver of `day`, or else the environment, or else the clock."""
+    """Words for the origin of the day on which waivers are judged.
+
+    The origin is `giver` if `day` is given, or else the environment variable, or else the day of the run.
+    """
     if day is not None:
         return giver
     return "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else DAY_OF_RUN
 
 
 def outside_of(model: str | None, day: str | dt.date | None) -> Outside:
-    """Influences of a question's arguments on its verdict."""
+    """Influences on a verdict that come from the arguments `model` and `day` of a question."""
     options = () if model is None else (Override("--model", model, _CALLER),)
     return Outside(options, day_origin(day, _CALLER), day is not None, _CALLER)
 
@@ -111,13 +114,13 @@ def check(
     date : str or date, optional
         Day on which waivers are judged; by default the day of SOURCE_DATE_EPOCH, or else today, UTC.
     monte_carlo : int, optional
-        Number of draws of the errors, to report how often each requirement holds; `seed` is as in `monte_carlo`.
+        Number of draws of the errors, to report how often each requirement is met; `seed` is as in `monte_carlo`.
     verify : bool
         Whether to form images at the limits, and to judge by them too.
     sweep : mapping, optional
-        For the report: further values of one key or two, as in `sweep`.
+        Values of one key or two, as in `sweep`; the report shows the results.
     outside : Outside, optional
-        Origins of model and day; by default the caller.
+        Origins of the model and the day; by default the caller.
 
     Raises
     ------
@@ -156,7 +159,7 @@ def checked(
     swept: Sequence[str] = (),
     is_illustrated: bool = False,
 ) -> list[CheckedMission]:
-    """Check files, with all content of a report.
+    """Check mission files, and add all content that a report needs.
 
     Parameters
     ----------
@@ -167,13 +170,13 @@ def checked(
     model, changes, outside
         As in `check_files`.
     drawn : Draws, optional
-        Draws of a Monte Carlo.
+        Draws of a Monte Carlo; None without one.
     is_verified : bool
-        Whether images at the limits add their verdicts.
+        Whether images are formed at the limits, and their verdicts are added.
     swept : sequence of str
         Texts `KEY=VALUES` of a study.
     is_illustrated : bool
-        Whether the report can show pictures: analyses and images are kept, sheets of specifications are added.
+        Whether the report can show pictures. Analyses and images are then kept, and sheets of specifications added.
 
     Raises
     ------
@@ -199,14 +202,14 @@ def pieces(
     changes: Sequence[SetValue] = (),
     outside: Outside = NOTHING_OUTSIDE,
 ) -> list[Piece]:
-    """Check files for a report that is joined from one text per mission; no findings are kept."""
+    """Check files for a report that consists of one text for each mission; findings are not kept in memory."""
     keep = partial(piece, format_name=format_name, style=style)
     return check_files(files, today, model, keep, changes=changes, outside=outside)
 
 
 # ---------------------------------------------------------------------- draws
 def drawn_here(draws: int, seed: int | None) -> Draws:
-    """Draws that this process makes, with a progress bar."""
+    """Settings for draws that this process makes, with a progress bar."""
     from bisar_budget.sampling.draws import in_turn
 
     return Draws(draws, seed, partial(_watched, in_turn, None))
@@ -216,7 +219,10 @@ def drawn_here(draws: int, seed: int | None) -> Draws:
 def drawn_by(
     scheduler: str | None, patience: int, draws: int | None, seed: int | None, files: int
 ) -> "Iterator[Draws | None]":
-    """Yield the draws for a number of files, made here or by the workers of a scheduler; None without draws."""
+    """Yield the settings for draws that this machine or the workers of a scheduler make; None without draws.
+
+    `files` is the number of mission files, and `patience` the longest time without a worker. [s]
+    """
     if draws is None:
         yield None
         return
@@ -230,7 +236,7 @@ def drawn_by(
 
 
 def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "Iterator[tuple[DrawsPiece, Tally]]":
-    """Pieces of draws from `make`, with an announcement of a long time, and with progress."""
+    """Yield the pieces of draws that `make` returns, and show progress; if they will take long, announce it first."""
     from bisar_budget.sampling.draws import Drawer, DrawsPiece
 
     if drawing.draws > _MANY_DRAWS and drawing.judged:
@@ -254,7 +260,10 @@ def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "I
 
 # ---------------------------------------------------------------------- images
 def with_images(missions: Sequence[CheckedMission], today: dt.date, *, is_illustrated: bool) -> list[CheckedMission]:
-    """Missions with verdicts of images, and for illustrated reports with the images of the deciding rows."""
+    """Form images at the limits of usable missions, and return the missions with the verdicts of the images.
+
+    With `is_illustrated` they also have the images of the rows that decide.
+    """
     from bisar_budget.budget.verdicts import with_verdicts
     from bisar_budget.front import imaging
     from bisar_budget.verifier.limits import form_image_evidence
@@ -279,9 +288,9 @@ def with_images(missions: Sequence[CheckedMission], today: dt.date, *, is_illust
 def with_studies(
     missions: Sequence[CheckedMission], asked: Sequence[str] | Mapping[str, object], model: str | None, today: dt.date
 ) -> list[CheckedMission]:
-    """Missions with a study: the results of a sweep of each usable mission.
+    """Sweep each usable mission, and return the missions with the results as a study.
 
-    `asked` are texts `KEY=VALUES`, or a mapping.
+    `asked` are texts `KEY=VALUES`, or a mapping of keys to values.
 
     Raises
     ------
@@ -330,7 +339,7 @@ def with_studies(
 def _of(
     mission: Mission, ask: Callable[Arguments, Answer], *arguments: Arguments.args, **options: Arguments.kwargs
 ) -> Answer:
-    """Answer of a function about a mission; the message of a `QuestionError` begins with the mission's file."""
+    """Call a function about a mission; if it raises `QuestionError`, put the mission's file before the message."""
     try:
         return ask(*arguments, **options)
     except QuestionError as error:
@@ -338,7 +347,10 @@ def _of(
 
 
 def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, object]) -> "Cases":
-    """Cases of a study: several values of each key, at most `MAX_STUDY_CASES` cases."""
+    """Make the cases of a study, with several values of each key.
+
+    Raises `QuestionError` if there are too many keys, or more than `MAX_STUDY_CASES` cases.
+    """
     from bisar_budget.design.cases import grid
     from bisar_budget.front.missions import grid_of
 
@@ -365,7 +377,10 @@ def gathered(
     advance: Callable[[int], None] = lambda _: None,
     jobs: int | None = None,
 ) -> "Gathered":
-    """Check all cases, and gather columns for a drawing; `advance` gets the number of cases of each finished part."""
+    """Check all cases, and gather the columns that a drawing needs.
+
+    `advance` is called after each part, with the number of its cases.
+    """
     from bisar_budget.design.sweep import Asked
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.report.tables import Described
@@ -382,7 +397,10 @@ def gathered(
 
 # ---------------------------------------------------------------------- specifications
 def with_sheets(missions: Sequence[CheckedMission], model: str | None, today: dt.date) -> list[CheckedMission]:
-    """Missions with sheets of specifications, if their files have `allocation.specify`, or with a warning."""
+    """Add a sheet of specifications to each mission whose file has `allocation.specify`.
+
+    A mission for which no sheet can be made gets a warning instead.
+    """
     return [
         _with_sheet(findings, model, today) if isinstance(findings, MissionFindings) else findings
         for findings in missions

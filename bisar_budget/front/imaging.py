@@ -1,4 +1,4 @@
-"""Images of a mission: at its limits, and with its declared errors."""
+"""Functions that form images of a mission, at the limits of its rows or with its declared errors."""
 
 from collections.abc import Sequence
 from datetime import date
@@ -27,21 +27,21 @@ if TYPE_CHECKING:
 
 
 def verify(mission: Mission, only: str = "*", *, jobs: int | None = None) -> VerifyResult:
-    """Form images at the limits of a mission, and measure whether the limits are true.
+    """Form images at the limits of a mission, and measure whether the limits are correct.
 
     Parameters
     ----------
     mission : Mission
         As in `check`.
     only : str
-        Glob of row ids.
+        Glob pattern that selects row ids.
     jobs : int, optional
-        Processes; omitted: the number of cores, or 1 with the extra `fast`, which uses all cores itself.
+        Number of processes; by default the number of cores, or 1 with the extra `fast`, which uses all cores itself.
 
     Raises
     ------
     QuestionError
-        No row with a limit has such an id.
+        No row with a limit has an id that matches.
     """
     (verified,) = verify_all([mission], only, jobs, outside=outside_of(None, None))
     return VerifyResult(verified)
@@ -55,7 +55,10 @@ def verify_all(
     *,
     outside: Outside = NOTHING_OUTSIDE,
 ) -> list[VerifiedMission]:
-    """Verify missions in processes here, or on workers of a scheduler; arguments and errors are as in `verify`."""
+    """Verify several missions, in processes on this machine or on workers of a scheduler.
+
+    Arguments and errors are as in `verify`.
+    """
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     if not total and only != "*":
         where_listed = where_ids_are(missions[0].file)
@@ -81,14 +84,14 @@ def verify_all(
 
 
 def faster(jobs: int | None = None) -> str:
-    """Advice for faster image formation on this machine; empty if there is none."""
+    """Advice on how to form images faster on this machine, to be added to a sentence; empty if there is none."""
     if not is_compiled():
         return f", and {install_command('fast')} makes it tens of times faster"
     return f", --jobs {cores()} uses all cores" if jobs is not None and 1 < jobs < cores() else ""
 
 
 def standing(targets: str | None) -> Targets:
-    """Targets of a text; without a text a point at the scene's centre.
+    """Read targets from a text; None gives one point at the centre of the scene.
 
     Raises
     ------

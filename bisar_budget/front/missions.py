@@ -1,4 +1,4 @@
-"""Missions from files and texts, and the cases of sweeps."""
+"""Functions that read missions from files and texts, and that make the cases of sweeps."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -34,7 +34,7 @@ def load(path: str | os.PathLike[str]) -> Mission:
     Raises
     ------
     MissionError
-        The file cannot be used; `faults` has every fault with its line.
+        The file cannot be used; `faults` lists every fault with its line.
     """
     return load_mission(os.fspath(path))
 
@@ -59,7 +59,10 @@ def loads(text: str | bytes, file: str = "mission.yaml") -> Mission:
 
 @dataclass(frozen=True)
 class Spaced:
-    """Evenly spaced values of a key, as `linspace` and `geomspace` return them, in the unit of the texts."""
+    """Evenly spaced values of a key, made by `linspace` or `geomspace`.
+
+    `start` and `stop` are texts with a unit. If `is_log`, the values have equal ratios.
+    """
 
     start: str
     stop: str
@@ -67,40 +70,41 @@ class Spaced:
     is_log: bool = False
 
     def of(self, key: str) -> str:
-        """Text of the values for `sweep --vary`."""
+        """Text of the values of `key`, as for the option `sweep --vary`."""
         return f"{key}={self.start}:{self.stop}:{self.count}" + (":log" if self.is_log else "")
 
 
 def linspace(start: object, stop: object, count: int) -> Spaced:
-    """`count` values from `start` to `stop` at even distances, both included, for `sweep`.
+    """Make `count` evenly spaced values from `start` to `stop`, both included, for `sweep`.
 
     Parameters
     ----------
     start, stop : str, float or quantity
-        Texts with a unit, `"1 s"`, or numbers in SI.
+        Texts with a unit, such as `"1 s"`, or numbers in SI.
     count : int
-        At least 2.
+        Number of values, at least 2.
     """
     return Spaced(text_of("", start), text_of("", stop), count)
 
 
 def geomspace(start: object, stop: object, count: int) -> Spaced:
-    """`count` values from `start` to `stop` in equal ratios; arguments are as in `linspace`, and above zero."""
+    """Make `count` values from `start` to `stop` with equal ratios; arguments are as in `linspace`, but above 0."""
     return Spaced(text_of("", start), text_of("", stop), count, is_log=True)
 
 
 def cases_of(mission: Mission, values: Mapping[str, object] | str | os.PathLike[str], paired: bool = False) -> Cases:
-    """The cases of a sweep over the values of keys, or the cases that a file lists.
+    """Make the cases of a sweep over the values of keys, or read the cases of a file.
 
-    The cases of a sweep are every combination of the values, and the last key varies fastest.
+    A sweep has every combination of the values, and the last key varies fastest.
 
     Parameters
     ----------
     mission : Mission
-        As loaded.
+        The loaded mission.
     values : mapping or path
-        For each key a range of `linspace`, an array of numbers in SI, a quantity that holds an array, or a list of
-        texts: values with units, or words. Or a CSV file, whose header has a `KEY [unit]` for each column.
+        Values by key: a range of `linspace`, an array of numbers in SI, a quantity with an array, or a list of texts,
+        which are values with units or words. Or the path of a CSV file, whose header has `KEY [unit]` for each
+        column.
     paired : bool
         Whether each case takes one value of every key, instead of every combination.
 
@@ -123,20 +127,23 @@ def cases_of(mission: Mission, values: Mapping[str, object] | str | os.PathLike[
 
 
 def grid_of(mission: Mission, values: Mapping[str, object]) -> Cases:
-    """Every combination of values of keys; `values` is as in `cases_of`."""
+    """Make the cases with every combination of values of keys; `values` is as in `cases_of`."""
     tree = tree_of(mission)
     axes = [_axis(tree, key, axis_values) for key, axis_values in values.items()]
     return Cases(tuple(axis.varied[0] for axis in axes), tuple(axis.columns[0] for axis in axes), is_grid=True)
 
 
 def cases_of_texts(mission: Mission, texts: Sequence[str], sample: str | None = None) -> Cases:
-    """Cases of texts such as `collection.aperture_time=1:5s:101`: every combination, or a sample of them."""
+    """Make the cases of texts such as `collection.aperture_time=1:5s:101`.
+
+    They are every combination of the values, or with `sample` a random sample of the ranges.
+    """
     tree = tree_of(mission)
     return grid(tree, texts) if sample is None else sample_of(tree, texts, sample)
 
 
 def _axis(tree: JsonObject, key: str, values: Measured) -> Cases:
-    """The values of one key."""
+    """Make the cases of one key from its values."""
     if isinstance(values, Spaced):
         return grid(tree, [values.of(key)], "sweep")
     if isinstance(values, str):

@@ -1,4 +1,4 @@
-"""Time, workers and progress of long work: a bar in a notebook or a terminal, no output elsewhere."""
+"""Estimated time, workers and progress bars of long work; bars appear only in a notebook or a terminal."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -33,7 +33,10 @@ SAYING: ContextVar[Callable[[str], None]] = ContextVar("SAYING", default=lambda 
 
 @contextmanager
 def watched(label: str) -> "Iterator[Progress]":
-    """Yield a function that takes the progress of long work, and shows a bar with the remaining time to a watcher."""
+    """Yield a function that is called with the progress of long work, and shows a bar with the remaining time.
+
+    The bar appears only in a notebook or a terminal, and only if the work takes longer than a moment.
+    """
     began, bars = monotonic(), list["tqdm[NoReturn]"]()
 
     def progress(done: int, total: int) -> None:
@@ -54,13 +57,13 @@ def watched(label: str) -> "Iterator[Progress]":
 
 
 def _is_notebook() -> bool:
-    """Whether a Jupyter kernel runs this process; imported modules of Jupyter alone are not enough."""
+    """Whether a Jupyter kernel runs this process; imported Jupyter modules do not prove this."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     return hasattr(shell, "kernel")
 
 
 def _bar(label: str, total: int, is_notebook: bool) -> "tqdm[NoReturn]":
-    """A bar of tqdm, for a notebook or a terminal."""
+    """Make a progress bar of tqdm, for a notebook or a terminal."""
     has_widgets = is_notebook and find_spec("ipywidgets") is not None
     kind = import_module("tqdm.notebook").tqdm_notebook if has_widgets else import_module("tqdm").tqdm
     # The monitor thread of tqdm, and its lock between processes, would not survive a fork. The class is our own, so
@@ -71,9 +74,10 @@ def _bar(label: str, total: int, is_notebook: bool) -> "tqdm[NoReturn]":
 
 @contextmanager
 def watched_checks(name: str) -> "Iterator[Progress]":
-    """Yield a function that takes the number of finished checks of a mission, and the expected number.
+    """Yield a function that is called with the number of finished checks of a mission, and the expected number.
 
-    The second call estimates the time of all checks, because the first check also imports modules.
+    At the second call the time of all checks is estimated, because the first check also imports modules. `name` is
+    the name of the mission.
     """
     since, calls, before = monotonic(), 0, 0
     with watched("Checking values") as show_progress:
@@ -92,7 +96,7 @@ def watched_checks(name: str) -> "Iterator[Progress]":
 
 
 def lasting(seconds: float) -> str:
-    """A time in words."""
+    """Words for a duration, such as `3 minutes`."""
     for unit, size in (("years", 365.25 * 86400), ("days", 86400), ("hours", 3600), ("minutes", 60)):
         if seconds >= 2 * size:
             return f"{seconds / size:.0f} {unit}"
@@ -100,13 +104,16 @@ def lasting(seconds: float) -> str:
 
 
 def foretell(seconds: float, doing: str, advice: str = "") -> None:
-    """Tell the user who waits that work will take long, and what to change."""
+    """Tell the user, if work will take long, how long it will take, and what would be faster."""
     if seconds > MIN_ANNOUNCED_S:
         SAYING.get()(f"{doing} will take about {lasting(seconds)}{'; ' if advice else ''}{advice}.")
 
 
 def foreseen(count: int, trial: Callable[[int], float], few: int, most: int) -> float:
-    """Estimated time of `count` items, by trials of `few` to `most` items that return their times. [s]"""
+    """Estimate the time for `count` items. [s]
+
+    `trial` processes a number of items, from `few` to `most`, and returns the time that it took. [s]
+    """
     trial(few)  # imports modules and fills caches
     tried, seconds = few, trial(few)
     while True:
@@ -120,7 +127,10 @@ def foreseen(count: int, trial: Callable[[int], float], few: int, most: int) -> 
 
 # ---------------------------------------------------------------------- workers
 def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[Workers | None]":
-    """Workers of a scheduler, None without a scheduler; `patience` is the longest time without a worker. [s]"""
+    """Connect to the workers of a scheduler; the context gives None without a scheduler.
+
+    `patience` is the longest time to wait without a worker. [s]
+    """
     if scheduler is None:
         return nullcontext()
     from bisar_budget.cluster.scheduler import connected
@@ -129,7 +139,7 @@ def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[
 
 
 def hold_to_tables() -> None:
-    """Raise an error if the libraries that write parts are not installed."""
+    """Raise an error if the libraries that write the parts of a sweep to files are not installed."""
     from bisar_budget.cluster.parts_folder import check_libraries
 
     check_libraries("--resume", TABLES_MEMORY_BYTES, "tables", "pyarrow")

@@ -1,4 +1,4 @@
-"""Questions about a mission that need many checks: sweeps, solutions, specifications, passes, draws."""
+"""Questions about a mission that need many checks: sweeps, solutions, specifications, passes and draws."""
 
 import datetime as dt
 import math
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 def _judged(
     mission: Mission, model: str | None, date: str | dt.date | None, outside: Outside | None
 ) -> tuple[dt.date, tuple[Override, ...]]:
-    """Day on which waivers are judged, and the influences on the verdict from outside the file."""
+    """Find the day on which waivers are judged, and the influences on the verdict from outside the file."""
     if model not in (None, *GATING_MODELS):
         raise QuestionError(f"--model {printable(str(model))}: accepted: {', '.join(GATING_MODELS)}")
     today = day_of(date)
@@ -65,17 +65,18 @@ def sweep(
     mission : Mission
         As in `check`.
     values : mapping, path or cases
-        By the path of a key, such as `collection.aperture_time`: `linspace("1 s", "5 s", 101)`, an array of numbers
-        in SI, a quantity that holds an array, a list of texts with units, or of words such as parts of the catalogue.
-        Or the path of a CSV file, whose header has a `KEY [unit]` for each column.
+        Values by the path of a key, such as `collection.aperture_time`. Values are a range such as
+        `linspace("1 s", "5 s", 101)`, an array of numbers in SI, a quantity with an array, a list of texts with
+        units, or a list of words such as parts of the catalogue. Or the path of a CSV file, whose header has
+        `KEY [unit]` for each column.
     paired : bool
         Whether each case takes one value of every key, instead of every combination.
     columns : str or sequence of str
-        Further columns, `ROW.FIELD` such as `receiver.velocity.x.allowable`.
+        Further columns of the form `ROW.FIELD`, such as `receiver.velocity.x.allowable`.
     model, date, outside
         As in `check`.
     jobs : int, optional
-        Processes, for cases that are read one by one; omitted: the number of cores.
+        Number of processes for cases that are read one by one; by default the number of cores.
 
     Raises
     ------
@@ -101,24 +102,24 @@ def solve(
     date: str | dt.date | None = None,
     outside: Outside | None = None,
 ) -> SolveResult:
-    """Find the values of a number at which a mission begins or ceases to comply.
+    """Find the values of a number at which a mission starts or stops complying with its requirements.
 
     Parameters
     ----------
     mission : Mission
         As in `check`.
     key : str
-        Path of the number, such as `collection.aperture_time`. For `platforms.receiver.motion_error.sensor` and the
-        like every part of the catalogue is tried.
+        Path of the number, such as `collection.aperture_time`. For keys such as
+        `platforms.receiver.motion_error.sensor`, every part of the catalogue is tried.
     between : pair, optional
-        Range of the search, `("0.2 s", "20 s")`; by default a tenth to ten times the file's value, and for an azimuth
-        the circle.
+        Range of the search, such as `("0.2 s", "20 s")`. The default is a tenth to ten times the value of the file,
+        and the full circle for an azimuth.
     scale : bool
         Whether to solve for a factor that multiplies all errors of a section; the key names the section.
     row : str, optional
-        The row that has to comply, instead of the whole mission.
+        Row that has to comply, instead of the whole mission.
     target : str
-        What must not happen: `fail`, or also `warn`.
+        `fail` if only failures must not occur, `warn` if warnings must not occur either.
     verify : bool
         Whether to form images of the binding row at the solution.
     model, date, outside
@@ -150,12 +151,12 @@ def solve(
 
 
 def hold_to_parts(key: str, between: object, scale: bool) -> None:
-    """Refuse a range, or a factor, for a key that names parts of the catalogue.
+    """Raise an error if a range or a factor is given for a key that names parts of the catalogue.
 
     Raises
     ------
     QuestionError
-        The key names parts.
+        The key names parts of the catalogue.
     """
     from bisar_budget.design.compare import is_sensor_key
 
@@ -165,7 +166,7 @@ def hold_to_parts(key: str, between: object, scale: bool) -> None:
 
 
 def _imaged(mission: Mission, solution: "Solution | Comparison", model: str | None) -> "Solution | Comparison":
-    """A solution with the verdict of images."""
+    """Form images at a solution, and return the solution with their verdict."""
     from bisar_budget.design.imaged import imaged, to_image
     from bisar_budget.front.imaging import faster
 
@@ -239,7 +240,7 @@ def allocate(
 
 
 def _weighted(keys: Sequence[str] | Mapping[str, float] | None) -> Mapping[str, float] | None:
-    """Weights of the errors to specify, by their keys."""
+    """Weights of the errors to specify, by key; keys without a weight have equal weights."""
     if not isinstance(keys, Mapping):
         return keys if keys is None else dict.fromkeys(keys, 1.0)
     for key, weight in keys.items():
@@ -271,7 +272,8 @@ def passes(
     days : float
         Length of the span. [d]
     min_elevation, squint : str, float or quantity
-        Least elevation seen from the scene, and the squint of the mid-time: texts with a unit, or radians.
+        Least elevation of the satellite as seen from the scene, and squint at the mid-time: texts with a unit, or
+        radians.
     platform : str, optional
         Platform of the passes, `transmitter` or `receiver`; by default the first with an orbit.
     model, date, outside
@@ -304,12 +306,12 @@ def passes(
 
 
 def angle_of(option: str, value: object, least: float) -> float:
-    """Angle of an option, from `least` [deg] to less than 90 deg. [rad]
+    """Read the angle of an option, from `least` [deg] to less than 90 deg; returns radians.
 
     Raises
     ------
     QuestionError
-        The value is no such angle.
+        The value is not an angle, or is out of range.
     """
     bounds = {"ge": 0.0} if least == 0 else {"gt": math.radians(least)}
     text = text_of("rad", value)
@@ -320,7 +322,7 @@ def angle_of(option: str, value: object, least: float) -> float:
 
 
 def monte_carlo(mission: Mission, draws: int = 20_000, *, seed: int | None = None) -> MonteCarloResult:
-    """Draw the declared errors from their distributions, and count how often each requirement holds.
+    """Draw the declared errors from their distributions, and count how often each requirement is met.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Answers of the Python interface: data, a line of `repr`, tables and drawings for notebooks, data frames of rows."""
+"""Results of the Python interface, with a short `repr`, tables and drawings for notebooks, and data frames."""
 
 import json
 import os
@@ -51,14 +51,14 @@ class MissingPackageError(ImportError):
 
 
 def frame_of(columns: Mapping[str, object], library: str | None = None) -> DataFrame:
-    """A data frame of columns, of pandas or of polars.
+    """Make a data frame of pandas or polars from columns.
 
     Parameters
     ----------
     columns : mapping
-        Values of each column by its name, all of one length.
+        Values of each column by its name; all columns have the same length.
     library : str, optional
-        `pandas` or `polars`; omitted: the first of them that is installed.
+        `pandas` or `polars`; by default the first of them that is installed.
 
     Raises
     ------
@@ -73,19 +73,19 @@ def frame_of(columns: Mapping[str, object], library: str | None = None) -> DataF
 
 
 def _frame_of_rows(rows: Sequence[Mapping[str, object]], library: str | None) -> DataFrame:
-    """A data frame of the rows of a document; the keys of the first row are the columns."""
+    """Make a data frame from rows; the keys of the first row are the columns."""
     return frame_of({key: [row.get(key) for row in rows] for key in (rows[0] if rows else ())}, library)
 
 
 class Picture:
-    """A drawing: a notebook shows it, `save` writes a file, `of` returns the content of a file.
+    """A drawing that notebooks show; `save` writes it to a file, and `of` returns the content of a file.
 
     Parameters
     ----------
     title : str
         Title of the drawing.
     draw : callable
-        Function of the kind of file, `svg`, `png` or `pdf`, that returns the content.
+        Function that takes the kind of file, `svg`, `png` or `pdf`, and returns the content.
     """
 
     def __init__(self, title: str, draw: Callable[[str], bytes]) -> None:
@@ -99,12 +99,12 @@ class Picture:
         return notebook.page(self.of("svg").decode())
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a file: .svg, .png or .pdf.
+        """Write the drawing to a file with the suffix .svg, .png or .pdf.
 
         Raises
         ------
         ValueError
-            The name ends otherwise.
+            The name has another suffix.
         """
         kind = os.path.splitext(os.fspath(path))[1][1:].lower()
         if kind not in ("svg", "png", "pdf"):
@@ -113,7 +113,7 @@ class Picture:
 
 
 def write_file(path: str, content: bytes) -> None:
-    """Write a file.
+    """Write bytes to a regular file.
 
     Raises
     ------
@@ -129,9 +129,9 @@ def write_file(path: str, content: bytes) -> None:
 # ---------------------------------------------------------------------- a check
 @dataclass(frozen=True, repr=False, eq=False)
 class CheckResult(Mapping[str, Row]):
-    """Findings of a check: its rows by their ids, in the order of the contract.
+    """Findings of a check, as a mapping of row ids to rows, in the order of the JSON contract.
 
-    `findings` are those of the reports; `model` and `day` are the arguments of the check.
+    `findings` are the findings that reports show. `model` and `day` are the arguments of the check.
     """
 
     findings: MissionFindings
@@ -174,7 +174,7 @@ class CheckResult(Mapping[str, Row]):
 
     @property
     def exit_code(self) -> int:
-        """Exit code of `bisar-budget check`: 0 all judged and met or waived, 1 not."""
+        """Exit code of `bisar-budget check`: 0 if all requirements are judged, and met or waived, otherwise 1."""
         return exit_code({self.status}, False)
 
     @property
@@ -183,36 +183,36 @@ class CheckResult(Mapping[str, Row]):
         return {requirement.key: requirement for requirement in self.findings.requirements}
 
     def to_dict(self) -> JsonDocument:
-        """The document of `--format json`."""
+        """The document that `check --format json` writes, as a dictionary."""
         document: JsonDocument = json.loads(render("json", self._report, Style()))
         return document
 
     def to_dataframe(self, library: str | None = None) -> DataFrame:
-        """The rows as a data frame of pandas, or of polars; numbers in SI and radians.
+        """The rows as a data frame of pandas or polars; numbers are in SI and radians.
 
         Raises
         ------
         MissingPackageError
-            Neither is installed.
+            The library is not installed, or neither of the two is.
         """
         (mission,) = self.to_dict()["missions"]
         rows = [{key: value for key, value in row.items() if key not in _NESTED} for row in mission["rows"]]
         return _frame_of_rows(rows, library)
 
     def report(self, path: str | os.PathLike[str], detail: str = "summary") -> None:
-        """Write a report, in the format of its suffix: .html, .md, .json, .csv, .xml, .sarif, .txt.
+        """Write a report; the suffix .html, .md, .json, .csv, .xml, .sarif or .txt selects the format.
 
         Parameters
         ----------
         path : path
-            Path of the file; pictures of .md go to a folder next to it.
+            Path of the file. Pictures of a .md report are written to a folder next to it.
         detail : str
             `summary`, or `full` with the annex.
 
         Raises
         ------
         ValueError
-            The suffix belongs to no format.
+            The suffix is not that of a format.
         """
         name = os.fspath(path)
         form = format_of(name)
@@ -275,12 +275,12 @@ _SPECIFIED = ("key", "value", "ordered", "unit", "declared")
 # ---------------------------------------------------------------------- answers to other questions
 @dataclass(frozen=True, repr=False, eq=False)
 class _Answer:
-    """An answer that a command writes as JSON; the attributes of `found` are attributes of the answer too."""
+    """Result of a question, as the matching command writes it in JSON; it also has the attributes of `found`."""
 
     found: Any
 
     def __getattr__(self, name: str) -> Any:
-        """An attribute of `found`."""
+        """Look up an attribute of `found`."""
         if name.startswith("_") or name == "found":
             raise AttributeError(name)
         return getattr(self.found, name)
@@ -294,27 +294,28 @@ class _Answer:
         return as_json([self.found], Style())
 
     def to_dict(self) -> JsonDocument:
-        """The document of `--format json` of the command."""
+        """The document that the matching command writes with `--format json`, as a dictionary."""
         document: JsonDocument = json.loads(self._document())
         return document
 
 
 def _waived(waivers: Sequence[Sequence[str]]) -> str:
-    """Words for the number of waived cases and their waivers, empty without waived cases."""
+    """Words for the number of waived cases and the ids of their waivers; empty if no case is waived."""
     ids = tuple(dict.fromkeys(waiver for case in waivers for waiver in case))
     return f", {waived_count(len(waivers), ids)}" if waivers else ""
 
 
 class SolveResult(_Answer):
-    """Values at which compliance begins or ends: `value` in SI, `crossings`, `status`, `nearest`.
+    """Result of `solve`: the values at which compliance begins or ends.
 
-    For a key of parts of the catalogue: `parts`, complying parts first, `complying`, `status`.
+    Its attributes are those of the solution: `value` in SI, `crossings`, `status` and `nearest`. For a key that names
+    parts of the catalogue, they are `parts` with complying parts first, `complying` and `status`.
     """
 
     found: "Solution | Comparison"
 
     def __repr__(self) -> str:
-        """Key and value, or whether all or none of the range complies, and waived values, on one line."""
+        """Summary on one line: the key, the value or how much of the range complies, and waived values."""
         return f"<solve of {self.found.key} for {self.found.name!r}: {self._summary}>"
 
     @property
@@ -348,17 +349,17 @@ class SolveResult(_Answer):
 
 
 class SensitivityResult(_Answer):
-    """Effects of each number on the worst utilization: `slopes`, ranked."""
+    """Result of `sensitivity`: `slopes` are the effects of the numbers on the worst utilization, largest first."""
 
     found: "Sensitivity"
 
     def __repr__(self) -> str:
-        """The number that matters most, on one line."""
+        """Summary on one line, with the number that has the largest effect."""
         first = self.found.slopes[0].key if self.found.slopes else "none"
         return f"<sensitivity of {self.found.name!r}: {len(self.found.slopes)} numbers, first {first}>"
 
     def plot(self) -> Picture:
-        """The effects as bars."""
+        """Draw the effects as bars."""
         from bisar_budget.report.drawing.figure import drawing_file
         from bisar_budget.report.drawing.tornado import tornado
 
@@ -370,10 +371,10 @@ class SensitivityResult(_Answer):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class AllocateResult(_Answer):
-    """Specifications that together meet every requirement.
+    """Result of `allocate`: specifications that together meet every requirement.
 
-    The attributes `specifications`, `complies` and `requirements` are those of `found`. If another mission was given,
-    `offer` compares the figures of that mission with the specifications.
+    The attributes `specifications`, `complies` and `requirements` are those of `found`. If the mission of an offer
+    was given, `offer` compares its figures with the specifications.
     """
 
     found: SpecificationSheet
@@ -390,7 +391,7 @@ class AllocateResult(_Answer):
         return as_json([(self.found, self.offer)], Style())
 
     def to_dataframe(self, library: str | None = None) -> DataFrame:
-        """The specifications as a data frame; numbers in SI, lists of three if axes differ."""
+        """The specifications as a data frame; numbers are in SI, and lists of three if the axes differ."""
         (mission,) = self.to_dict()["missions"]
         return _frame_of_rows([{key: row[key] for key in _SPECIFIED} for row in mission["specifications"]], library)
 
@@ -403,12 +404,12 @@ class AllocateResult(_Answer):
 
 
 class VerifyResult(_Answer):
-    """Verdicts of images on the limits: `rows`, `status`."""
+    """Result of `verify`: `rows` are the verdicts of images on the limits, and `status` is the status of all."""
 
     found: VerifiedMission
 
     def __repr__(self) -> str:
-        """Number of limits of each verdict, on one line."""
+        """Number of limits with each verdict, on one line."""
         counts = Counter(row.verdict for row in self.found.rows)
         verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
         return f"<verify of {self.found.name!r}: {verdicts}>"
@@ -419,7 +420,7 @@ class VerifyResult(_Answer):
         return as_json([self.found], Style())
 
     def to_dataframe(self, library: str | None = None) -> DataFrame:
-        """The verdicts as a data frame."""
+        """The verdicts of the images as a data frame, with one row for each limit."""
         (mission,) = self.to_dict()["missions"]
         return _frame_of_rows(mission["rows"], library)
 
@@ -433,7 +434,7 @@ class VerifyResult(_Answer):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class PassesResult(_Answer):
-    """Passes of a satellite, each with the verdict of the mission in it: a sequence of passes.
+    """Result of `passes`: a sequence of the passes of a satellite, each with the verdict of the mission in it.
 
     `mission` and `model` are the arguments of the question.
     """
@@ -453,11 +454,14 @@ class PassesResult(_Answer):
         return len(self.found.found)
 
     def __getitem__(self, index: int) -> "SatellitePass":
-        """A pass, counted from 0."""
+        """The pass at an index, from 0."""
         return self.found.found[index]
 
     def mission_text(self, satellite_pass: "SatellitePass", folder: str | os.PathLike[str]) -> str:
-        """Text of a mission file with the aperture in a pass; names of files are relative to a folder."""
+        """Text of a mission file whose aperture is at the mid-time of a pass.
+
+        Names of files in it are relative to `folder`.
+        """
         from bisar_budget.design.passes import center_time
         from bisar_budget.mission.edited import in_folder, with_values
 
@@ -472,11 +476,11 @@ class PassesResult(_Answer):
         return as_json(self.found, Style())
 
     def to_dataframe(self, library: str | None = None) -> DataFrame:
-        """The passes as a data frame; angles in radians, lengths in metres, times as texts of UTC."""
+        """The passes as a data frame; angles are in radians, lengths in metres, and times are texts in UTC."""
         return _frame_of_rows(self.to_dict()["passes"], library)
 
     def plot(self) -> Picture:
-        """Tracks in the sky, and resolutions over time."""
+        """Draw the tracks of the satellite in the sky, and the resolutions as functions of time."""
         from bisar_budget.report.drawing.figure import drawing_file
         from bisar_budget.report.drawing.sky_plot import sky_plot
         from bisar_budget.report.formats.pass_list import verdict
@@ -489,12 +493,12 @@ class PassesResult(_Answer):
 
 
 class MonteCarloResult(_Answer):
-    """How often each requirement holds: `probability`, `requirements`, each with its interval."""
+    """Result of `monte_carlo`: `probability` for all requirements together, and `requirements`, with intervals."""
 
     found: MonteCarlo
 
     def __repr__(self) -> str:
-        """Draws and the probability of all requirements, on one line."""
+        """Number of draws and probability that all requirements are met, on one line."""
         answer = self.found
         if answer.probability is None:
             return f"<monte_carlo: {answer.draws} draws, no requirement to hold>"
@@ -502,7 +506,7 @@ class MonteCarloResult(_Answer):
         return f"<monte_carlo: {answer.draws} draws, all hold in {answer.probability:.4g} ({interval})>"
 
     def to_dict(self) -> JsonDocument:
-        """The Monte Carlo part of the document of `check --monte-carlo --format json`."""
+        """The Monte Carlo part of the document that `check --monte-carlo --format json` writes."""
         from bisar_budget.report.formats.json_document import monte_carlo_item
 
         document: JsonDocument = json.loads(json.dumps(monte_carlo_item(self.found)))
@@ -520,7 +524,7 @@ class MonteCarloResult(_Answer):
 
 
 class SimulateResult:
-    """Images with the declared errors: `image` in the axes of the scene; `images` has all images with their data."""
+    """Result of `simulate`: `image` with the declared errors, in scene axes, and `images` with all images."""
 
     def __init__(self, images: "PointImages", mission: Mission) -> None:
         self.images, self._mission = images, mission
@@ -532,11 +536,11 @@ class SimulateResult:
 
     @property
     def image(self) -> Complexes:
-        """The image in the axes of the scene: (nx, ny) complex, along east and north."""
+        """Complex image in the axes of the scene, (nx, ny), with x east and y north."""
         return self.images.in_scene
 
     def plot(self) -> Picture:
-        """The figures of the paper for this mission."""
+        """Draw the figures of the paper with the images of this mission."""
         from bisar_budget.report.drawing.point_plot import drawn
 
         return Picture(self._mission.name, lambda kind: drawn(self.images, self._mission.name, kind))

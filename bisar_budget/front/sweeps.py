@@ -1,4 +1,4 @@
-"""A mission checked in many cases: a table, a drawing, and a line with the number of cases that comply."""
+"""Result of a sweep: the table of all cases, a drawing, and a summary with the number of cases that comply."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -41,12 +41,13 @@ _MAX_SHOWN_CASES = 10  # of a sweep without a drawing, in a notebook
 
 @dataclass(repr=False, eq=False)
 class SweepResult:
-    """A mission checked for many values: its table, by `to_dataframe`, `to_xarray`, or as columns.
+    """Result of `sweep`: the table of a mission checked in many cases.
 
-    The cases are `mission` with the values of `cases`; they are checked when they are first needed. `statuses` counts
-    the statuses of the checked cases, and `waived_by` has the ids of their waivers. `workers` of a scheduler check
-    the cases, if there are any. If a file `beside` is named, parts are kept next to it, and `is_resumed` continues
-    from kept parts.
+    The table is available by `to_dataframe` and `to_xarray`, and as columns by their names. The cases are `mission`
+    with the values of `cases`, and are checked when they are first needed. `statuses` counts the statuses of the
+    checked cases, and `waived_by` has the ids of their waivers. If `workers` of a scheduler are given, they check the
+    cases. If `beside` is the path of a file, parts are kept in a folder next to it; with `is_resumed` the sweep
+    continues from kept parts.
     """
 
     mission: Mission
@@ -63,7 +64,7 @@ class SweepResult:
     waived_by: dict[str, None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Prepare the question; raises `QuestionError` if the mission cannot answer it."""
+        """Prepare the cases for checks; raises `QuestionError` if the mission cannot answer the question."""
         self.asked = Asked(self.mission, self.cases, columns=self.more, model=self.model, today=self.day)
 
     def __repr__(self) -> str:
@@ -75,7 +76,7 @@ class SweepResult:
 
     # ------------------------------------------------------------------ checking cases
     def foreseen(self) -> float:
-        """Estimated time of all cases; 0 for few cases. [s]"""
+        """Estimate the time to check all cases; 0 for few cases. [s]"""
         if self.cases.count <= _MANY_CASES:
             return 0.0
 
@@ -95,7 +96,10 @@ class SweepResult:
 
     @contextmanager
     def checked(self) -> Iterator[tuple[Described, Iterator[Part]]]:
-        """Yield the table and its parts, each checked when it is needed, with a progress bar if somebody watches."""
+        """Yield the table and an iterator that checks its parts on demand, with a progress bar.
+
+        The bar appears only in a notebook or a terminal.
+        """
         sweep: AbstractContextManager[Swept]
         if self.beside is None:
             sweep, label = nullcontext(self.asked.checked(self.jobs)), "Checking cases"
@@ -106,10 +110,10 @@ class SweepResult:
 
     @contextmanager
     def _kept(self, path: str) -> Iterator[Swept]:
-        """Yield the sweep when all its parts are kept in a folder, and remove them when the table is written.
+        """Check all parts, keep them in a folder, and then yield the sweep; afterwards the folder is removed.
 
-        Workers of a scheduler check the parts, or processes on this machine. An interruption leaves the parts in the
-        folder, with a message that tells how to continue.
+        Workers of a scheduler, or processes on this machine, check the parts. After an interruption the folder stays,
+        and a message tells how to continue.
         """
         from bisar_budget.cluster.parts_folder import parts_folder, question_of
 
@@ -154,7 +158,7 @@ class SweepResult:
 
     @property
     def so_far(self) -> str:
-        """Words for the number of checked cases, and of cases that comply."""
+        """Words for the number of cases checked so far, and the number of complying cases among them."""
         done, comply = self.statuses.total(), complying(self.statuses)
         if not done:
             return "no case was checked"
@@ -172,11 +176,11 @@ class SweepResult:
 
     @property
     def is_unjudged(self) -> bool:
-        """Whether no case with a mission could be judged."""
+        """Whether none of the cases with a usable mission could be judged."""
         return self.statuses.keys() - {"error"} == {"not_evaluated"}
 
     def drawing(self, trade_data: Gathered, *, is_polar: bool = False) -> str:
-        """SVG of gathered cases; over one key also the rows that are the worst in any case."""
+        """Draw gathered cases as SVG; if one key varies, also the rows that are the worst in any case."""
         from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
 
         trade = trade_data.trade(is_polar=is_polar)
@@ -204,18 +208,18 @@ class SweepResult:
 
     @property
     def summary(self) -> str:
-        """Words for the number of cases, and of cases that comply."""
+        """Words for the number of all cases, and the number of complying cases; checks the cases if necessary."""
         return self.so_far if self._parts else ""  # cases are counted when they are checked
 
     @cached_property
     def columns(self) -> Mapping[str, Values]:
-        """Values of each column by its name, (cases,); varied keys are in the unit of the question."""
+        """Values of each column (cases,), by name; varied keys are in the unit in which their values were given."""
         table = self._table
         values = [table.values(block) for block in table.swept.parts]
         return {column.name: np.concatenate([block[column.name] for block in values]) for column in table.columns}
 
     def __getitem__(self, name: str) -> Values:
-        """Values of a column, (cases,)."""
+        """Values of the column with a name, (cases,)."""
         if name not in self.columns:
             raise KeyError(f"{name}: no such column; accepted: {', '.join(self.columns)}")
         return self.columns[name]
@@ -227,20 +231,20 @@ class SweepResult:
         return frame_of(lists, library)
 
     def to_xarray(self, chunks: Mapping[str, int] | int | str | None = None) -> "Dataset":
-        """The table as `xarray.Dataset`, a dimension for each key, with units and long names (CF).
+        """The table as `xarray.Dataset`, with a dimension for each key, and with units and long names (CF).
 
         Parameters
         ----------
         chunks : mapping, int or "auto", optional
-            Sizes of chunks by dimension, of all dimensions, or those of the sweep. Values are then arrays of Dask,
-            and cases are checked when it computes.
+            Sizes of chunks by dimension, one size for all dimensions, or `"auto"` for the chunks of the sweep. The
+            values are then arrays of Dask, and cases are checked when Dask computes them.
 
         Raises
         ------
         MissingTablesError
             xarray is not installed.
         MissingPackageError
-            Dask is asked for and not installed.
+            `chunks` is given, and Dask is not installed.
         """
         if chunks is None:
             return dataset(self._table, self.columns)
@@ -257,7 +261,10 @@ class SweepResult:
         )
 
     def _later(self) -> "dict[str, Array]":
-        """Columns as arrays of Dask: each chunk of the sweep is a task, with the result that it would have now."""
+        """Make the columns as arrays of Dask, in which each chunk of the sweep is a task.
+
+        The tasks have copies of all files that the mission names, so that later changes of files have no effect.
+        """
         try:
             from dask import array
             from dask.delayed import delayed
@@ -276,12 +283,12 @@ class SweepResult:
         return {name: array.concatenate(chunk_arrays) for name, chunk_arrays in columns.items()}
 
     def plot(self, column: str | None = None) -> Picture:
-        """Curves of utilization over one key, or a map over two keys of the cases that comply.
+        """Draw curves of utilization over one key, or a map of the complying cases over two keys.
 
         Parameters
         ----------
         column : str, optional
-            Draw this column instead.
+            Column that is drawn instead.
 
         Raises
         ------
@@ -310,14 +317,17 @@ class SweepResult:
 
 
 def _values(common: tuple[Question, Described, AbstractContextManager[object]], block: Block) -> Mapping[str, Values]:
-    """Values of the columns in a block of cases; threads take turns, because a table caches results."""
+    """Check a block of cases, and return the values of its columns.
+
+    Only one thread at a time checks cases, because a table caches results.
+    """
     question, table, lock = common
     with lock:
         return table.values(part_of(question, block))
 
 
 def percentage(count: int, total: int) -> str:
-    """Percentage of a count in a total; 0 % and 100 % only for none and all."""
+    """Text of a count as a percentage of a total; 0 % and 100 % are only used for none and all."""
     if count in (0, total):
         return "100 %" if count else "0 %"
     return f"{min(max(100 * count / total, 0.1), 99.9):.3g} %"

@@ -1,4 +1,4 @@
-"""The mission file: what it may say (`model`), and how it is read (`load`)."""
+"""The mission file: its keys and their meaning (`model`), and the reading of a file (`load`)."""
 
 # What other rooms may use.
 __all__ = [

@@ -1,7 +1,7 @@
-"""Paths of keys: values that options put at them, and hints for unknown keys.
+"""Paths of keys in a mission file: values that options put there, and hints for unknown keys.
 
-`--set KEY=VALUE` is for a question that is asked once. The value goes into the tree of the file before the tree is
-interpreted, so every check works as for a file. `KEY=null` takes the key out. The readers define the known keys.
+`--set KEY=VALUE` changes a value for one run only. The value goes into the tree of the file before the tree is
+interpreted, so every check works as for a file. `KEY=null` removes the key. The readers define the known keys.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,7 +22,7 @@ _WITH_DOTTED_KEYS = (("requirement_ids",), ("specifications",), ("allocation", "
 
 
 def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
-    """Read `KEY=VALUE` of each option.
+    """Split the `KEY=VALUE` text of each option into key and value.
 
     Raises
     ------
@@ -47,19 +47,22 @@ def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
 
 
 def parts_of(key: str) -> tuple[str, ...]:
-    """Parts of a path of keys: other_errors, 0, name for `other_errors[0].name` and for `other_errors.0.name`."""
+    """Split a path of keys into its parts.
+
+    Both `other_errors[0].name` and `other_errors.0.name` give other_errors, 0, name.
+    """
     return tuple(key.replace("[", ".").replace("]", "").split("."))
 
 
 def apply_changes(tree: Tree, changes: Sequence[SetValue]) -> None:
     """Put the value of each option into the tree; problems become faults of the tree.
 
-    A value replaces the value of the file, or is added.
+    A value replaces the value of the file. If the file has no such value, it is added.
 
     Raises
     ------
     UnusableError
-        The tree is not worth reading beyond this point; the fault is in the tree.
+        The tree has so many or such faults that reading it further makes no sense. The fault is in the tree.
     """
     for change in changes:
         if takes_out(change):
@@ -69,12 +72,15 @@ def apply_changes(tree: Tree, changes: Sequence[SetValue]) -> None:
 
 
 def takes_out(change: SetValue) -> bool:
-    """Whether an option takes a key out: its value is a null of YAML, as in `--set requirements.islr=null`."""
+    """Whether an option removes a key: its value is a null of YAML, as in `--set requirements.islr=null`."""
     return not isinstance(change, SetNumber) and change.text in NULLS and change.text != ""
 
 
 def _take_out(tree: Tree, change: SetValue) -> None:
-    """Take a key out of the tree. A known key that the file does not have is no fault; an unknown key is."""
+    """Remove a key from the tree.
+
+    A known key that the file does not have is no fault. An unknown key is a fault.
+    """
     steps = parts_of(change.key)
     container: Content = tree.root
     path: KeyPath = ()
@@ -105,7 +111,7 @@ def _take_out(tree: Tree, change: SetValue) -> None:
 
 
 def _apply(tree: Tree, change: SetValue) -> None:
-    """Put a value at its path, and make the sections that are missing on the way."""
+    """Put a value at its path in the tree, and add missing sections along the path."""
     steps = parts_of(change.key)
     container: Content = tree.root
     path: KeyPath = ()
@@ -142,9 +148,10 @@ def _apply(tree: Tree, change: SetValue) -> None:
 def next_name(
     container: Content, steps: tuple[str, ...], has_dotted_keys: bool = False
 ) -> tuple[str | int | None, tuple[str, ...]]:
-    """The next key or index of a path within a container, and the steps behind it; None if there is none.
+    """Split a path into its first key or index within a container and the remaining steps.
 
-    With `has_dotted_keys` all steps are one key, joined by dots.
+    The first key or index is None if the container cannot have it. A key may contain dots itself. With
+    `has_dotted_keys` all steps are one key, joined by dots.
     """
     if isinstance(container, list):
         is_entry = is_index(steps[0]) and int(steps[0]) <= len(container)
@@ -160,7 +167,7 @@ def next_name(
 
 
 def _put(container: Content, name: str | int, value: object) -> None:
-    """Set a value in a mapping or a list; the index behind the last entry appends."""
+    """Set a value in a mapping or a list. In a list, the index after the last entry appends the value."""
     if isinstance(container, list) and name == len(container):
         container.append(value)
     else:
@@ -168,7 +175,7 @@ def _put(container: Content, name: str | int, value: object) -> None:
 
 
 def _value(tree: Tree, change: SetValue, path: KeyPath) -> Content:
-    """Parse the value that an option sets, as if it stood in the file; a number needs no parsing.
+    """Parse the value that an option sets, as if it were in the file; a number needs no parsing.
 
     A fault names the option. The result is `INVALID` for a text that cannot be read.
     """
@@ -191,7 +198,7 @@ def _value(tree: Tree, change: SetValue, path: KeyPath) -> Content:
 
 
 def _forget(tree: Tree, path: KeyPath) -> None:
-    """Forget the positions in the file of a value and of all values below it: no fault may point there."""
+    """Delete the file positions of a value and of all values below it, so that no fault refers to them."""
     for events in (tree.keys, tree.values):
         for key_path in [key_path for key_path in events if key_path[: len(path)] == path]:
             del events[key_path]
@@ -206,7 +213,7 @@ _KNOWN_KEY_SIMILARITY_RATIO, _UNKNOWN_KEY_SIMILARITY_RATIO = 0.8, 0.6
 
 @cache
 def all_keys() -> tuple[str, ...]:
-    """Paths of all keys, without the numbers of lists: `other_errors.name`."""
+    """Paths of all keys, without indices of lists: `other_errors.name`."""
     return tuple(dict.fromkeys(_below(MISSION, "")))
 
 
@@ -225,10 +232,10 @@ def _below(reader: Reader[object], path: str) -> Iterator[str]:
 
 
 def nearest_keys(path: str) -> str:
-    """Hint at the known path nearest to an unknown path, or at the sections of its key; empty if there is neither.
+    """Hint for an unknown path: the nearest known path, or the sections that have its last key.
 
-    A misspelt key is compared with the keys of its own section only. A path without its first sections is compared
-    with the paths that end like it.
+    A misspelt key is compared only with the keys of its own section. A path that lacks its first sections is compared
+    with the known paths that have the same end. The hint is empty if there is neither.
     """
     path = path[:_MAX_PATH_CHARACTERS]
     steps = parts_of(path)
@@ -249,10 +256,11 @@ def nearest_keys(path: str) -> str:
 
 
 def section_hint(path: str, near: str) -> str:
-    """Hint at the sections that have the last key of a path; `near` is the hint at a key with a similar name.
+    """Hint that names the sections with the last key of a path; `near` is the hint for a key with a similar name.
 
-    The hint is `near` if the key resembles a key of its own section, or if no section has it. The hint names the
-    sections that share most of the path, and is empty if they are more than `_MAX_HINT_PATH_COUNT`.
+    The result is `near` if the key resembles a key of its own section, or if no section has the key. Otherwise the
+    hint names the sections whose path has most keys in common with this path. It is empty if there are more than
+    `_MAX_HINT_PATH_COUNT` of them.
     """
     *above, name = _names(path[:_MAX_PATH_CHARACTERS]) or [""]
     sections = [key.split(".")[:-1] for key in all_keys() if key.rpartition(".")[2] == name]
@@ -267,12 +275,12 @@ def section_hint(path: str, near: str) -> str:
 
 
 def _is_key(name: str) -> bool:
-    """Whether any section has a key."""
+    """Whether any section has a key of this name."""
     return any(key.rpartition(".")[2] == name for key in all_keys())
 
 
 def _names(path: str) -> list[str]:
-    """Keys of a path, without the numbers of lists."""
+    """Keys in a path, without the indices of lists."""
     return [step for step in parts_of(path) if not step.isdigit()]
 
 
@@ -283,7 +291,7 @@ def _keys_of(section: Sequence[str]) -> list[str]:
 
 
 def _split(names: list[str]) -> tuple[str, str]:
-    """The longest known beginning of a path, and the remainder of the path."""
+    """Split a path into its longest known beginning and the remainder."""
     paths = all_keys()
     count = next((count for count in range(len(names), 0, -1) if ".".join(names[:count]) in paths), 0)
     return ".".join(names[:count]), ".".join(names[count:])
@@ -308,7 +316,7 @@ def _spelt_right(steps: Sequence[str]) -> str:
 
 
 def _shared(names: list[str], other_names: list[str]) -> int:
-    """Number of keys with which two paths begin alike."""
+    """Number of keys at the beginning that two paths have in common."""
     return next(
         (at for at, (a, b) in enumerate(zip(names, other_names, strict=False)) if a != b),
         min(len(names), len(other_names)),
@@ -328,18 +336,21 @@ ACCEPTED_ERRORS = (
 
 
 def is_error(key: str) -> bool:
-    """Whether a key is the size of an error: in a section of errors, and no interval, frequency or the like."""
+    """Whether a key states the size of an error.
+
+    It is in a section of errors, and is not an interval, a frequency or a similar number.
+    """
     steps = parts_of(key)
     return any(step in _ERROR_KEYS for step in steps[:3]) and steps[-1] not in _NO_SIZES
 
 
 def name_of_error(key: str) -> str:
-    """The name of an error in rows: `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
+    """Name of an error in rows, such as `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
     return ".".join(step for step in parts_of(key) if step not in ("platforms", "motion_error"))
 
 
 def report_specified(tree: Tree) -> None:
-    """Report the keys of `allocation.specify` that name no errors."""
+    """Report the keys in `allocation.specify` that are not keys of errors."""
     specify = tree.root["allocation"]["specify"]
     for index, key in enumerate(specify):
         path = ("allocation", "specify", key if isinstance(specify, dict) else index)

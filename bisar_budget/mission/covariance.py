@@ -1,6 +1,6 @@
 """Position-velocity covariance of a platform's motion error: readers of its two forms, and checks.
 
-A file has the 6 x 6 matrix, or sigmas with their correlations. A mission holds sigmas and a correlation matrix. The
+A file has either a 6 x 6 matrix or sigmas with their correlations. A mission holds sigmas and a correlation matrix. A
 correlation matrix has no units, so a tolerance means the same for metres and for millimetres per second.
 """
 
@@ -53,18 +53,18 @@ class Covariance(NamedTuple):
     pairs: tuple[str, ...] = ()
 
     def of(self, kind: str) -> Vector:
-        """Marginal sigmas of a kind, position or velocity, along the frame's axes."""
+        """Sigmas of the position errors or of the velocity errors along the axes of the frame; `kind` names which."""
         first = 3 * MOTION_KINDS.index(kind)
         a, b, c = self.sigmas[first : first + 3]
         return (a, b, c)
 
     def block(self, kind: str) -> list[tuple[float, ...]]:
-        """Correlations (3, 3) of the errors of a kind among each other."""
+        """Correlations (3, 3) among the position errors or among the velocity errors; `kind` names which."""
         first = 3 * MOTION_KINDS.index(kind)
         return [row[first : first + 3] for row in self.correlation[first : first + 3]]
 
     def path(self, kind: str, axis: int) -> KeyPath:
-        """Path below `covariance` of the sigma of an error in the file."""
+        """Path, below `covariance` in the file, of the sigma of an error."""
         index = 3 * MOTION_KINDS.index(kind) + axis
         return (index, index) if self.is_matrix else (kind, axis)
 
@@ -74,7 +74,7 @@ class Covariance(NamedTuple):
 
 
 def _problems(correlation: _Matrix) -> Iterator[Problem]:
-    """Problem of a correlation matrix that is not positive semi-definite."""
+    """Yield a problem if a correlation matrix is not positive semi-definite."""
     smallest = float(np.linalg.eigvalsh(correlation)[0])
     if smallest <= -EIGENVALUE_TOLERANCE_FRACTION:
         yield Problem(
@@ -87,7 +87,10 @@ def _problems(correlation: _Matrix) -> Iterator[Problem]:
 def _rows(
     value: object, readers: Sequence[Sequence[Reader[float]]], path: KeyPath, report: Report, otherwise: str
 ) -> list[tuple[float, ...]] | Invalid:
-    """Read a 6 x 6 matrix as six lists; `INVALID` after a report."""
+    """Read a 6 x 6 matrix as six rows; returns `INVALID` after a report.
+
+    `otherwise` describes the other accepted form in messages.
+    """
     if not isinstance(value, list) or len(value) != MATRIX_SIZE:
         given = f", {len(value)} given" if isinstance(value, list) else ""
         accepted = f"accepted: x, y, z of position, then of velocity, or {otherwise}"
@@ -113,14 +116,17 @@ def _rows(
 
 
 def _report_all(faults: Sequence[Problem], path: KeyPath, report: Report) -> bool:
-    """Report faults; True if there are any."""
+    """Report faults; returns whether there are any."""
     for fault in faults:
         report(path, fault)
     return bool(faults)
 
 
 def _asymmetries(rows: Sequence[Sequence[float]], scales: Sequence[float]) -> Iterator[Problem]:
-    """Problems of elements that differ from their mirror element, in units of the scales of row and column."""
+    """Yield a problem for each element that differs from its mirror element.
+
+    Differences are compared with the product of the scales of row and column.
+    """
     for i in range(MATRIX_SIZE):
         for j in range(i):
             if abs(rows[i][j] - rows[j][i]) > _ELEMENT_TOLERANCE_FRACTION * scales[i] * scales[j]:
@@ -128,7 +134,7 @@ def _asymmetries(rows: Sequence[Sequence[float]], scales: Sequence[float]) -> It
 
 
 def _symmetric(rows: Sequence[Sequence[float]]) -> _Matrix:
-    """Mean of a matrix and its transpose, with a diagonal of 1, and elements within ±1."""
+    """Mean of a matrix and its transpose, with a diagonal of 1 and elements limited to ±1."""
     return tuple(
         tuple(1.0 if i == j else max(-1.0, min(1.0, (rows[i][j] + rows[j][i]) / 2)) for j in range(MATRIX_SIZE))
         for i in range(MATRIX_SIZE)
@@ -171,7 +177,7 @@ class _MatrixReader(Reader[Covariance]):
 
 
 def _excesses(rows: Sequence[Sequence[float]], sigmas: Sequence[float]) -> Iterator[Problem]:
-    """Problems of elements that are larger than the product of their sigmas."""
+    """Yield a problem for each element that is larger than the product of its sigmas."""
     for i in range(MATRIX_SIZE):
         for j in range(i):
             most = sigmas[i] * sigmas[j]
@@ -302,7 +308,7 @@ COVARIANCE = either(dict, _SigmasReader(Sigmas), _MatrixReader())
 
 
 def misplaced_axes(covariance: Covariance, frame: str) -> Iterator[Problem]:
-    """Problems of pairs that name an axis which the frame does not have; paths are below `motion_error`."""
+    """Yield a problem for each pair with an axis that the frame does not have; paths are below `motion_error`."""
     for pair in covariance.pairs:
         for name in pair.split("-"):
             axis = name.strip().partition(".")[2]

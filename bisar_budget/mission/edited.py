@@ -1,4 +1,4 @@
-"""Text of a mission file with changed values; everything else stays as it was written, comments included."""
+"""Changes of values in the text of a mission file. All other text, including comments, stays unchanged."""
 
 import json
 import os
@@ -20,9 +20,9 @@ Node = Any
 
 
 def with_values(text: str, changes: Sequence[SetValue]) -> str:
-    """Text of a valid mission file with changed values; the values are texts as a file has them.
+    """Replace values in the text of a valid mission file; the new values are texts as in a file.
 
-    Missing sections are made.
+    Missing sections are added. An option with a null removes its key.
     """
     is_of_dos = "\r\n" in text
     text = text.replace("\r\n", "\n")
@@ -35,9 +35,9 @@ def with_values(text: str, changes: Sequence[SetValue]) -> str:
 
 
 def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
-    """Text of a mission file with a section of keys and values, in place of the section of that name or at the end.
+    """Put a section of keys and values into the text of a mission file.
 
-    Keys of the section may have dots.
+    It replaces an existing section of the same name, or is added at the end. Keys of the section may contain dots.
     """
     is_of_dos, text = "\r\n" in text, text.replace("\r\n", "\n")
     root: Node = yaml.compose(text, Loader=_LOADER)
@@ -61,7 +61,7 @@ def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
 
 
 def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
-    """Values with which the file of a mission, moved to a folder, names the same files from there."""
+    """Yield changes that let the file of a mission name the same files after it is moved to a folder."""
     for key, name in (*path_files(mission), *_named_part_files(mission)):
         if os.path.isabs(name):
             continue
@@ -74,7 +74,7 @@ def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
 
 
 def _named_part_files(mission: Mission) -> Iterator[tuple[str, str]]:
-    """Keys under which a mission names files of parts, with the names; parts of a catalogue are left out."""
+    """Yield the keys under which a mission names files of parts, and the names; parts of a catalogue are left out."""
     for owner, platform in mission.platforms._asdict().items():
         sensor = platform.motion_error.sensor
         key = f"platforms.{owner}.motion_error.sensor"
@@ -87,7 +87,7 @@ def _named_part_files(mission: Mission) -> Iterator[tuple[str, str]]:
 
 
 def _with_value(text: str, steps: tuple[str, ...], value: str) -> str:
-    """The text with a value at a path of keys."""
+    """Set the value at a path of keys in a text."""
     node: Node = yaml.compose(text, Loader=_LOADER)
     while True:
         key, remaining = _next(node, steps)
@@ -102,7 +102,10 @@ def _with_value(text: str, steps: tuple[str, ...], value: str) -> str:
 
 
 def _without_key(text: str, parts: tuple[str, ...]) -> str:
-    """The text without a key and its value; a section without other keys becomes empty. Other comments stay."""
+    """Remove a key and its value from a text, if the key exists.
+
+    A section that has no other keys becomes empty. Comments elsewhere stay.
+    """
     node: Node = yaml.compose(text, Loader=_LOADER)
     end_of_key = 0
     while True:
@@ -130,7 +133,7 @@ def _without_key(text: str, parts: tuple[str, ...]) -> str:
 
 
 def _next(node: Node, parts: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
-    """The next key or index of a path within a node, and the parts behind it; a key may have dots itself."""
+    """Split a path into its first key or index within a node and the remaining parts; a key may contain dots."""
     names: dict[str, None] | list[Node] = (
         {key.value: None for key, _ in node.value} if isinstance(node, yaml.MappingNode) else list(node.value)
     )
@@ -139,21 +142,21 @@ def _next(node: Node, parts: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
 
 
 def _below(node: Node, name: str) -> Node:
-    """The node at a key or an index; None if there is none."""
+    """Node at a key or an index of a node; None if there is none."""
     if isinstance(node, yaml.MappingNode):
         return next((value for key, value in node.value if key.value == name), None)
     return node.value[int(name)] if int(name) < len(node.value) else None
 
 
 def _end_of_key(node: Node, name: str) -> int:
-    """Index in the text of the end of a mapping's key, or of the start of a list."""
+    """Index in the text at which a key of a mapping ends; for a list, the index at which the list begins."""
     if not isinstance(node, yaml.MappingNode):
         return int(node.start_mark.index)
     return next(int(key.end_mark.index) for key, _ in node.value if key.value == name)
 
 
 def _replaced(text: str, node: Node, value: str, end_of_key: int) -> str:
-    """The text with a value in place of a node; comments within a node of several lines stay."""
+    """Replace a node in a text by a value; comments within a node of several lines stay."""
     start, end = node.start_mark.index, node.end_mark.index
     if isinstance(node, yaml.ScalarNode):
         is_apart = start == 0 or text[start - 1].isspace()
@@ -170,7 +173,7 @@ def _replaced(text: str, node: Node, value: str, end_of_key: int) -> str:
 
 
 def _without_trailing_comments(inside: str) -> str:
-    """Lines without comments and blank lines at their end."""
+    """Remove comments and blank lines from the end of a text."""
     lines = inside.splitlines(keepends=True)
     while lines and (not lines[-1].strip() or lines[-1].lstrip().startswith("#")):
         lines.pop()
@@ -178,14 +181,14 @@ def _without_trailing_comments(inside: str) -> str:
 
 
 def _nested(parts: Sequence[str], value: str) -> str:
-    """A value below nested keys, in one line."""
+    """Text of a value below nested keys, in one line."""
     for part in reversed(parts):
         value = f"{{{part}: {value}}}"
     return value
 
 
 def _with_entry(text: str, node: Node, key: str, remaining: Sequence[str], value: str) -> str:
-    """The text with a further key of a mapping, or a further entry of a list, in the style of that node."""
+    """Add a further key to a mapping, or a further entry to a list, in the style of that node."""
     nested_value, start, end = _nested(remaining, value), node.start_mark.index, node.end_mark.index
     entry = nested_value if isinstance(node, yaml.SequenceNode) else f"{key}: {nested_value}"
     if node.flow_style:

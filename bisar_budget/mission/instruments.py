@@ -307,25 +307,28 @@ class Oscillator(NamedTuple):
 
     @property
     def needs_frequency(self) -> bool:
-        """Whether the mask or the tones hold at a frequency; a power law describes the fractional frequency."""
+        """Whether the noise is stated for a carrier frequency, as a mask or as tones.
+
+        A power law describes the fractional frequency, and needs no carrier frequency.
+        """
         return self.phase_noise is not None or bool(self.spurs)
 
     @property
     def mask_at_frequency_of_part(self) -> Overridden | None:
-        """Noise figure of a part that a mask without a frequency replaces; the mask applies at the part's frequency.
+        """Noise figure of a part that is replaced by a mask without a frequency; None if there is none.
 
-        None if no figure is replaced in this way.
+        The mask then applies at the frequency of the part.
         """
         return next((figure for figure in self.overridden if figure.frequency), None)
 
     @property
     def noise_alone(self) -> "Oscillator":
-        """The oscillator without level, aging and vibration."""
+        """The oscillator without its level, aging and vibration, so that only its noise remains."""
         return self._replace(level=0.0, aging=None, acceleration_sensitivity=None, vibration=None)
 
     @staticmethod
     def problems(values: SectionValues, or_else: str = _OR_SENSOR) -> Iterator[Problem]:
-        """Require one form, and possible slopes of a mask; `or_else` names what else is accepted."""
+        """Require exactly one form of noise, and possible slopes of a mask; `or_else` names what else is accepted."""
         forms = [form for form in OSCILLATOR_NOISE_FORMS if values.get(form) is not None]
         accepted = f"accepted: one of {', '.join(OSCILLATOR_NOISE_FORMS)}"
         for form in forms[1:]:
@@ -412,12 +415,12 @@ class Synchronization(NamedTuple):
 
     @property
     def is_direct_path(self) -> bool:
-        """Whether the receiver receives the transmitter directly, and no pulses are exchanged."""
+        """Whether the receiver receives the transmitter's signal directly, without an exchange of pulses."""
         return self.method == "direct_path"
 
     @property
     def is_holdover(self) -> bool:
-        """Whether the clocks were set before the aperture, and run free during it."""
+        """Whether the clocks are set before the aperture, and run free during the aperture."""
         return self.method == "holdover"
 
     @staticmethod

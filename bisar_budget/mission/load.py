@@ -1,4 +1,4 @@
-"""Reading of a mission file: a plain tree with positions (`tree`), a `Mission` of the tree, faults with their lines.
+"""Reader of mission files: a plain tree with positions (`tree`), then a `Mission`, or faults with their lines.
 
 Every text gives a `Mission` or a `MissionError`.
 """
@@ -25,12 +25,13 @@ def load_mission(
 ) -> Mission:
     """Read the mission file at `path`; `-` is standard input.
 
-    `model` replaces the model of the file, and `changes` its values. `is_placed` is as in `parse_mission`.
+    `model` replaces the model in the file, and `changes` replace values in the file. `is_placed` is as in
+    `parse_mission`.
 
     Raises
     ------
     MissionError
-        The file cannot be read, or is no usable mission; carries every fault.
+        The file cannot be read, or is no usable mission. The error contains every fault.
     """
     try:
         data = held(path, MAX_BYTES, lambda: _content(path))
@@ -57,7 +58,7 @@ def _content(path: str) -> bytes:
 
 
 def _bounded(file: BinaryIO) -> bytes:
-    """At most `MAX_BYTES + 1` bytes of a file, read in two steps: a large buffer would cost page faults."""
+    """At most `MAX_BYTES + 1` bytes of a file, read in two steps, because a large buffer would cost page faults."""
     data = file.read(1 << 14)
     return data + file.read(MAX_BYTES + 1 - len(data)) if len(data) == 1 << 14 else data
 
@@ -113,7 +114,10 @@ def mission_of(
     *,
     is_placed: bool = True,
 ) -> Mission:
-    """Turn the tree of a mission file into a `Mission`, and change the tree; other arguments as `parse_mission`."""
+    """Turn the tree of a mission file into a `Mission`; the tree is changed.
+
+    The other arguments are the same as in `parse_mission`.
+    """
     if changes:
         from bisar_budget.mission.changes import apply_changes
 
@@ -162,7 +166,7 @@ def mission_of(
 
 
 def _recording(find: _Find, parts: dict[str, PartFile]) -> _Find:
-    """A function that finds parts like `find`, and puts the file of each part into `parts`."""
+    """Return a function that finds parts like `find`, and adds the file of each found part to `parts`."""
 
     def find_and_record(name: str) -> tuple[str, bytes]:
         file, content = find(name)
@@ -173,12 +177,12 @@ def _recording(find: _Find, parts: dict[str, PartFile]) -> _Find:
 
 
 def folder_of(file: str) -> str:
-    """Folder to which names in a mission file are relative; for standard input the current folder."""
+    """Folder for relative file names in a mission file; the current folder for a mission from standard input."""
     return os.path.dirname(file) if file != "-" else ""
 
 
 def _with_hint(fault: Fault) -> Fault:
-    """A fault with a hint, for an unknown key: at the nearest known key, or at the sections that have the key."""
+    """Add a hint to the fault of an unknown key: the nearest known key, or the sections that have the key."""
     is_unknown = fault.problem.endswith("is not a known key")
     if not is_unknown or (fault.hint and not fault.hint.startswith("Did you mean")):
         return fault
@@ -192,7 +196,7 @@ def _with_hint(fault: Fault) -> Fault:
 
 
 def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
-    """A fault of the file with a hint that names the options: without them there may be no fault."""
+    """Add a hint to a fault that names the options, because without them there may be no fault."""
     return (
         fault if fault.option else fault._replace(hint=sentences(fault.hint, f"Read with {changes_words(changes)}"))
     )
@@ -209,7 +213,7 @@ class Named:
     def parse(
         self, tree: Tree, data: bytes, file: str, model: str | None = None, *, changes: Sequence[SetValue] = ()
     ) -> Mission:
-        """Read a mission that names only these files; arguments and faults are as in `mission_of`."""
+        """Read a mission that names only these files; arguments and errors are the same as in `mission_of`."""
         content_by_name = {part_file.name: (part_file.file, part_file.data) for part_file in self.parts}
         return mission_of(tree, data, file, model, dict(self.paths).__getitem__, changes, content_by_name.__getitem__)
 
@@ -224,7 +228,9 @@ class Named:
 
 
 def named_by(mission: Mission, also: Sequence[SetValue] = ()) -> Named:
-    """Read all files that a mission names, also with each value of `also` in turn.
+    """Read all files that a mission names, and also the files that it names with each change in `also`.
+
+    Each change is applied alone.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The mission file, schema_version 1: every key with its type and meaning. Values are in SI and radians."""
+"""The mission file, schema_version 1: every key with its type and meaning. Values are in SI units and radians."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -72,7 +72,7 @@ class Radar(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require a band above 0 Hz."""
+        """Require the lower edge of the band to be above 0 Hz."""
         if (
             values.keys() >= {"bandwidth", "center_frequency"}
             and values["bandwidth"] >= 2 * values["center_frequency"]
@@ -124,7 +124,7 @@ class Scene(NamedTuple):
 
     @property
     def axes(self) -> SceneAxes | None:
-        """East, north and up of the scene in Earth-fixed axes; None if the file states no position."""
+        """East, north and up of the scene in Earth-fixed axes; None if the file states no position on the Earth."""
         if self.latitude is None or self.longitude is None or self.height is None:
             return None
         return axes_at(Geodetic(self.latitude, self.longitude, self.height))
@@ -150,7 +150,7 @@ class EarthOrientation(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require figures that go together, or a table."""
+        """Require values that belong together, or a table."""
         figures = [key for key in values if key != "file" and values[key] is not None]
         if values.get("file") is not None:
             if figures:
@@ -162,7 +162,7 @@ class EarthOrientation(NamedTuple):
 
     @property
     def orientation(self) -> Orientation:
-        """Orientation by the figures; an unstated pole is unknown, with its doubt."""
+        """Orientation of the Earth from the stated values; a pole that is not stated has its usual doubt."""
         x, y = self.polar_motion_x, self.polar_motion_y
         pole, doubt = UNKNOWN.pole, UNKNOWN.pole_doubt
         if x is not None and y is not None:
@@ -191,7 +191,7 @@ class OtherError(NamedTuple):
 
     @staticmethod
     def any_of() -> tuple[str, ...]:
-        """Keys of the effects."""
+        """Keys of the effects, of which at least one is required."""
         return OTHER_EFFECTS
 
     @staticmethod
@@ -202,7 +202,7 @@ class OtherError(NamedTuple):
 
     @property
     def stated(self) -> dict[str, float]:
-        """Size of each effect that the file states, by row id."""
+        """Size of each effect that the file states, by the id of its row."""
         first, *further = OTHER_EFFECTS
         sizes = {f"other.{self.name}": getattr(self, first)}
         sizes |= {f"other.{self.name}.{effect}": getattr(self, effect) for effect in further}
@@ -251,12 +251,15 @@ class Requirements(NamedTuple):
 
 
 def least_age(averaging: PerCase, aperture_time: PerCase) -> PerCase:
-    """Least age of a clock setting whose averaging does not overlap with the aperture. [s]"""
+    """Smallest age of a clock setting for which its averaging time does not overlap with the aperture. [s]"""
     return (averaging + aperture_time) / 2
 
 
 def _unset_clocks(values: SectionValues) -> Iterator[Problem]:
-    """Problems of clocks that were set: too late, or with their errors stated twice."""
+    """Yield problems of clocks that are set before or during the aperture.
+
+    The problems are an averaging time that overlaps with the aperture, and clock errors that are stated twice.
+    """
     sync, collection, timing = (values.get(key) for key in ("synchronization", "collection", "timing_error"))
     if sync is None or sync.is_direct_path:
         return
@@ -286,12 +289,15 @@ def _unset_clocks(values: SectionValues) -> Iterator[Problem]:
 
 
 def least_bandwidth(aperture_time: PerCase) -> PerCase:
-    """Least bandwidth of an oscillator's noise, a cycle per aperture; with a smaller one no noise counts. [Hz]"""
+    """Smallest useful bandwidth of an oscillator's noise: one cycle per aperture. [Hz]
+
+    With a smaller bandwidth, no noise of the oscillator counts.
+    """
     return 1 / aperture_time
 
 
 def _noise_cut_off(values: SectionValues) -> Iterator[Problem]:
-    """Problems of oscillators whose bandwidth excludes all noise of the aperture."""
+    """Yield a problem for each oscillator whose bandwidth excludes all noise within the aperture."""
     platforms, collection = values.get("platforms"), values.get("collection")
     if platforms is None or collection is None:
         return
@@ -318,7 +324,7 @@ class Shares(NamedTuple):
     reserve: Annotated[float, Key(Quantity(units.RATIO, ge=0, lt=1))] = 0.0
 
     def of(self, owner: str) -> float:
-        """Share of an owner; 1 for errors of the mission, which have no owner."""
+        """Share of an owner. It is 1 for the owner `mission`, which stands for errors without an owner."""
         if owner == "clock":
             return self.receiver if self.clock is None else self.clock
         if owner == "mission":
@@ -326,7 +332,7 @@ class Shares(NamedTuple):
         return self.transmitter if owner == "transmitter" else self.receiver
 
     def includes(self, owner: str, of: str) -> bool:
-        """Whether an owner's errors count against the share of `of`; all errors count against the mission's."""
+        """Whether the errors of an owner count against the share of `of`; all errors count against `mission`."""
         return of in ("mission", owner) or (owner == "clock" and of == "receiver" and self.clock is None)
 
     @staticmethod
@@ -356,7 +362,7 @@ METRIC_SPLITS = Section(MetricSplits)
 
 
 def _form_of_split(value: object) -> Reader[str | Shares | MetricSplits]:
-    """Reader of a split: a rule, shares, or splits by metric."""
+    """Reader of a split, which is a rule, shares, or splits by metric."""
     if not isinstance(value, dict):
         return RULE
     return SHARES if value.keys().isdisjoint(METRIC_SPLITS.keys) else METRIC_SPLITS
@@ -509,7 +515,7 @@ class Mission(NamedTuple):
     taken: tuple[TakenFigure, ...] = ()
 
     def __repr__(self) -> str:
-        """File and name, on one line."""
+        """Text of one line with the file and the name of the mission."""
         return f"Mission({self.file!r}, {shown(self.name)!r})"
 
     def _repr_html_(self) -> str:
@@ -537,7 +543,7 @@ class Mission(NamedTuple):
         return isinstance(other, Mission) and tuple(self._replace(places={})) == tuple(other._replace(places={}))
 
     def __ne__(self, other: object) -> bool:
-        """Whether two missions differ; defined because a tuple has an answer of its own."""
+        """Whether two missions differ; defined because the comparison of a tuple would be used otherwise."""
         return not self == other
 
     def replace(self, values: Mapping[str, object]) -> "Mission":
@@ -548,7 +554,7 @@ class Mission(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require a collection that forms an image, and distinct names."""
+        """Require paths and a collection that form an image, and distinct names of other errors."""
         platforms: Platforms | None = values.get("platforms")
         if platforms is not None and not any(platform.is_of_the_earth for platform in platforms):
             collection, synchronization = values.get("collection"), values.get("synchronization")
@@ -586,26 +592,29 @@ class Mission(NamedTuple):
 
     @property
     def gating_model(self) -> str:
-        """The model that gates: with a direct path the full model, because the published model has no direct path."""
+        """The model that gates, which is the full model if there is a direct path.
+
+        The published model has no direct path.
+        """
         return "full" if self.has_direct_path else self.allocation.model
 
     def line(self, path: KeyPath) -> Place | None:
-        """Line of a value in the mission file, from 1, or else of the nearest key above it that exists.
+        """Place of a value in the mission file, or of the nearest key above it that exists; lines count from 1.
 
-        The last resort is the first key of the file. None for a mission without a file, and for a value that an
-        option set.
+        If there is no such key, the first key of the file is used. The result is None for a mission without a file,
+        and for a value that an option set.
         """
         event = next(filter(None, map(self.places.get, (*upwards(path), ()))), None)
         return None if event is None or isinstance(event, Changed) else Place.of(event)
 
     def is_changed(self, path: KeyPath) -> bool:
-        """Whether a value, or a section or list around it, comes from an option."""
+        """Whether an option set a value, or a section or list that contains it."""
         event = next(filter(None, map(self.places.get, upwards(path))), None)
         return bool(self.changes) and isinstance(event, Changed)
 
 
 def _at_a_glance(state: PlatformState) -> str:
-    """Position and motion of a platform in a line."""
+    """Text of one line with a platform's slant range, elevation and speed."""
     speed = math.hypot(*state.velocity)
     moves = "stands still" if state.is_still else f"moves at {format_quantity(speed, 'm/s', 4)}"
     slant_range = format_quantity(float(state.slant_range), "m", 4)
@@ -613,7 +622,7 @@ def _at_a_glance(state: PlatformState) -> str:
 
 
 def has_instruments(mission: Mission) -> bool:
-    """Whether a mission has sensors, lever arms, clocks or spectra, whose errors are random over an aperture."""
+    """Whether a mission has sensors, lever arms, clocks or spectra, whose errors vary randomly over an aperture."""
     return (
         mission.synchronization is not None
         or any(
@@ -630,7 +639,7 @@ def has_instruments(mission: Mission) -> bool:
 
 
 def has_random_errors(mission: Mission) -> bool:
-    """Whether a mission has sensors, clocks, delays in the air, or other errors that are no quadratic phase."""
+    """Whether a mission has sensors, clocks, propagation delays, or other errors than a quadratic phase error."""
     return (
         has_instruments(mission)
         or mission.propagation is not None
@@ -639,7 +648,7 @@ def has_random_errors(mission: Mission) -> bool:
 
 
 def flies_on_earth(mission: Mission) -> bool:
-    """Whether paths of a mission depend on the position of the scene on the Earth, or on files."""
+    """Whether paths of a mission depend on files, or on the position of the scene on the Earth."""
     common = mission.common_motion_error
     return (
         mission.scene.is_on_earth
@@ -657,7 +666,7 @@ def names_parts(mission: Mission) -> bool:
 
 
 def names_files(root: Mapping[str, object]) -> bool:
-    """Whether the content of a file, mission or not, names a part, an orbit or a log."""
+    """Whether the content of a file, valid or not, names a part, an orbit or a log."""
     platforms = root.get("platforms")
     sections = platforms.values() if isinstance(platforms, dict) else ()
     return any(
@@ -674,7 +683,7 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 
 
 def mission_schema() -> JsonObject:
-    """JSON Schema of a mission; quantities are text with a unit, which only the tool checks, or a bare number."""
+    """JSON Schema of a mission. A quantity is a bare number, or text with a unit; only the tool checks the unit."""
     definitions: Definitions = {}
     return {
         "$schema": DRAFT,

@@ -1,7 +1,7 @@
-"""Parts of the catalogue: inertial sensors, GNSS receivers and oscillators, their figures and the sources of these.
+"""Parts of the catalogue: inertial sensors, GNSS receivers and oscillators, with their figures and sources.
 
-Each part has one YAML file: in `specs/sensors/`, in a folder that a project names, or anywhere by its path. A mission
-names parts. A figure that the mission states itself overrides the figure of the part.
+Each part has one YAML file. The file is in `specs/sensors/`, in a folder that a project names, or anywhere if it is
+named by its path. A mission names parts. A figure that the mission states itself overrides the figure of the part.
 """
 
 import os
@@ -147,7 +147,7 @@ class OscillatorPart(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Check the part as an oscillator of a mission, and require noise that is not zero."""
+        """Check the part like an oscillator of a mission, and require noise that is not zero."""
         yield from Oscillator.problems({**values, "sensor": None}, or_else="")
         if any(values.get(form) is not None for form in OSCILLATOR_NOISE_FORMS):
             yield from _without_figure(values, OSCILLATOR_NOISE_FORMS)
@@ -189,7 +189,7 @@ class PartError(Exception):
 
 
 def evidence(part: Part, figure: str) -> str:
-    """Evidence for a figure of a part: the name of the part and the source of the figure."""
+    """Evidence for a figure of a part: the name of the part, and the source of the figure."""
     source = part.source if isinstance(part.source, str) else part.source.get(figure, "")
     return f"{part.name}: {source}"
 
@@ -214,19 +214,19 @@ class Entry:
 
 
 def entries(places: Sequence[str]) -> Iterator[Entry]:
-    """Read every part of the catalogue, ordered by kind and name.
+    """Yield all parts of the catalogue, ordered by kind and name.
 
     Raises
     ------
     PartError
-        One of the files is no part.
+        A file is not a valid part.
     """
     read = [_entry(file, _content(file, DISK)) for file in catalogue(places).values()]
     yield from sorted(read, key=lambda entry: (list(PART_SECTIONS).index(entry.part.kind), entry.id))
 
 
 def figure_text(value: object) -> str:
-    """A figure as the file of its part writes it, in one line."""
+    """Text of one line with a figure as the file of its part writes it."""
     if isinstance(value, dict):
         return ", ".join(f"{key}: {figure_text(item)}" for key, item in value.items())
     if isinstance(value, list):
@@ -235,12 +235,12 @@ def figure_text(value: object) -> str:
 
 
 def read_entry(file: str) -> Entry:
-    """Read the file of a part, `-` for standard input, as for a mission that names it; the file name is checked too.
+    """Read the file of a part as for a mission that names it; `-` is standard input. The file name is checked too.
 
     Raises
     ------
     PartError
-        No mission can use the part; carries every fault.
+        No mission can use the part. The error contains every fault.
     """
     data = _standard_input() if file == "-" else _content(file, DISK)
     faults = () if file == "-" else tuple(_name_faults(file))
@@ -254,7 +254,7 @@ def read_entry(file: str) -> Entry:
 
 
 def _name_faults(file: str) -> Iterator[Fault]:
-    """Faults of a file name by which no mission can name the part."""
+    """Yield faults of a file name that no mission can use to name the part."""
     name = os.path.basename(file)
     if not name.endswith(_SUFFIXES):
         accepted = f"accepted: one that ends in {' or '.join(_SUFFIXES)}"
@@ -285,7 +285,7 @@ def _standard_input() -> bytes:
 
 @lru_cache(maxsize=64)  # a thousand missions name the same parts
 def _entry(file: str, data: bytes) -> Entry:
-    """Read a part; parts that were read before come from the cache."""
+    """Read a part from the content of its file; parts that were read before come from a cache."""
     part: Part | Invalid = INVALID
     try:
         tree = read_tree(data, file, "part")
@@ -299,9 +299,10 @@ def _entry(file: str, data: bytes) -> Entry:
 
 
 def _part_of(tree: Tree) -> Part | Invalid:
-    """The part of a file; `INVALID` after a report.
+    """Read the part in the tree of its file; returns `INVALID` after a report.
 
-    A file without a valid kind is read as the kind with most of its figures, so that all faults are reported at once.
+    A file without a valid kind is read as the kind that has most of the file's figures, so that all faults are
+    reported at once.
     """
     root = tree.root
     kind = root.get("kind")
@@ -319,7 +320,7 @@ def _part_of(tree: Tree) -> Part | Invalid:
 
 
 def _no_kind(root: Mapping[str, object], likely: str) -> Problem:
-    """The problem with a missing or unknown kind; `likely` is the kind that the figures belong to, or empty."""
+    """Problem for a missing or unknown kind; `likely` is the kind to which the figures belong, or empty."""
     hint = did_you_mean(root.get("kind", ""), tuple(PART_SECTIONS))
     if likely:
         hint = f"Its figures are those of kind: {likely}"
@@ -330,13 +331,16 @@ def _no_kind(root: Mapping[str, object], likely: str) -> Problem:
 
 
 def _without_figure(values: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
-    """A problem if all figures are missing or zero; none if `values` lacks a figure because it was reported."""
+    """Yield a problem if all figures of a part are missing or zero.
+
+    There is no problem if `values` lacks a figure, because an invalid figure is reported elsewhere.
+    """
     if values.keys() >= set(figures) and not any(_is_not_zero(values[figure]) for figure in figures):
         yield Problem("states no figure", f"accepted: one of {', '.join(figures)} that is not zero")
 
 
 def _without_source(root: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
-    """A problem if sources are given by figure and a figure of the file, valid or not, has none."""
+    """Yield a problem if sources are given by figure, and a figure of the file, valid or not, has no source."""
     source = root.get("source")
     if not isinstance(source, dict):
         return
@@ -350,7 +354,7 @@ def _without_source(root: Mapping[str, object], figures: Sequence[str]) -> Itera
 
 
 def _is_not_zero(figure: object) -> bool:
-    """Whether a figure is stated and not zero: no sensor is without error."""
+    """Whether a figure is stated and not zero, because no sensor is without error."""
     if isinstance(figure, GaussMarkov):
         return _is_not_zero(figure.sigma)
     if isinstance(figure, tuple | list):
@@ -359,12 +363,12 @@ def _is_not_zero(figure: object) -> bool:
 
 
 def folders(beside: str, files: Files = DISK) -> list[str]:
-    """Folders that are searched for parts: the folders of the project's settings, then the catalogue of this package.
+    """Folders that are searched for parts: the folders in the project's settings, then the catalogue of this package.
 
     Raises
     ------
     PartError
-        The project's settings cannot be read.
+        The settings of the project cannot be read.
     """
     try:
         settings = project_settings(beside or os.getcwd(), files)
@@ -377,7 +381,7 @@ def folders(beside: str, files: Files = DISK) -> list[str]:
 
 
 def catalogue(places: Sequence[str], files: Files = DISK) -> dict[str, str]:
-    """File of each part by its name; parts of a folder hide parts of the same name in later folders."""
+    """File of each part by its name; a part hides the parts of the same name in later folders."""
     part_file_by_name: dict[str, str] = {}
     for folder in places:
         for file in part_files(folder, files)[:_MAX_FOLDER_FILES]:
@@ -386,7 +390,7 @@ def catalogue(places: Sequence[str], files: Files = DISK) -> dict[str, str]:
 
 
 def part_files(folder: str, files: Files = DISK) -> list[str]:
-    """Files of a folder that are parts by their suffixes; raises `PartError` if the folder cannot be listed."""
+    """Files in a folder whose suffix is that of a part; raises `PartError` if the folder cannot be listed."""
     try:
         names = files.names(folder)
     except OSError as error:
@@ -420,7 +424,7 @@ def find_part(name: str, beside: str) -> Part:
 
 
 def is_file(name: str) -> bool:
-    """Whether the name of a part is the path of a file, and not a name of the catalogue."""
+    """Whether a mission names a part by the path of a file, and not by its name in the catalogue."""
     return name.endswith(_SUFFIXES)
 
 
@@ -440,7 +444,7 @@ def _file_of(name: str, beside: str, files: Files) -> str:
 
 
 def with_parts(mission: Mission, find: Find, report: Report) -> Mission | Invalid:
-    """The mission with the figures of its parts; `INVALID` after a report. `find` raises `PartError`."""
+    """Add the figures of its parts to a mission; returns `INVALID` after a report. `find` raises `PartError`."""
     is_valid, taken = True, list[TakenFigure]()
     platforms = mission.platforms
     for name, platform in platforms._asdict().items():
@@ -457,9 +461,9 @@ def with_parts(mission: Mission, find: Find, report: Report) -> Mission | Invali
 
 
 def report_parts(root: Mapping[str, object], find: Find, report: Report) -> None:
-    """Report problems with the parts of a file that is no mission for other reasons.
+    """Report problems with the parts that an otherwise invalid mission file names.
 
-    A valid section is checked together with its parts as in a mission. For an invalid section only the names of its
+    A valid section is checked together with its parts as in a mission. For an invalid section, only the names of its
     parts are checked. `root` is the content of the file.
     """
     platforms = root.get("platforms")
@@ -475,7 +479,7 @@ def report_parts(root: Mapping[str, object], find: Find, report: Report) -> None
 
 
 def _stand_in(section: Section[object], value: object) -> SectionValues:
-    """Values of a section if all of them are valid, else only the names of its parts."""
+    """Values of a section if all of them are valid; otherwise only the names of its parts."""
     values = section.each(value)
     if INVALID not in values.values():
         return values
@@ -485,7 +489,7 @@ def _stand_in(section: Section[object], value: object) -> SectionValues:
 def _parts_of(
     names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequence[str], find: Find, report: Report
 ) -> dict[str, Entry] | Invalid:
-    """Entries of parts by their names; `INVALID` after a report."""
+    """Find parts by their names, and read them; returns their entries by name, or `INVALID` after a report."""
     is_list = isinstance(names, tuple)
     entry_by_name: dict[str, Entry] = {}
     is_valid = True
@@ -513,10 +517,10 @@ def _parts_of(
 def _with_sensors(
     error: MotionError, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]
 ) -> MotionError | Invalid:
-    """A motion error with figures of parts in place of missing figures; `INVALID` after a report.
+    """Add figures of parts to a motion error that lacks them; returns `INVALID` after a report.
 
-    Figures taken from parts are appended to `taken`. A figure of the file overrides the same figure of a part, and
-    the motion error lists it as overridden.
+    Figures that come from parts are appended to `taken`. A figure in the file overrides the same figure of a part,
+    and the motion error lists it as overridden.
     """
     path = (*path, "sensor")
     entries = _parts_of(error.sensor, path, ("imu", "gnss"), find, report)
@@ -552,14 +556,14 @@ def _with_sensors(
 
 
 def _taken(name: str, entry: Entry, section: KeyPath, figures: Collection[str]) -> Iterator[TakenFigure]:
-    """Notes on the figures that a section takes from a part, in the order of the part's file."""
+    """Yield the figures that a section takes from a part, in the order of the part's file."""
     for figure in entry.figures:
         if figure in figures:
             yield TakenFigure(".".join(map(str, (*section, figure))), entry.written[figure], name)
 
 
 def _own_key(error: MotionError, stating: MotionError | Imu, figure: str) -> str:
-    """Key below the platform that states a figure in addition to a part; empty if the part alone states it."""
+    """Key below the platform that states a figure which a part also states; empty if only the part states it."""
     if figure in ("position", "velocity"):
         if error.covariance is not None:
             return "motion_error.covariance"
@@ -573,12 +577,12 @@ def _own_key(error: MotionError, stating: MotionError | Imu, figure: str) -> str
 def _with_sensor(
     oscillator: Oscillator, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]
 ) -> Oscillator | Invalid:
-    """An oscillator with the figures of its part; `INVALID` after a report.
+    """Add the figures of its part to an oscillator; returns `INVALID` after a report.
 
-    Figures taken from the part are appended to `taken`. A figure of the file overrides the same figure of the part,
-    and the oscillator lists it as overridden. A mask holds at the frequency at which it was measured: with another
-    frequency, the same decibels would describe a better or a worse oscillator. So the file has to state both, or
-    neither.
+    Figures that come from the part are appended to `taken`. A figure in the file overrides the same figure of the
+    part, and the oscillator lists it as overridden. A mask is valid at the frequency at which it was measured. With
+    another frequency, the same decibels would describe a better or a worse oscillator. So the file has to state both,
+    or neither.
     """
     if oscillator.sensor is None:
         return oscillator
@@ -633,7 +637,7 @@ _NOT_EMPTY: JsonObject = {"not": {"const": []}}  # an empty list states no figur
 
 
 def part_schema() -> JsonObject:
-    """JSON Schema of the file of a part, with one alternative for each kind; quantities as in `mission_schema`."""
+    """JSON Schema of the file of a part, with an alternative for each kind; quantities are as in `mission_schema`."""
     definitions: Definitions = {}
     kinds = []
     for kind, section in PART_SECTIONS.items():
@@ -652,10 +656,10 @@ def part_schema() -> JsonObject:
 
 
 def _rules(figures: Sequence[str]) -> JsonObject:
-    """Schema rules between the figures of a part: at least one is stated, and each has a source.
+    """Schema rules for the figures of a part: at least one is stated, and each has a source.
 
-    An oscillator has exactly one form of noise, and a mask has its frequency. The rules do not see figures that are
-    zero; the reader does.
+    An oscillator has exactly one form of noise, and a mask has its frequency. The rules cannot detect figures that
+    are zero; the reader does.
     """
     by_itself = [figure for figure in figures if figure not in ("frequency", *BESIDE_NOISE)]
     alternatives = [{"required": [figure], "properties": {figure: _NOT_EMPTY}} for figure in by_itself]

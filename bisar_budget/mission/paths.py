@@ -1,4 +1,4 @@
-"""Paths of the platforms of a mission: from an orbit, the log of a flight or a geodetic position."""
+"""Paths of the platforms of a mission, from an orbit, from a flight log, or from a geodetic position."""
 
 import hashlib
 import math
@@ -112,7 +112,7 @@ def reader_of(folder: str, files: Files = DISK) -> Beside:
 
 
 def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
-    """Keys under which a mission names the file of a path or of the Earth's orientation, with the names."""
+    """Yield the keys under which a mission names files of paths or of the Earth's orientation, and the names."""
     for name, platform in mission.platforms._asdict().items():
         for key, section in (("orbit", platform.orbit), ("trajectory", platform.trajectory)):
             for form in _FILE_KEYS:
@@ -123,7 +123,7 @@ def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
 
 
 def report_files(root: Mapping[str, object], read: Beside, report: Report) -> None:
-    """Report orbits and logs that cannot be read, for a file that is no mission for other reasons.
+    """Report orbits and logs that cannot be read, for a mission file that is invalid for other reasons.
 
     Their content is not checked here, because a path depends on the scene, time and aperture of a valid mission.
     `root` is the content of the mission file.
@@ -145,7 +145,10 @@ def report_files(root: Mapping[str, object], read: Beside, report: Report) -> No
 
 
 def with_paths(mission: Mission, read: Beside, report: Report) -> Mission | Invalid:
-    """The mission with the paths of its platforms; `INVALID` after a report. `read` may raise `PathFileError`."""
+    """Add the paths of the platforms to a mission; returns `INVALID` after a report.
+
+    `read` may raise `PathFileError`.
+    """
     axes, platforms, is_valid = mission.scene.axes, mission.platforms, True
     if (orientation_problem := _unusable_orientation(mission, read)) is not None:
         report(("earth_orientation", "file"), orientation_problem)
@@ -175,7 +178,10 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Mission | Inva
 
 
 def _unusable_orientation(mission: Mission, read: Beside) -> Problem | None:
-    """Problem of the table of the Earth's orientation, whether a path needs it or not; None if it can be used."""
+    """Problem with the table of the Earth's orientation; None if the table can be used.
+
+    The table is checked even if no path needs it.
+    """
     section, center = mission.earth_orientation, mission.collection.center_time
     if section is None or section.file is None:
         return None
@@ -189,7 +195,7 @@ def _unusable_orientation(mission: Mission, read: Beside) -> Problem | None:
 
 
 def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | None, read: Beside) -> Platform:
-    """A platform with its path, and with the errors that the source of the path states."""
+    """Add its path to a platform, and the errors that the source of the path states."""
     if platform.orbit is not None:
         path = _of_orbit(mission, platform.orbit, _required_axes(axes, "orbit"), read)
     elif platform.trajectory is not None:
@@ -214,21 +220,21 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
 
 
 def _file_problem(file: str | None, error: PathFileError) -> Problem:
-    """The problem with a path file that a key may name; the text of the problem names the file only once."""
+    """Problem with a path file that a key may name; the text of the problem names the file only once."""
     words = str(error)
     words = f"{file} {words}" if file is not None and words.startswith("has ") else words
     return Problem(words, error.accepted, error.hint, names_value=file is not None and words.startswith(file))
 
 
 def _required_axes(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
-    """The axes of a scene on the Earth; raises `_UnusablePathError` if the scene has none."""
+    """Axes of a scene on the Earth; raises `_UnusablePathError` if the scene has no position on the Earth."""
     if axes is None:
         raise _UnusablePathError((key,), Problem("needs the scene's position on the Earth", _ACCEPTED_SCENE))
     return axes
 
 
 def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
-    """The path with the axes of its `ric` frame, of a scene on the Earth; without them where there are none."""
+    """Add the axes of the `ric` frame to a path, for a scene on the Earth; unchanged if these axes are undefined."""
     try:
         return replace(state, radial=axes.radial(state.position, state.velocity))
     except ZeroDivisionError:  # at rest against the stars, on the Earth's axis: no plane
@@ -236,7 +242,7 @@ def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
 
 
 def with_dynamics(state: PlatformState, axes: earth.SceneAxes | None, *, is_orbit: bool = False) -> PlatformState:
-    """The path with the dynamics of its errors if it is an orbit, or a path in free fall."""
+    """Add the dynamics of its errors to a path, if it is an orbit or is in free fall."""
     return replace(state, fall=of_scene(axes) if is_orbit else fall_of(state, axes))
 
 
@@ -273,7 +279,7 @@ class _OrbitFile(NamedTuple):
         return cls(form, None, "\n".join(source).encode(), route.object, bool(route.planned))
 
     def orbit(self, center: Instant, orientation: Orientation) -> Orbit:
-        """The orbit at an instant; raises `PathFileError` if the file has none."""
+        """The orbit at an instant; raises `PathFileError` if the file has no orbit then."""
         name = self.name or "the element set"
         hold_to_format(self.data, name, self.form)
         orbit = ORBIT_FORMATS[self.form].read(self.data, name, self.object, center, orientation)
@@ -281,16 +287,15 @@ class _OrbitFile(NamedTuple):
 
 
 def _form_of(route: OrbitSource) -> str:
-    """Key under which the mission file has the orbit."""
+    """Key of the mission file that states the orbit."""
     return next(form for form in ORBIT_FORMATS if getattr(route, form) is not None)
 
 
 def orbits_of(mission: Mission, route: OrbitSource, read: Beside) -> Callable[[Instant], Orbit]:
-    """Return a function that takes the instant of an aperture's midpoint and returns the orbit of a mission.
+    """Return a function that takes the instant of mid-aperture and returns the orbit of a mission.
 
-    The orbit is the nearest of several element sets or segments of an ephemeris. Both functions raise
-    `PathFileError`. The orientation of the Earth is that at noon of the day: UT1 - UTC changes by a millisecond per
-    day.
+    Of several element sets or segments of an ephemeris, the nearest is used. Both functions raise `PathFileError`.
+    The orientation of the Earth is taken at noon of the day, because UT1 - UTC changes by only a millisecond per day.
     """
     orbit_file = _OrbitFile.of(route, read)
 
@@ -302,7 +307,7 @@ def orbits_of(mission: Mission, route: OrbitSource, read: Beside) -> Callable[[I
 
 
 def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read: Beside) -> FlownPath:
-    """Path of a platform with an orbit."""
+    """Path of a platform that has an orbit."""
     center = mission.collection.center_time
     if center is None:
         raise _UnusablePathError(("orbit",), Problem("needs an instant", "accepted: collection.center_time"))
@@ -326,7 +331,7 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
 
 
 def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orientation, tuple[str, str] | None]:
-    """Orientation of the Earth in the middle of the aperture, and its table with the SHA-256."""
+    """Orientation of the Earth at mid-aperture, and its table with the SHA-256, or None without a table."""
     section = mission.earth_orientation
     if section is None:
         return UNKNOWN._replace(day=center.day), None
@@ -338,7 +343,7 @@ def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orien
 
 
 def _kept(cache: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...], make: Callable[[], _T]) -> _T:
-    """The value of a key, from the cache or made now; the cache keeps the `most` values that were used last."""
+    """Value of a key from a cache, or made by `make`; the cache keeps the `most` recently used values."""
     value = cache.pop(key, None) or make()
     cache[key] = value
     for old in list(cache)[:-most]:
@@ -349,7 +354,7 @@ def _kept(cache: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...
 def _orbit_path(
     orbit: Orbit, file: str | None, center: Instant, axes: earth.SceneAxes, aperture_time_s: float
 ) -> FlownPath:
-    """Path that interpolates an orbit in an aperture."""
+    """Path over an aperture that interpolates an orbit."""
     name, half, widest = file or "the element set", aperture_time_s / 2, math.inf
     if orbit.span is not None:
         before, after = center.since(orbit.span[0]), orbit.span[1].since(center)
@@ -386,7 +391,7 @@ def _orbit_path(
 
 
 def _stated_of_orbit(orbit: Orbit, center: Instant, axes: earth.SceneAxes, name: str) -> Iterator[StatedAccuracy]:
-    """Accuracy that the file of an orbit states in the middle of the aperture, along the scene's axes."""
+    """Accuracy that the file of an orbit states for mid-aperture, along the axes of the scene."""
     accuracy = orbit.stated(center)
     if accuracy is not None:
         covariance = accuracy.covariance
@@ -395,7 +400,7 @@ def _stated_of_orbit(orbit: Orbit, center: Instant, axes: earth.SceneAxes, name:
 
 
 def _hold_to_range(doubt: PathDoubt, slant_range: float, doubts: Sequence[str], remedy: str, name: str) -> None:
-    """Refuse an orbit with a doubt of more than a tenth of the slant range, because the geometry is then unknown."""
+    """Refuse an orbit whose doubt is more than a tenth of the slant range, because the geometry is then unknown."""
     if not doubt.size <= _MAX_DOUBT_FRACTION * slant_range:
         lengths = (slant_range, _MAX_DOUBT_FRACTION * slant_range, doubt.size)
         slant_range_text, largest, size = (format_quantity(length, "m", 4) for length in lengths)
@@ -408,7 +413,7 @@ def _hold_to_range(doubt: PathDoubt, slant_range: float, doubts: Sequence[str], 
 
 
 def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, read: Beside) -> FlownPath:
-    """Path of a platform with a log of its flight."""
+    """Path of a platform that has a flight log."""
     aperture_time = mission.collection.aperture_time
     try:
         data = read(route.file)
@@ -423,7 +428,7 @@ def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | N
 def _log_path(
     mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, data: bytes, digest: str
 ) -> FlownPath:
-    """Path that smooths a log in an aperture."""
+    """Path over an aperture that smooths a flight log."""
     center, aperture_time = mission.collection.center_time, mission.collection.aperture_time
     log = dated(track_around(_log(route, data, digest), center, route.center, aperture_time, route.file), center)
     if log.is_earth_fixed:
@@ -460,7 +465,7 @@ def _log_path(
 
 
 def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
-    """A log, from the cache or read now."""
+    """Read a log, or take it from the cache."""
     keys = LogKeys(route.week, route.time_scale, route.geoid_separation, route.talker, route.track, route.instance)
     key = (route.file, route.format, keys, digest)
 
@@ -474,7 +479,7 @@ def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
 def _by_accuracy(
     mission: Mission, route: TrajectorySource, error: MotionError, read: Beside
 ) -> tuple[StatedAccuracy, str]:
-    """Errors that the accuracy file of a log states, and its SHA-256."""
+    """Errors that the accuracy file of a log states for the aperture, and the SHA-256 of this file."""
     file = route.accuracy or ""
     key = ("trajectory", "accuracy")
     if error.frame != "scene":
@@ -494,10 +499,10 @@ def _by_accuracy(
 
 
 def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]:
-    """Accuracy that a log states of its fixes around the aperture: the largest sigmas, and the largest usual sigma.
+    """Accuracy of a log around the aperture: the largest stated sigmas, and the largest usual sigma.
 
-    Along an axis of which the log states none, the largest of the others counts. The usual one counts for fixes of
-    which the log does not state all sigmas.
+    If no sigma is stated along an axis, the largest sigma of the other axes is used. The usual sigma of a fix follows
+    from its quality. It is used for fixes without a complete set of stated sigmas.
     """
     unstated: Booleans = np.ones(log.times[near].shape, dtype=bool)
     if log.sigmas is not None:
@@ -516,10 +521,10 @@ def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]
 
 
 def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) -> MotionError:
-    """Motion errors with figures of the source of a path in place of missing figures of the mission file.
+    """Add the figures of a path's source to a motion error that lacks them.
 
-    The figures are along the axes of the motion error. A figure without a direction is taken on each axis, because
-    the error may have any direction. A figure of the mission file overrides the source; `overridden` lists it.
+    The figures are along the axes of the motion error. A figure without a direction is used on each axis, because the
+    error may have any direction. A figure of the mission file overrides the source, and is listed in `overridden`.
     """
     if stated.is_typical:
         return error
@@ -556,13 +561,13 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
 
 
 def _is_correlated(covariance: Floats) -> bool:
-    """Whether the errors of a covariance are correlated, beyond rounding."""
+    """Whether the errors of a covariance are correlated by more than rounding."""
     off_diagonal = np.array(correlations(covariance)) - np.eye(len(covariance))
     return bool(np.abs(off_diagonal).max() > _ROUNDED_CORRELATION_FRACTION)
 
 
 def _of_position(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float) -> FlownPath:
-    """Path along the geodesic from a geodetic position, with `speed` over ground at a height that `climb` changes."""
+    """Path along a geodesic from a geodetic position, with the platform's speed over ground and its climb rate."""
     position = earth.Geodetic(platform.latitude or 0.0, platform.longitude or 0.0, platform.altitude or 0.0)
     speed, heading, climb = platform.speed or 0.0, platform.heading or 0.0, platform.climb or 0.0
     if not speed and not climb:
@@ -581,7 +586,7 @@ def _of_position(platform: Platform, axes: earth.SceneAxes, aperture_time_s: flo
 
 
 def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | None = None) -> FlownPath:
-    """The path of a fit, with its residuals and doubts; `words` name the source."""
+    """Flown path from a fit, with its residuals and doubts; `words` name the source of the path."""
     return FlownPath(
         fitted.state,
         source=words,

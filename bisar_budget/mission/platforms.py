@@ -146,7 +146,10 @@ class MotionError(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Check that a covariance is alone, fits its frame and is normal, and that names of errors are distinct."""
+        """Require a covariance to be stated alone, to fit its frame, and to have a normal distribution.
+
+        Names of errors have to be distinct.
+        """
         yield from _names_twice(values.get("random", ()))
         covariance: Covariance | None = values.get("covariance")
         if covariance is None:
@@ -160,7 +163,7 @@ class MotionError(NamedTuple):
             yield from misplaced_axes(covariance, values["frame"])
 
     def stated(self, kind: str) -> Vector | None:
-        """Position, velocity or acceleration error along the frame's axes; marginal sigmas of a covariance."""
+        """Position, velocity or acceleration error along the axes of the frame; for a covariance, its sigmas."""
         if self.covariance is not None and kind != "acceleration":
             return self.covariance.of(kind)
         error: Vector | None = getattr(self, kind)
@@ -171,12 +174,12 @@ class MotionError(NamedTuple):
         return dict(self.of_parts).get(figure, self.source)
 
     def key_of(self, figure: str) -> str:
-        """Key under which the file states a figure, or names the part of the figure."""
+        """Key under which the file states a figure, or names the part that has the figure."""
         return "sensor" if figure in dict(self.of_parts) else figure
 
 
 def _names_twice(random: Sequence[GaussMarkov]) -> Iterator[Problem]:
-    """Problems of errors with the name of an earlier error."""
+    """Yield a problem for each error that has the name of an earlier error."""
     seen: set[str] = set()
     for index, error in enumerate(random):
         if error.name in seen:
@@ -219,7 +222,10 @@ class CommonMotionError(NamedTuple):
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file states an error. A zero is an error; axes or a source alone are not."""
+        """Whether the file states an error.
+
+        A zero counts as a stated error. Axes or a source without an error do not.
+        """
         figures = (self.position, self.velocity, self.acceleration, self.time_tag)
         return bool(self.random) or any(figure is not None for figure in figures)
 
@@ -300,7 +306,7 @@ class _Instant(Reader[Instant]):
     accepted = "2026-06-01T05:20:31.250Z and the like"
 
     def leaf(self, value: object) -> Instant:
-        """Read 2026-06-01T05:20:31.250Z, or with an offset from UTC."""
+        """Read an instant like 2026-06-01T05:20:31.250Z, or with an offset from UTC."""
         instant = parse_instant(value) if isinstance(value, str) else None
         if instant is None:
             is_zoneless = isinstance(value, str) and parse_instant(value, needs_zone=False) is not None
@@ -320,7 +326,7 @@ class _Talker(Text):
     is_word = True
 
     def leaf(self, value: object) -> str:
-        """Refuse a text that is no talker."""
+        """Return the text; refuse a text that is no talker."""
         if not isinstance(value, str) or not re.fullmatch(_TALKER, value, re.ASCII):
             raise InvalidValueError("must be two capital letters", "accepted: GN, GP and the like")
         return value
@@ -402,7 +408,7 @@ class Way:
 
     @property
     def own(self) -> tuple[str, ...]:
-        """Required keys that no other way has."""
+        """Required keys that belong to no other way."""
         return tuple(key for key in self.keys if key != "speed")
 
 
@@ -514,17 +520,17 @@ class FlownPath(NamedTuple):
 
     @property
     def is_raw(self) -> bool:
-        """Whether the path is that of a log whose fixes the processor flies without smoothing."""
+        """Whether the path comes from a log whose fixes the processor uses without smoothing."""
         return self.log_noise is not None and self.log_noise.processed == RAW
 
     @property
     def largest_doubt_m(self) -> float:
-        """Largest distance of the true path, by the doubt of the source or by its stated accuracy. [m]"""
+        """Largest distance of the true path: the doubt of the source, or its stated accuracy if larger. [m]"""
         return max([self.doubt_m, *(accuracy.position_m for accuracy in self.stated)])
 
     @property
     def beside(self) -> Mapping[str, tuple[str, str] | None]:
-        """Further files that the path depends on, with their SHA-256, by their content."""
+        """Other files on which the path depends, with their SHA-256, by what they contain."""
         return {"accuracy": self.accuracy, "earth_orientation": self.orientation}
 
 
@@ -558,7 +564,7 @@ class Platform(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require one complete geometry, above the ground and away from the scene centre."""
+        """Require one complete way to state the path, above the ground and away from the scene centre."""
         wrong = [key for key in _PATH_KEYS if key not in values]  # stated with an invalid value
         given = [key for key in _PATH_KEYS if key in wrong or values[key] is not None]
         unclear = _unclear_geometry(given, is_fixed=values.get("speed") == 0, may_be_fixed="speed" in wrong)
@@ -573,7 +579,7 @@ class Platform(NamedTuple):
                 yield from platform.without_image(values.get("motion_error"))
 
     def without_image(self, error: MotionError | None) -> Iterator[Problem]:
-        """Problems that keep the path from forming an image, or the errors from having a frame."""
+        """Yield problems of a path that forms no image, and of errors whose frame is undefined."""
         state = self.state
         if state.slant_range < 1:
             at_key: KeyPath = ("slant_range",) if self.slant_range is not None else (self.way,)
@@ -586,7 +592,7 @@ class Platform(NamedTuple):
 
     @property
     def way(self) -> str:
-        """First key of the way in which the path is stated."""
+        """First key of the way in which the file states the path."""
         firsts = [way.keys[0] for way in WAYS]
         return next((key for key in firsts if getattr(self, key) is not None), firsts[-1])
 
@@ -597,7 +603,7 @@ class Platform(NamedTuple):
 
     @property
     def state(self) -> PlatformState:
-        """The path in the frame of the scene; if it `is_of_the_earth`, only once `path` is set.
+        """The path in the frame of the scene. If it `is_of_the_earth`, it is known only once `path` is set.
 
         Numbers may be arrays (cases,).
         """
@@ -628,7 +634,7 @@ class Platform(NamedTuple):
 
 
 def _with_fall(state: PlatformState) -> PlatformState:
-    """The path, with the dynamics of its errors if it is in free fall over a scene without a place on the Earth."""
+    """Add the dynamics of its errors to a path that is in free fall over a scene without a place on the Earth."""
     if not np.any(np.asarray(state.position[2]) > LEAST_FALLING_HEIGHT_M):
         return state
     from bisar_budget.paths.free_fall import fall_of  # takes 8 ms; most missions have no satellite
@@ -637,7 +643,7 @@ def _with_fall(state: PlatformState) -> PlatformState:
 
 
 def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: bool) -> Problem | None:
-    """Problem that keeps the stated keys from being one complete way; None if they are one."""
+    """Problem of stated keys that are not one complete way to state a path; None if they are."""
     ways = [way for way in WAYS if any(key in way.own for key in given)] or WAYS[-1:]
     known_keys = (*ways[0].keys, *ways[0].optional)
     foreign = [key for key in given if key not in known_keys]
@@ -654,7 +660,7 @@ def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: boo
 
 
 def _bends(jerk: Vector | None, snap: Vector | None) -> tuple[Vector, ...]:
-    """Coefficients of τ³ and τ⁴ of a path. [m/s³], [m/s⁴]"""
+    """Coefficients of τ³ [m/s³] and τ⁴ [m/s⁴] of a path, from its jerk and snap; empty without both."""
     if jerk is None and snap is None:
         return ()
     (a, b, c), (x, y, z) = jerk or STRAIGHT, snap or STRAIGHT
@@ -681,7 +687,10 @@ def without_image(
     *,
     has_direct_path: bool,
 ) -> Iterator[Problem]:
-    """Problems that keep paths from forming an image, or errors from having axes; an invalid aperture is None."""
+    """Yield problems of paths that form no image, and of errors whose axes are undefined.
+
+    `aperture_time_s` is None if the aperture time is invalid.
+    """
     geometry = platforms.geometry
     yield from _no_image(geometry, radar, aperture_time_s)
     if common is not None:
@@ -702,7 +711,7 @@ def _no_image(geometry: BistaticGeometry, radar: "Radar | None", aperture_time_s
 
 
 def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
-    """Problems of platforms on which the frame of the common motion error is undefined."""
+    """Yield a problem for each platform on which the frame of the common motion error is undefined."""
     for name, platform in platforms._asdict().items():
         if frame == "ric" and platform.path is None:  # its radial direction follows with the path
             continue
@@ -713,9 +722,10 @@ def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
 
 
 def has_body_axes(state: PlatformState, half: PerCase, margin: float = 1.0) -> Booleans:
-    """Whether a velocity keeps a direction on the ground within apertures of half-length `half` (cases,) [s].
+    """Whether a velocity keeps a horizontal direction over apertures of half-length `half` (cases,) [s].
 
-    True for a platform that does not move, whose direction does not matter.
+    It does not if it becomes vertical, stops or turns back. True for a fixed platform, whose direction does not
+    matter.
     """
     times = half * _FINE_APERTURE_TIMES
     u, v, w = (np.broadcast_to(component, times.shape) for component in state.at(times)[1])
@@ -728,7 +738,7 @@ def has_body_axes(state: PlatformState, half: PerCase, margin: float = 1.0) -> B
 
 
 def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
-    """Problems of lever arms on platforms whose velocity has no direction on the ground during the aperture."""
+    """Yield a problem for each lever arm on a platform whose velocity does not keep a horizontal direction."""
     for name, platform in platforms._asdict().items():
         if platform.motion_error.lever_arm is None or platform.state.is_still:
             continue
@@ -741,7 +751,7 @@ def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
 
 
 def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: float) -> Iterator[Problem]:
-    """Problems of platforms that go below the ground during the aperture."""
+    """Yield a problem for each platform that goes below the ground during the aperture."""
     for (name, platform), state in zip(platforms._asdict().items(), geometry.both, strict=True):
         lowest = min(state.place(tau)[2] for tau in _turning_points(state, aperture_time / 2))
         if lowest < 0 <= state.position[2]:
@@ -757,12 +767,15 @@ def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: floa
 
 
 def least_baseline(apart: PlatformState, half: PerCase) -> Floats:
-    """Least distance of the platforms over an aperture of half-length `half` [s]. [m]"""
+    """Smallest distance between the platforms over apertures of half-length `half` [s]. [m]
+
+    `apart` is the path of one platform relative to the other.
+    """
     return np.asarray(norm(apart.place(half * _FINE_APERTURE_TIMES)).min(axis=0))
 
 
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
-    """Problem of platforms that come too near each other for a direct path."""
+    """Yield a problem if the platforms come too close to each other for a direct path."""
     least, travelled = float(least_baseline(apart, half)[0]), apart.travelled(half)
     if least < max(MIN_BASELINE_M, travelled / MAX_TRAVEL_RATIO):
         yield Problem(
@@ -774,9 +787,11 @@ def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
 
 
 def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
-    """Slow times at which a platform can be lowest: the ends of the aperture, and where the platform stops sinking.
+    """Slow times at which a platform can be lowest. [s]
 
-    For a path that bends more than once, times a 64th of the aperture apart.
+    These are the ends of the aperture, and the time at which the platform stops sinking.
+
+    For a path that is no quadratic polynomial, the times have steps of 1/64 of the aperture.
     """
     yield from (-half, half)
     if not state.is_quadratic:

@@ -1,4 +1,4 @@
-"""Delays in the air that remain after correction, on the leg of each platform. Values are SI, 1 sigma."""
+"""Propagation delays that remain after correction, on the leg of each platform. Values are SI, 1 sigma."""
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, NamedTuple
@@ -39,7 +39,7 @@ class LegDelay(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Reject a leg without a delay."""
+        """Refuse a leg without a delay."""
         if not values.keys() >= {*DELAYS, _CORRELATION_TIME_KEY} or any(
             values[delay] is not None for delay in DELAYS
         ):
@@ -81,7 +81,7 @@ class Propagation(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Reject delays of both legs together with delays of one leg, no delay, and a time without a delay."""
+        """Refuse delays of both legs together with delays of one leg, no delay at all, and a time without a delay."""
         if not values.keys() >= {*DELAYS, _CORRELATION_TIME_KEY, *Platforms._fields}:
             return
         of_both = [delay for delay in DELAYS if values[delay] is not None]
@@ -110,11 +110,11 @@ class Propagation(NamedTuple):
 
     @property
     def is_one_air(self) -> bool:
-        """Whether the delays are stated once, for the same air over both legs."""
+        """Whether the delays are stated once for both legs, which then share the same air."""
         return self.transmitter is None and self.receiver is None
 
     def content(self, platform: str) -> float | None:
-        """Electron content at the zenith for the leg of a platform; None if the file states none. [1/m²]"""
+        """Zenith electron content for the leg of a platform; None if the file states none. [1/m²]"""
         leg = self.leg(platform)
         return None if leg is None else leg.zenith_electron_content
 
@@ -134,7 +134,7 @@ class Propagation(NamedTuple):
         return platform_leg._replace(correlation_time=time, source=platform_leg.source or self.source)
 
     def path(self, platform: str, delay: str) -> KeyPath:
-        """Path in the file of a figure of a leg."""
+        """Path of keys in the file to a delay of a leg."""
         return ("propagation", *(() if self.is_one_air else (platform,)), delay)
 
 
@@ -142,7 +142,7 @@ PROPAGATION = Section(Propagation)
 
 
 def height_of(position: Vectors) -> PerCase:
-    """Height of positions (…) above the sphere of the Earth's mean radius that touches the scene. [m]"""
+    """Height of positions (…) above a sphere with the Earth's mean radius that touches the scene centre. [m]"""
     x, y, z = position
     distance: PerCase = np.sqrt(x * x + y * y + (z + EARTH_RADIUS_M) ** 2)
     return distance - EARTH_RADIUS_M
@@ -156,7 +156,7 @@ def elevation_deg(position: Vectors) -> Floats:
 
 
 def least_elevation_deg(path: PlatformState, aperture_time_s: PerCase) -> Floats:
-    """Least elevation of a platform over the aperture, seen from the scene centre. [deg]"""
+    """Smallest elevation of a platform during the aperture, seen from the scene centre. [deg]"""
     half = np.asarray(aperture_time_s, dtype=float) / 2
     least: Floats = elevation_deg(path.place(_COARSE_APERTURE_TIMES * half)).min(axis=0)
     return least
@@ -165,7 +165,7 @@ def least_elevation_deg(path: PlatformState, aperture_time_s: PerCase) -> Floats
 def least_elevations(
     propagation: Propagation, paths: Mapping[str, PlatformState], aperture_time_s: PerCase
 ) -> Iterator[tuple[str, str, Floats]]:
-    """Platform, figure and least elevation over the aperture [deg], for each stated delay of a leg."""
+    """Yield platform, figure and smallest elevation during the aperture [deg] for each stated delay of a leg."""
     for name, path in paths.items():
         leg = propagation.leg(name)
         if leg is None:
@@ -179,7 +179,7 @@ def least_elevations(
 
 
 def too_low(propagation: Propagation, platforms: Platforms, aperture_time_s: float) -> Iterator[Problem]:
-    """Problems of delays on legs that run along the ground."""
+    """Yield a problem for each delay on a leg that runs along the ground."""
     paths = dict(zip(Platforms._fields, platforms.geometry.both, strict=True))
     for name, delay, least in least_elevations(propagation, paths, aperture_time_s):
         (degrees,) = least.tolist()

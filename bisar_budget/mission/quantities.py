@@ -1,6 +1,7 @@
 """Numbers of a mission by their keys: reader, value and unit of a number in the file, and its field in a mission.
 
-Callers give values as a file would have them: texts, numbers in SI, or quantities of other packages.
+Callers give values in the forms that a file accepts: texts, or numbers in SI. Quantities of other packages are
+accepted too.
 """
 
 import functools
@@ -101,7 +102,10 @@ class Number(NamedTuple):
         return self.dimension.scales.get(self.unit) or (1.0, 1.0)
 
     def text(self, value: float, *, is_up: bool | None = None) -> str:
-        """Value in the number's unit with `ANSWER_DIGITS` digits, rounded up, down, or (None) to the nearest."""
+        """Text of a value in SI in the number's unit with `ANSWER_DIGITS` digits.
+
+        It is rounded up or down for `is_up` true or false, and to the nearest for None.
+        """
         factor, divisor = self.scale
         number = value / factor * divisor
         if is_up is not None:
@@ -110,13 +114,16 @@ class Number(NamedTuple):
         return f"{number:.{ANSWER_DIGITS}g}{' ' if self.unit else ''}{self.unit}"
 
     def said_like(self, between: str | None) -> "Number":
-        """The number in the unit of a range's upper end, if the file has no value whose unit could be used."""
+        """The number with the unit of a range's upper end, if the file has no value whose unit could be used."""
         unit = units.unit_behind((between or "").rpartition("..")[2])
         unit = unit if unit in self.dimension.scales else units.normal_unit(unit)
         return self._replace(unit=unit) if self.value is None and unit in self.dimension.scales and unit else self
 
     def read(self, text: str) -> float:
-        """Value in SI of a text that `text` wrote, equal to the value of the file's reader within rounding."""
+        """Read a text that `text` wrote, and return its value in SI.
+
+        Within rounding, the value is the same as that of the file's reader.
+        """
         return parse_quantity(text, self.dimension)
 
 
@@ -137,7 +144,7 @@ Varied = Number | Choices
 
 
 def tree_of(mission: Mission) -> JsonObject:
-    """Content of a mission's file, changed by the mission's options: texts, lists and mappings."""
+    """Content of a mission's file after its options are applied: texts, lists and mappings."""
     tree = read_tree(mission.data or b"", mission.file)
     apply_changes(tree, mission.changes)
     root: JsonObject = tree.root
@@ -145,7 +152,7 @@ def tree_of(mission: Mission) -> JsonObject:
 
 
 def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool = False) -> Number:
-    """The number that a key names; a scalar that holds for each of three axes counts as a number.
+    """Find the number that a key names; a single value for all three axes counts as a number.
 
     Parameters
     ----------
@@ -154,9 +161,9 @@ def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool
     key : str
         Path of the key.
     of_all : str
-        Words of the message for a key with three numbers: what else is accepted.
+        Words for what else is accepted, in the message for a key with three numbers.
     is_for_each : bool
-        Whether the number is to hold for each axis. The value is then the largest of the three in the file.
+        Whether the number is meant for each axis. The value is then the largest of the three in the file.
 
     Raises
     ------
@@ -183,10 +190,10 @@ def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool
 
 
 def choices_of(tree: JsonObject, key: str, text: str) -> Choices | None:
-    """The key if a word can be its value; None for a key with a number, or with anything else.
+    """The key as one with words, if a word can be its value; None for a key with a number, or with anything else.
 
-    `text` is the new value: for shares of a budget the rule, for parts a list. Raises `QuestionError` if the key does
-    not exist.
+    `text` is the new value. For shares of a budget it is the rule, and for parts it may be a list. Raises
+    `QuestionError` if the key does not exist.
     """
     reader, value = _reader_and_value(tree, key)
     reader = form_of(reader, [] if text.startswith("[") else text)
@@ -202,7 +209,7 @@ def choices_of(tree: JsonObject, key: str, text: str) -> Choices | None:
 
 
 def as_number(key: str, reader: Quantity, value: object) -> Number:
-    """A number with the unit of its texts; `value` is the file's value, None if it has none."""
+    """A number with the unit of its text; `value` is the value in the file, None if there is none."""
     dimension = reader.dimension
     number = parse_quantity(value, dimension) if isinstance(value, str) else value if type(value) is float else None
     unit = units.unit_behind(value) if isinstance(value, str) else ""
@@ -213,7 +220,7 @@ def as_number(key: str, reader: Quantity, value: object) -> Number:
 
 
 def _reader_and_value(tree: JsonObject, key: str) -> tuple[Reader[object], Content]:
-    """Reader of a key, which may be one of several forms, and the file's value, None if it has none."""
+    """Reader of a key, and the value in the file, None if there is none. The reader may have several forms."""
     reader: Reader[object] = MISSION
     value: Content = tree
     steps = parts_of(key)
@@ -241,7 +248,7 @@ def _reader_and_value(tree: JsonObject, key: str) -> tuple[Reader[object], Conte
 
 
 def form_of(reader: Reader[object], value: object) -> Reader[object]:
-    """The form of a reader that reads a value."""
+    """The form of a reader that reads a given value."""
     while isinstance(reader, OneOf):
         reader = reader.pick(value)
     return reader
@@ -256,7 +263,7 @@ class Range(NamedTuple):
     is_circle: bool = False
 
     def places(self, count: int) -> list[float]:
-        """`count` values over the range, with both ends."""
+        """`count` values in the range, including both ends."""
         fractions = [index / (count - 1) for index in range(1, count - 1)]
         if self.is_log:
             between = [self.low * (self.high / self.low) ** fraction for fraction in fractions]
@@ -266,7 +273,10 @@ class Range(NamedTuple):
 
 
 def range_of(number: Number, between: str | None) -> Range:
-    """Read `A..B`; None gives two decades around the file's value, and for angles all that the key accepts.
+    """Read a range `A..B`.
+
+    If `between` is None, the range is two decades around the value in the file, and for angles all that the key
+    accepts.
 
     Raises
     ------
@@ -331,13 +341,13 @@ _CURVE_ABSCISSAS: Mapping[str, Dimension] = {
 
 
 def with_number(mission: Mission, key: str, number: SectionValue) -> Mission:
-    """The mission with a number, or an array over cases, as the value of a key."""
+    """Set the value of a key in a mission to a number, or to an array over cases."""
     changed_mission: Mission = _with_value(mission, parts_of(key), number)
     return changed_mission
 
 
 def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue) -> SectionValue:
-    """A value with a number at a path below it; at a triple the number goes into all three axes."""
+    """Set the number at a path below a value; a triple gets the number on all three axes."""
     if not steps:
         return (number, number, number) if isinstance(value, tuple) else number
     if isinstance(value, Covariance):
@@ -358,7 +368,7 @@ def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue)
 
 
 def _with_point(curve: SectionValue, name: str, point: str, number: SectionValue) -> SectionValue:
-    """A curve with another ordinate at the point that a text names."""
+    """Set the ordinate of a curve at the point that a text names."""
     if isinstance(curve, Spectrum):
         return curve._replace(points=_with_point(curve.points, name, point, number))
     here = parse_quantity(point, _CURVE_ABSCISSAS[name])
@@ -366,7 +376,10 @@ def _with_point(curve: SectionValue, name: str, point: str, number: SectionValue
 
 
 def _with_element(covariance: Covariance, steps: Sequence[str], number: SectionValue) -> Covariance:
-    """A covariance with another sigma of one axis or of all axes, or with another correlation of a pair."""
+    """Set sigmas or a correlation of a covariance.
+
+    `steps` name one axis, a kind of error with all its axes, or a pair of correlated errors.
+    """
     kind, *remaining = steps
     if kind in MOTION_KINDS:
         first = 3 * MOTION_KINDS.index(kind)
@@ -382,15 +395,15 @@ def _with_element(covariance: Covariance, steps: Sequence[str], number: SectionV
 
 
 def value_at(mission: Mission, key: str) -> SectionValue:
-    """The value of a key in a mission, in SI: a number, a tuple of three numbers, or None.
+    """Value of a key in a mission, in SI: a number, a tuple of three numbers, or None.
 
-    The value of a covariance is the sigma. A figure that comes from a part is the part's figure.
+    For a covariance the value is the sigma. For a figure that comes from a part it is the part's figure.
     """
     return _value_below(mission, parts_of(key))
 
 
 def _value_below(value: SectionValue, steps: Sequence[str]) -> SectionValue:
-    """The value at a path below a value; None if there is none."""
+    """Value at a path below another value; None if there is none."""
     if not steps or value is None:
         return value
     if isinstance(value, Covariance):
@@ -413,7 +426,7 @@ def _point(curve: SectionValue, name: str, point: str) -> PerCase | None:
 
 
 def _element(covariance: Covariance, steps: Sequence[str]) -> float | Vector | None:
-    """Sigma of an axis, or the three sigmas, of a covariance; None for a correlation."""
+    """Sigma of one axis, or all three sigmas, of a covariance; None for a correlation, which is no size."""
     kind, *axis = steps
     if kind not in MOTION_KINDS:
         return None  # a correlation is no size
@@ -422,7 +435,7 @@ def _element(covariance: Covariance, steps: Sequence[str]) -> float | Vector | N
 
 # ---------------------------------------------------------------- specified sizes of errors
 def with_specifications(mission: Mission, tree: Tree) -> Mission:
-    """The mission with its `specifications` as numbers of their keys; problems become faults of the tree."""
+    """Convert the `specifications` of a mission to numbers of their keys; problems become faults of the tree."""
     read = {}
     for key, text in mission.specifications.items():
         path = ("specifications", key)
@@ -445,9 +458,9 @@ def with_specifications(mission: Mission, tree: Tree) -> Mission:
 
 
 def largest_at(mission: Mission, number: Number) -> PerCase | None:
-    """The size that a mission states for an error, the largest of three axes; None if it states none.
+    """Size that a mission states for an error, the largest of three axes; None if it states none.
 
-    The level of a spectrum that states none is 0 dB.
+    If a spectrum has no stated level, its level is 0 dB.
     """
     value: Vector | PerCase | None = value_at(mission, number.key)
     if value is None and parts_of(number.key)[-1] in ("level", "spectrum_level"):
@@ -466,15 +479,16 @@ def largest_at(mission: Mission, number: Number) -> PerCase | None:
 
 # ---------------------------------------------------------------- values that a caller gives
 def changed(mission: Mission, values: Mapping[str, object]) -> Mission:
-    """A mission with values that replace values of the file or are added to them, as with `--set`.
+    """Change or add values of a mission, as `--set` does.
 
     Parameters
     ----------
     mission : Mission
-        As loaded.
+        The mission as loaded.
     values : mapping of str to str, float, sequence, quantity or None
-        By the path of a key in the mission file, such as `collection.aperture_time`: a text as the file would have
-        it, `"8 s"`; a number in SI; a list of three; a quantity of pint or astropy; None takes the key out.
+        New values by the paths of their keys in the mission file, such as `collection.aperture_time`. A value is a
+        text as in a file, such as `"8 s"`; a number in SI; a list of three; or a quantity of pint or astropy. None
+        removes the key.
 
     Raises
     ------
@@ -487,7 +501,7 @@ def changed(mission: Mission, values: Mapping[str, object]) -> Mission:
 
 
 def _si_of(tree: JsonObject, key: str) -> str:
-    """SI unit of a key's numbers; empty if the key has no number with a unit."""
+    """SI unit of the numbers of a key; empty if the key has no number with a unit."""
     for number_key in (key, f"{key}.0"):
         try:
             return number_of(tree, number_key).dimension.si
@@ -497,7 +511,7 @@ def _si_of(tree: JsonObject, key: str) -> str:
 
 
 def text_of(si: str, value: object) -> str:
-    """Text in a mission file for a text, number, quantity, list of them, or None; numbers are in the SI unit.
+    """Text for a mission file from a text, number, quantity, list of them, or None; numbers are in the SI unit.
 
     Raises
     ------
@@ -529,13 +543,13 @@ def is_quantity(value: object) -> TypeGuard[Measured]:
 
 
 def magnitude(value: Measured, unit: str) -> Measured:
-    """The number or array of a quantity in a unit."""
+    """Number or array of a quantity, converted to a unit."""
     if hasattr(value, "to_value"):
         return value.to_value(unit)
     return value.to(unit.replace("^", "**") or "dimensionless").magnitude
 
 
 def _unit_of(value: Measured) -> str:
-    """The unit of a quantity, as a mission file writes it."""
+    """Unit of a quantity in the spelling of a mission file."""
     unit = str(value.unit) if hasattr(value, "to_value") else f"{value.units:~}"
     return unit.replace("**", "^").replace(" ", "")

@@ -1,9 +1,11 @@
-"""How a value of a mission file is read: one reader per kind of value, which also writes its JSON Schema.
+"""Readers of values in a mission file: one reader per kind of value, which also writes the JSON Schema of the kind.
 
 A section of the file is a `NamedTuple` whose keys are annotated with `Key(reader, description)`; see `model`. A
-reader takes the content of the file: a text, list or mapping, or for a case of a sweep a number in SI. It reports
-problems through `report`, and returns `INVALID` after a report. Readers do for a mission file what a validation
-library would do, in a fifth of the import time: `check` starts in every commit of somebody's repository.
+reader takes the content of the file, which is a text, list or mapping, or for a case of a sweep a number in SI. It
+reports problems through `report`, and returns `INVALID` after a report.
+
+A validation library would do the same, but its import takes five times as long. The import time matters because users
+run `check` in every commit of a repository.
 """
 
 import math
@@ -57,7 +59,7 @@ _NOT_SINGLE = {"type": ["array", "object", "null"]}  # JSON Schema: lists, mappi
 
 
 def date_schema(pattern: str) -> JsonObject:
-    """JSON Schema of a date or an instant: a text, or a type of dates that YAML readers have and JSON has not."""
+    """JSON Schema of a date or an instant: a text, or a date type that YAML readers return and JSON does not have."""
     return {"not": {"type": ["array", "object", "null", "boolean", "number"]}, "pattern": pattern}
 
 
@@ -67,7 +69,7 @@ class Reader(Generic[T_co]):
     is_word = False
 
     def read(self, value: object, path: KeyPath, report: Report) -> T_co | Invalid:
-        """Return the value, or `INVALID` after a report. `leaf` raises the problem as `InvalidValueError`."""
+        """Return the value, or `INVALID` after a report of the problem that `leaf` raises."""
         try:
             return self.leaf(value)
         except InvalidValueError as error:
@@ -75,7 +77,7 @@ class Reader(Generic[T_co]):
             return INVALID
 
     def leaf(self, value: object) -> T_co:
-        """Return the value; raises `InvalidValueError`."""
+        """Return the value; raises `InvalidValueError` for an invalid value."""
         raise NotImplementedError
 
     def below(self, step: str) -> "Reader[object] | None":
@@ -113,7 +115,7 @@ class Quantity(Reader[float]):
         self.bounds = (gt, ge, lt, le)
 
     def leaf(self, value: object) -> float:
-        """Parse the text of a number, or take a float in SI, and check the bounds."""
+        """Read a number from a text, or take a float in SI, and check the bounds."""
         if type(value) is float and math.isfinite(value):
             number = value
         else:
@@ -137,11 +139,11 @@ class Quantity(Reader[float]):
         raise InvalidValueError(f"must be {words} {bound_text}", hint=self._unit_hint(self._text(value)))
 
     def _text(self, value: object) -> object:
-        """A float as a file would write it; other values unchanged."""
+        """Text of a float as a file would write it; other values are unchanged."""
         return f"{value!r} {self.dimension.si}".rstrip() if type(value) is float else value
 
     def _unit_hint(self, value: object) -> str:
-        """Hint at the unit that a bare number may lack."""
+        """Hint that names the unit which may be missing after a bare number."""
         text = str(value).strip()
         if not text or not text[-1].isdigit():
             return ""
@@ -165,7 +167,7 @@ class Quantity(Reader[float]):
         return {"allOf": [accepted], **bounds} if bounds else accepted
 
     def _sides_of_zero(self) -> JsonObject:
-        """JSON Schema of the sign of a number in any unit, if the bounds exclude a sign or zero."""
+        """JSON Schema for the sign of a number in any unit, if the bounds exclude zero or one sign."""
         gt, ge, lt, le = self.bounds
         if self.dimension.offsets:  # a unit shifts the zero
             return {}
@@ -185,7 +187,7 @@ _UNIT_ALIASES = ("dps", "mdps", "dph", "micro-g", "milli-g")  # further spelling
 
 
 def _quantity_schema(dimension: Dimension) -> JsonObject:
-    """JSON Schema of a kind of quantity: text that begins with a number and has no unit of another kind behind it."""
+    """JSON Schema of a kind of quantity: text that begins with a number, without a unit of another kind after it."""
     number = r"[+-]?(?!0\d)(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
     all_units = {unit for dimension_of_unit in units.DIMENSIONS for unit in dimension_of_unit.units if unit}.union(
         _UNIT_ALIASES
@@ -207,7 +209,7 @@ class Triple(Reader[tuple[float, ...]]):
         self.or_scalar = or_scalar
 
     def read(self, value: object, path: KeyPath, report: Report) -> tuple[float, ...] | Invalid:
-        """Read each component; a problem is reported at its own path."""
+        """Read each of the three components; a problem with a component is reported at its own path."""
         bracketed = "" if isinstance(value, list) else self._bracketed(value)
         if self.or_scalar and not isinstance(value, list) and not bracketed:
             scalar = self.component.read(value, path, report)
@@ -223,9 +225,10 @@ class Triple(Reader[tuple[float, ...]]):
         return components if are_valid(components) else INVALID
 
     def _bracketed(self, value: object) -> str:
-        """Hint to put brackets around three values; empty if the value is not three values.
+        """Hint to put brackets around three values; empty if the text is not three values.
 
-        Each of the three has a unit or is 0: `1,234,567 m` may be one number, and `1, 2, 3 km` are not three lengths.
+        Each of the three values needs a unit, or has to be 0. The reason is that `1,234,567 m` may be one number, and
+        `1, 2, 3 km` is not three lengths.
         """
         if not isinstance(value, str):
             return ""
@@ -243,7 +246,7 @@ class Triple(Reader[tuple[float, ...]]):
         return f"Did you mean [{', '.join(text.strip() for text in texts)}]?"
 
     def below(self, step: str) -> Reader[object] | None:
-        """Reader of one component."""
+        """Reader of one component; None if the step is no index."""
         return self.component if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
@@ -257,7 +260,10 @@ class Text(Reader[str]):
     """One line of printable text."""
 
     def leaf(self, value: object) -> str:
-        """Refuse empty, long and unprintable texts: control characters could change a terminal or a report."""
+        """Return the text; refuse empty, long and unprintable texts.
+
+        Control characters could change a terminal or a report.
+        """
         if not isinstance(value, str):
             raise InvalidValueError("must be text")
         if not value.strip():
@@ -269,7 +275,10 @@ class Text(Reader[str]):
         return value
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema of any single value: YAML readers make a number of 007, true of `yes`, a date of 2026-06-01."""
+        """JSON Schema of any single value, because YAML readers convert some texts.
+
+        They read 007 as a number, `yes` as true, and 2026-06-01 as a date.
+        """
         pattern = r"^(?=.*\S)[^\u0000-\u001f\u007f-\u009f\u2028\u2029\ufeff\u202a-\u202e\u2066-\u2069]*$"
         words = {"description": "One line of text."}
         definitions.setdefault(
@@ -288,7 +297,7 @@ class Glob(Text):
     """An id, or a pattern of ids with `*`, `?` and `[...]`."""
 
     def leaf(self, value: object) -> str:
-        """Refuse a pattern with more than `_MAX_WILDCARD_COUNT` wildcards, which takes long to match."""
+        """Return the pattern; refuse more than `_MAX_WILDCARD_COUNT` wildcards, because matching would take long."""
         pattern = super().leaf(value)
         if sum(map(pattern.count, "*?[")) > _MAX_WILDCARD_COUNT:
             raise InvalidValueError(f"must have at most {_MAX_WILDCARD_COUNT} wildcards")
@@ -304,7 +313,7 @@ class Choice(Reader[str]):
         self.names, self.accepted = names, accepted or ", ".join(names)
 
     def leaf(self, value: object) -> str:
-        """Refuse unknown words, with a hint at the nearest known word."""
+        """Return the word; refuse unknown words, with a hint at the nearest known word."""
         if isinstance(value, str) and value in self.names:
             return value
         near = did_you_mean(value, self.names)
@@ -325,14 +334,14 @@ class YesNo(Reader[bool]):
     accepted = "true or false"
 
     def leaf(self, value: object) -> bool:
-        """Read true or false, in the spellings of YAML 1.2; options may have a boolean already."""
+        """Read true or false in the spellings of YAML 1.2; a boolean from an option is accepted too."""
         boolean = value if isinstance(value, bool) else _YES_NO.get(value) if isinstance(value, str) else None
         if boolean is None:
             raise InvalidValueError("must be true or false", "accepted: true, false")
         return boolean
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: boolean, or its word."""
+        """JSON Schema: boolean, or true or false as text."""
         return {"enum": [True, False, *_YES_NO]}
 
 
@@ -389,7 +398,7 @@ class Whole(Reader[int]):
         self.low, self.high = low, high
 
     def leaf(self, value: object) -> int:
-        """Read decimal digits; a leading zero is refused, because YAML 1.1 reads it as octal."""
+        """Read a whole number from decimal digits; a leading zero is refused, because YAML 1.1 reads it as octal."""
         if isinstance(value, str) and re.fullmatch(r"0|-?[1-9]\d{0,17}", value.strip(), re.ASCII):
             number = int(value)
             if self.low <= number <= self.high:
@@ -406,7 +415,7 @@ class Version(Reader[int]):
     """The schema version."""
 
     def leaf(self, value: object) -> int:
-        """Accept 1."""
+        """Return 1, the only schema version; refuse any other value."""
         if value != "1":
             raise InvalidValueError("is not a schema version this tool reads", "accepted: 1")
         return 1
@@ -420,7 +429,7 @@ class Day(Reader["date"]):
     """A calendar date."""
 
     def leaf(self, value: object) -> "date":
-        """Read 2027-03-31."""
+        """Read a date like 2027-03-31."""
         from datetime import date
 
         try:
@@ -431,14 +440,14 @@ class Day(Reader["date"]):
             raise InvalidValueError("must be a calendar date", "accepted: 2027-03-31 and the like") from None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: date as text, or as the type that YAML readers make of it."""
+        """JSON Schema: date as text, or as the date type that YAML readers return."""
         return date_schema(r"^\d{4}-\d\d-\d\d$")
 
 
 def _is_few(
     value: object, kind: type[SizedT] | tuple[type[SizedT], ...], kind_problem: str, path: KeyPath, report: Report
 ) -> TypeGuard[SizedT]:
-    """Whether a value is of a kind and has at most `_MAX_ID_COUNT` entries; reports the problem if not."""
+    """Whether a value has the given type and at most `_MAX_ID_COUNT` entries; a problem is reported if not."""
     if not isinstance(value, kind):
         report(path, Problem(kind_problem))
         return False
@@ -470,7 +479,7 @@ class SizeMap(Reader[dict[str, object]]):
     """A mapping from keys of errors to single sizes. The reader of each key reads the size of that key later."""
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, object] | Invalid:
-        """Refuse sizes that are lists or mappings."""
+        """Read the keys and their sizes as they are; refuse sizes that are lists or mappings."""
         if not _is_few(value, dict, "must be a mapping of keys of errors to sizes", path, report):
             return INVALID
         nested = [key for key, size in value.items() if isinstance(size, dict | list)]
@@ -537,7 +546,7 @@ class Section(Reader[T_co]):
         self.any_of: tuple[str, ...] = getattr(kind, "any_of", tuple)()
 
     def read(self, value: object, path: KeyPath, report: Report) -> T_co | Invalid:
-        """Read every key, report every fault."""
+        """Read all keys of the section, and report every fault."""
         if not isinstance(value, dict):
             report(path, Problem("must be a mapping of keys to values", f"accepted: {', '.join(self.keys)}"))
             return INVALID
@@ -570,7 +579,7 @@ class Section(Reader[T_co]):
         return self.kind(**values) if is_valid else INVALID
 
     def each(self, value: object) -> dict[str, object]:
-        """Value of each known key, read by itself without a report; `INVALID` for an invalid value."""
+        """Read the value of each known key separately, without a report; an invalid value becomes `INVALID`."""
         items = value.items() if isinstance(value, dict) else ()
         return {
             name: read_part(self.keys[name].reader, item, (), _ignore_problem)
@@ -579,11 +588,11 @@ class Section(Reader[T_co]):
         }
 
     def below(self, step: str) -> Reader[object] | None:
-        """Reader of a key."""
+        """Reader of a key; None for an unknown key."""
         return self.keys[step].reader if step in self.keys else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: reference to a definition, which is made on first use."""
+        """JSON Schema: reference to the definition of the section, which is made on first use."""
         name = self.kind.__name__
         if name not in definitions:
             definitions[name] = {}  # keeps the order of first use
@@ -668,7 +677,7 @@ class PointsReader(Reader[T_co]):
         self.abscissa, self.ordinate, self.accepted, self.fewest = abscissa, ordinate, accepted, fewest
 
     def points(self, value: object, path: KeyPath, report: Report) -> Points | Invalid:
-        """Read each point, in rising order; a problem is reported at its own path."""
+        """Read all points, and return them in rising order; a problem is reported at its own path."""
         if not isinstance(value, dict) or not self.fewest <= len(value) <= _MAX_POINTS:
             length_words = f", {len(value)} given" if isinstance(value, dict) else ""
             report(
@@ -713,39 +722,42 @@ class CurveReader(PointsReader[Points]):
     """A mapping of abscissas to ordinates, read in rising order; `SortedPoints` if the file has another order."""
 
     def read(self, value: object, path: KeyPath, report: Report) -> Points | Invalid:
-        """Read each point; a problem is reported at its own path."""
+        """Read all points of the curve; a problem is reported at its own path."""
         return self.points(value, path, report)
 
 
 def either(kind: type, form: Reader[Form], other: Reader[OtherForm]) -> OneOf[Form | OtherForm]:
-    """Reader of two forms: `form` for values of type `kind`, a list or a mapping, and `other` for other values."""
+    """Reader of two forms: `form` for values of type `kind`, and `other` for all other values.
+
+    `kind` is a list or a mapping.
+    """
     return OneOf(lambda value: form if isinstance(value, kind) else other, (other, form))
 
 
 def is_empty(item: object) -> bool:
-    """Whether an item of a file is a section or a list that is empty, or has only empty sections and lists."""
+    """Whether an item of a file is an empty section or list, or contains only empty sections and lists."""
     if isinstance(item, dict):
         return all(map(is_empty, item.values()))
     return isinstance(item, list) and all(map(is_empty, item))
 
 
 def is_index(step: str) -> bool:
-    """Whether a step of a path is the index of an entry."""
+    """Whether a step of a path is an index in a list."""
     return step.isascii() and step.isdigit() and len(step) < 9
 
 
 def read_part(reader: Reader[T], value: object, path: KeyPath, report: Report) -> T | Invalid:
-    """Read an item of a list or a mapping; an item that was reported stays `INVALID`."""
+    """Read an item of a list or a mapping; an item that is `INVALID` already stays `INVALID`."""
     return INVALID if value is INVALID else reader.read(value, path, report)
 
 
 def are_valid(items: tuple[T | Invalid, ...]) -> TypeGuard[tuple[T, ...]]:
-    """Whether no item of a list was reported."""
+    """Whether no item of a list is `INVALID`."""
     return INVALID not in items
 
 
 def has_valid_values(mapping: Mapping[K, T | Invalid]) -> TypeGuard[dict[K, T]]:
-    """Whether no value of a mapping was reported."""
+    """Whether no value of a mapping is `INVALID`."""
     return INVALID not in mapping.values()
 
 
@@ -754,7 +766,7 @@ def _ignore_problem(path: KeyPath, problem: Problem) -> None:
 
 
 def did_you_mean(word: object, known_words: tuple[str, ...]) -> str:
-    """Hint at the nearest of the known words; empty if no word is near."""
+    """Hint that names the nearest of the known words; empty if no word is near."""
     from difflib import get_close_matches
 
     near = get_close_matches(str(word)[:_MAX_TEXT_CHARACTERS], known_words, 1)

@@ -1,4 +1,4 @@
-"""A mission file of a git revision, with the files that it names: parts, settings, orbits, logs."""
+"""A mission file from a git revision, with the files that it names: parts, settings, orbits, logs."""
 
 import os
 from collections.abc import Sequence
@@ -27,10 +27,10 @@ class RevisionError(Exception):
 class Revision:
     """The files of a git repository as committed in a branch, tag or commit.
 
-    The repository of the current folder is read if the path is in it, else the repository of the path. So a folder
-    that has become a submodule since the revision is read from the repository around it. Links are followed within
-    the revision. Submodules are read at the commit that the revision names. A file outside of the repository has one
-    version, which is on the disk; `outside` lists the files outside that were read.
+    If the path is in the repository of the current folder, that repository is read, and otherwise the repository of
+    the path. So a folder that has become a submodule since the revision is read from the repository around it. Links
+    are followed within the revision. Submodules are read at the commit that the revision names. A file outside of the
+    repository has only one version, which is on the disk; `outside` lists the outside files that were read.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Revision:
         self._names_by_tree: dict[str, list[str]] = {}
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
-        """Content of a file in the revision; arguments and `UnreadableError` are as in `resources.Files`."""
+        """Content of a file in the revision; arguments and `UnreadableError` are the same as in `resources.Files`."""
         called = file if called is None else called
         inside = self._inside(file)
         if inside is None:
@@ -92,7 +92,7 @@ class Revision:
         return self._names_by_tree[git_object.hash]
 
     def has(self, file: str) -> bool:
-        """Whether the revision has a file; raises `RevisionError` for a link out of it or an absent submodule."""
+        """Whether the revision has a file; raises `RevisionError` for a link out of it or a missing submodule."""
         inside = self._inside(file)
         git_object = _Object(b"missing") if inside is None else self._object(inside)
         if git_object.kind in (b"symlink", b"submodule"):
@@ -114,7 +114,7 @@ class Revision:
     def _files(
         self, pattern: Sequence[str], tree: "_Object", above: str = "", way: tuple[str, ...] = ()
     ) -> list[str]:
-        """Paths of the files below a tree, also in submodules and linked folders that a pattern may match."""
+        """Paths of all files below a tree, also in those submodules and linked folders that a pattern may match."""
         _, entries, _ = _git(tree.top, "ls-tree", "-r", "-z", tree.hash)
         files = []
         for entry in filter(None, entries.split(b"\0")):
@@ -129,11 +129,11 @@ class Revision:
         return files
 
     def path_of(self, file: str) -> str:
-        """Path of a file from the top of the repository, with forward slashes; unchanged for a file outside."""
+        """Path of a file from the top of the repository, with forward slashes; unchanged for a file outside of it."""
         return self._inside(file) or file
 
     def _inside(self, path: str) -> str | None:
-        """Path from the top of the repository, with forward slashes; None outside of the repository.
+        """Path relative to the top of the repository, with forward slashes; None outside of the repository.
 
         Links below the top are not resolved here, because the revision may have other links.
         """
@@ -151,9 +151,10 @@ class Revision:
         return None
 
     def _object(self, inside: str) -> "_Object":
-        """The git object at a path of the commit; its `kind` tells why, if there is no such file or folder.
+        """The git object at a path of the commit.
 
-        An object with at most `MAX_BYTES` bytes of content is kept for the next call.
+        If there is no such file or folder, its `kind` tells why. An object with at most `MAX_BYTES` bytes of content
+        is kept for the next call.
         """
         git_object = self._objects.get(inside)
         if git_object is None:
@@ -164,7 +165,10 @@ class Revision:
 
 
 def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
-    """Whether a path matches a pattern, both split at slashes, as in `glob.glob`: `**` is any number of folders."""
+    """Whether a path matches a pattern as in `glob.glob`, where `**` is any number of folders.
+
+    Both are split at slashes.
+    """
     if not pattern:
         return not parts
     is_open = bool(parts) and (not parts[0].startswith(".") or pattern[0].startswith("."))
@@ -175,13 +179,16 @@ def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
 
 
 def _leads_to(folder: Sequence[str], pattern: Sequence[str]) -> bool:
-    """Whether a pattern may name files below a folder."""
+    """Whether a pattern may match files below a folder."""
     start = pattern[: len(folder)]
     return "**" in start or (len(folder) < len(pattern) and _matches(folder, start))
 
 
 def _top(folder: str) -> tuple[str, str]:
-    """Top folder of the repository around a folder, empty if there is none, and the refusal of git."""
+    """Top folder of the repository around a folder, and the message of git if it refuses.
+
+    The folder is empty if there is no repository.
+    """
     is_found, top, refusal = _git(folder, "rev-parse", "--show-toplevel")
     return (os.fsdecode(top).rstrip("\r\n") if is_found else ""), refusal
 
@@ -200,7 +207,7 @@ _MISSING_OBJECT = _Object(b"missing")
 
 
 def _object(top: str, commit: str, inside: str) -> _Object:
-    """The object at a path of a commit, also in submodules."""
+    """The object at a path in a commit; the path may lead into submodules."""
     if "\n" in inside:
         return _object_of_lines(top, commit, inside)
     request = os.fsencode(f"{commit}:{'' if inside == os.curdir else inside}")
@@ -224,9 +231,12 @@ def _object(top: str, commit: str, inside: str) -> _Object:
 
 
 def _object_of_lines(top: str, commit: str, inside: str) -> _Object:
-    """The object at a path with a line end in it, found by its hash: `cat-file --batch` takes no such path.
+    """The object at a path that contains a line end.
 
-    Links and submodules are not followed. A path that is one, or is below one, has the kind of the link or submodule.
+    It is found by its hash, because `cat-file --batch` takes no such path.
+
+    Links and submodules are not followed. A path that is a link or a submodule, or is below one, has the kind of the
+    link or submodule.
     """
     parts = inside.split("/")
     for length in range(1, len(parts) + 1):
@@ -249,7 +259,7 @@ def _object_of_lines(top: str, commit: str, inside: str) -> _Object:
 
 
 def _existing(path: str) -> tuple[str, str]:
-    """The nearest existing folder above a path, and the remainder of the path."""
+    """Nearest existing folder above a path, and the remainder of the path."""
     folder, remainder = os.path.split(os.path.abspath(path))
     while not os.path.isdir(folder) and folder != os.path.dirname(folder):
         folder, name = os.path.split(folder)
@@ -258,7 +268,7 @@ def _existing(path: str) -> tuple[str, str]:
 
 
 def _why_not(git_object: _Object) -> str:
-    """Return the words between the name of a file and the revision that say why git gives no content of it."""
+    """Reason why git gives no content of a file, as words between the name of the file and the revision."""
     if git_object.kind == b"symlink":
         return f"is a link out of the repository, to {printable(os.fsdecode(git_object.content))}, in"
     if git_object.kind == b"submodule":
@@ -290,7 +300,7 @@ def mission_at(path: str, revision: Revision, model: str | None = None) -> Missi
 
 
 def _git(folder: str, *arguments: str, stdin: bytes = b"") -> tuple[bool, bytes, str]:
-    """Run git in a folder: whether it succeeded, its output, and why it refuses the repository, if it does."""
+    """Run git in a folder; returns whether it succeeded, its output, and the reason if it refuses the repository."""
     # Committed files can look like a bare repository, with revisions and settings; git must not use them.
     command = ["git", "-c", "safe.bareRepository=explicit", "-C", folder, *arguments]
     variables = {name: value for name, value in os.environ.items() if name not in _VARIABLES_OF_HOOKS}

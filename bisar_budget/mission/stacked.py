@@ -1,4 +1,5 @@
-"""Missions of one shape as one mission of arrays.
+"""Combination of missions with the same shape into one mission of arrays.
+
 A number that differs between the missions becomes an array with one element per case.
 """
 
@@ -17,7 +18,7 @@ from bisar_budget.mission.readers import SectionValue, SectionValues
 
 
 def picked(mission: Mission, cases: NDArray[np.intp]) -> Mission:
-    """The mission with some of the cases of its arrays; `cases` are their indices."""
+    """Select some of the cases in the arrays of a mission; `cases` are their indices."""
 
     def of_cases(leaf: object) -> object:
         return leaf[cases] if isinstance(leaf, np.ndarray) and leaf.ndim else leaf
@@ -45,12 +46,12 @@ def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.i
 
 
 def _next_of(numbers: Iterator[PerCase], leaf: object) -> object:
-    """The next number for a leaf that is a number; a word unchanged."""
+    """The next number in place of a leaf that is a number; a word is unchanged."""
     return next(numbers) if isinstance(leaf, float) else leaf
 
 
 def _bare(mission: Mission) -> Mission:
-    """The mission without the sources of its values and of its paths."""
+    """Remove the sources of values and of paths from a mission."""
     for name, platform in mission.platforms._asdict().items():
         if platform.path is not None:
             path = platform.path
@@ -70,7 +71,7 @@ def _bare(mission: Mission) -> Mission:
 
 
 def _children(value: SectionValue) -> tuple[object, ...] | None:
-    """Values that a value is made of; None for a number, an array or a word."""
+    """Values that a value contains; None for a number, an array or a word."""
     if isinstance(value, tuple):
         return value
     if isinstance(value, dict):
@@ -79,7 +80,7 @@ def _children(value: SectionValue) -> tuple[object, ...] | None:
 
 
 def _shape(value: SectionValue, numbers: list[float]) -> object:
-    """Everything of a value but its numbers, which are appended to a list."""
+    """Shape of a value: everything except its numbers, which are appended to `numbers`."""
     if isinstance(value, float):
         numbers.append(value)
         return float
@@ -91,7 +92,7 @@ def _shape(value: SectionValue, numbers: list[float]) -> object:
 
 
 def _with_leaves(value: SectionValue, put: Callable[[object], object]) -> SectionValue:
-    """The value with `put(leaf)` for each number, array or word in it."""
+    """Replace each number, array or word in a value by `put(leaf)`."""
     children = _children(value)
     if children is None:
         return put(value)

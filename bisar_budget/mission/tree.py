@@ -1,7 +1,7 @@
 """YAML as a plain tree with positions: the content of a file before its keys and values are interpreted.
 
-The tree is built from the parser's events, so that depth is bounded before anything recurses further. Every scalar
-stays the text of the file: YAML 1.1 would read `9.6e9` as text, `on` as true and `010` as eight.
+The tree is built from the parser's events, so that its depth is limited before any recursion. Every scalar stays the
+text of the file, because YAML 1.1 would read `9.6e9` as text, `on` as true and `010` as eight.
 """
 
 import re
@@ -87,14 +87,14 @@ class Tree:
         self.changes: dict[KeyPath, SetValue] = {}
 
     def copied(self) -> "Tree":
-        """A copy of the tree, for changes that leave this tree as it is."""
+        """Copy of the tree; changes of the copy do not affect this tree."""
         tree = Tree(self.file_kind)
         tree.root, tree.faults = _copied(self.root), list(self.faults)
         tree.keys, tree.values, tree.changes = dict(self.keys), dict(self.values), dict(self.changes)
         return tree
 
     def fault(self, mark: ParserEvent, path: KeyPath, problem: str, **details: str) -> None:
-        """Record a fault at a mark in the file. A fault without a mark is at the start of the file.
+        """Record a fault at a mark in the file. Without a mark, the fault is at the start of the file.
 
         If an option set the value, the fault names the option and has no line. Raises `UnusableError` when the file
         has `MAX_FAULT_COUNT` faults.
@@ -113,15 +113,15 @@ class Tree:
             raise UnusableError
 
     def _change_at(self, path: KeyPath) -> SetValue | None:
-        """The option that put a value, or a section or list around it, into the tree."""
+        """The option that set a value, or a section or list that contains it; None if there is none."""
         return next(filter(None, map(self.changes.get, upwards(path))), None)
 
     def in_order(self) -> tuple[Fault, ...]:
-        """Faults in the order of the file, each once."""
+        """All faults in the order of the file, without repetitions."""
         return tuple(sorted(dict.fromkeys(self.faults), key=lambda fault: (fault.line or 0, fault.column or 0)))
 
     def report(self, path: KeyPath, problem: Problem) -> None:
-        """Note a problem that a reader reports: at the value, or else at the nearest key above it."""
+        """Record a problem that a reader reports, at the value or else at the nearest key above it."""
         path = (*path, *problem.at)
         value: Content = self.root
         for name in path:
@@ -192,9 +192,10 @@ class Tree:
         return value
 
     def _decimal_commas(self, items: list[ParserEvent], path: KeyPath) -> None:
-        """Refuse `[0,5 m, 1 m, 2 m]` and `[0,5 m, 1 m]`, which YAML reads as four values and as three.
+        """Refuse lists with decimal commas, such as `[0,5 m, 1 m, 2 m]` and `[0,5 m, 1 m]`.
 
-        A decimal comma shows by the blank that follows the other commas of the list and not this one.
+        YAML reads these as four and as three values. A comma counts as a decimal comma if no blank follows it, and
+        blanks follow other commas of the list.
         """
         commas = []
         for index, (before, item) in enumerate(pairwise(items), start=1):
@@ -214,7 +215,7 @@ class Tree:
                 self.fault(item.start_mark, (*path, index), problem, given=given, accepted=accepted)
 
     def _mapping(self, next_event: Callable[[], ParserEvent], path: KeyPath, *, is_flow: bool) -> dict[str, Content]:
-        """Read the keys and values of a mapping; its first event has been read."""
+        """Read the keys and values of a mapping whose first event has been read already."""
         mapping: dict[str, Content] = {}
         split: dict[str, list[str]] = {}  # by key: texts that commas of a flow mapping separate from its value
         name = ""
@@ -257,7 +258,7 @@ class Tree:
 
 
 def _is_bare(key: ParserEvent, item: ParserEvent) -> bool:
-    """Whether a key of a mapping is a number, with a unit or without, that has no value."""
+    """Whether a key of a mapping is a number, with or without a unit, and has no value."""
     is_empty = type(item) is ScalarEvent and not item.style and not item.value
     return is_empty and not key.style and bool(_NUMERAL.match(key.value))
 
@@ -269,12 +270,12 @@ _STARTS = {
 
 
 def read_tree(data: bytes | str, file: str, file_kind: str = "mission") -> Tree:
-    """Read the only document of a file; bytes are UTF-8, `file_kind` is "mission" or "part".
+    """Read a file that consists of one document; bytes are UTF-8, and `file_kind` is "mission" or "part".
 
     Raises
     ------
     MissionError
-        The file is no mapping in YAML, or too large; carries every fault.
+        The file is not a mapping in YAML, or is too large. The error contains every fault.
     """
     text = _decoded(data, file, file_kind)
     tree = Tree(file_kind)
@@ -304,14 +305,14 @@ def read_tree(data: bytes | str, file: str, file_kind: str = "mission") -> Tree:
 
 
 def _copied(value: Content) -> Content:
-    """A copy of nested mappings and lists."""
+    """Deep copy of nested mappings and lists."""
     if isinstance(value, dict):
         return {key: _copied(item) for key, item in value.items()}
     return [_copied(item) for item in value] if isinstance(value, list) else value
 
 
 def _dotted(path: KeyPath) -> str:
-    """A path as `other_errors[0].name`, shortened beyond 200 characters."""
+    """Text of a path such as `other_errors[0].name`, shortened beyond 200 characters."""
     text = ""
     for name in path:
         text += f"[{name}]" if isinstance(name, int) else f".{name}" if text else str(name)

@@ -1,4 +1,4 @@
-"""Vibration of a mission file: sinusoids, wideband noise and spectra, of displacement or of acceleration."""
+"""Vibration in a mission file: sinusoids, wideband noise and spectra, as displacement or as acceleration."""
 
 import math
 from collections.abc import Iterator
@@ -39,7 +39,7 @@ class _Displacement(Quantity):
         self.of_acceleration, self.also = of_acceleration, also
 
     def leaf(self, value: object) -> float:
-        """Parse and check the bounds; a velocity or an acceleration gets a hint."""
+        """Read a displacement and check its bounds; the error for a velocity or an acceleration has a hint."""
         try:
             return super().leaf(value)
         except InvalidValueError as error:
@@ -63,7 +63,7 @@ _ALONG = "along the line of sight; a vector: along each axis"
 
 
 def _of_all(value: float | Vector, number: float) -> float | Vector:
-    """An amplitude, single or of three axes, multiplied by a number."""
+    """Multiply an amplitude, a single one or one for each of three axes, by a number."""
     if isinstance(value, tuple):
         a, b, c = value
         return a * number, b * number, c * number
@@ -89,12 +89,12 @@ class Sinusoid(NamedTuple):
 
     @property
     def displacement(self) -> float | Vector:
-        """Amplitude of the displacement, single or along each axis. [m]"""
+        """Amplitude of the displacement, as a single value or along each axis. [m]"""
         return self.amplitude
 
     @property
     def acceleration(self) -> float | Vector:
-        """Amplitude of the acceleration, single or along each axis. [m/s²]"""
+        """Amplitude of the acceleration, as a single value or along each axis. [m/s²]"""
         return _of_all(self.amplitude, (2 * math.pi * self.frequency) ** 2)
 
 
@@ -113,12 +113,12 @@ class AcceleratedSinusoid(NamedTuple):
 
     @property
     def displacement(self) -> float | Vector:
-        """Amplitude of the displacement, single or along each axis. [m]"""
+        """Amplitude of the displacement, as a single value or along each axis. [m]"""
         return _of_all(self.amplitude, self.scale)
 
     @property
     def acceleration(self) -> float | Vector:
-        """Amplitude of the acceleration, single or along each axis. [m/s²]"""
+        """Amplitude of the acceleration, as a single value or along each axis. [m/s²]"""
         return self.amplitude
 
 
@@ -126,7 +126,7 @@ _SINUSOID, _ACCELERATED = Section(Sinusoid), Section(AcceleratedSinusoid)
 
 
 def _form_of_sinusoid(value: object) -> Reader[Sinusoid | AcceleratedSinusoid]:
-    """Reader of a sinusoid in g, or else in metres, by the unit of its amplitude."""
+    """Reader of a sinusoid, chosen by the unit of its amplitude: acceleration, or else displacement."""
     amplitude = value.get("amplitude") if isinstance(value, dict) else None
     components = amplitude if isinstance(amplitude, list) else [amplitude]
     is_accelerated = any(isinstance(text, str) and given_unit(text, units.ACCELERATION.si) for text in components)
@@ -152,7 +152,7 @@ class Spectrum(NamedTuple):
     is_accelerated: bool
 
     def times(self, power: PerCase) -> "Spectrum":
-        """The spectrum with each density multiplied by a factor of power."""
+        """The spectrum with each density multiplied by a power factor."""
         points: SectionValue = tuple((f, density * power) for f, density in self.points)
         return self._replace(points=points)
 
@@ -178,7 +178,7 @@ _SPECTRA = (
 
 
 def _form_of_spectrum(value: object) -> Reader[Spectrum]:
-    """Reader of the dimension that most points have; of acceleration if both have equally many."""
+    """Reader of a spectrum of the dimension that most of its points have; acceleration if both have equally many."""
     texts = [item for item in value.values() if isinstance(item, str)] if isinstance(value, dict) else []
     accelerations, displacements = (
         sum(bool(given_unit(text, reader.ordinate.dimension.si)) for text in texts) for reader in _SPECTRA
@@ -207,14 +207,14 @@ class Vibration(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Refuse a level without a spectrum."""
+        """Refuse a spectrum level without a spectrum."""
         if values.get("spectrum_level") is not None and "spectrum" in values and values["spectrum"] is None:
             problem = "shifts a spectrum, and there is none"
             yield Problem(problem, "accepted: spectrum beside it", at=("spectrum_level",))
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file states a vibration. A zero is stated."""
+        """Whether the file states a vibration. An amplitude of zero counts as stated."""
         return bool(self.sinusoidal) or self.wideband is not None or self.spectrum is not None
 
 
@@ -229,12 +229,12 @@ class FeltVibration(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Refuse a level without a spectrum."""
+        """Refuse a spectrum level without a spectrum."""
         yield from Vibration.problems(values)
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file states a vibration. A zero is stated."""
+        """Whether the file states a vibration. An amplitude of zero counts as stated."""
         return bool(self.sinusoidal) or self.spectrum is not None
 
 

@@ -1,4 +1,4 @@
-"""Paths of platforms from orbits and logs of flights, and the Earth they are flown over."""
+"""Paths of platforms from orbit files and flight logs, and the shape and orientation of the Earth."""
 
 # What other rooms may use.
 __all__ = [

@@ -1,7 +1,7 @@
-"""The accuracy that the source of a path states: covariances, sigmas, and figures without a direction.
+"""Accuracy of a path as its source states it: covariances, sigmas, and errors without a direction.
 
-An ephemeris states covariances at epochs. In the orbit's axes (radial, in-track, cross-track) a covariance changes
-little from one epoch to the next. It is interpolated in these axes, and then turned to the Earth.
+An ephemeris states covariances at epochs. Along the orbit's axes (radial, in-track, cross-track) a covariance changes
+little from one epoch to the next. So it is interpolated along these axes, and then converted to Earth-fixed axes.
 """
 
 import math
@@ -28,19 +28,19 @@ _VELOCITY_STEP_S = 0.5
 
 
 class StatedAccuracy(NamedTuple):
-    """The one-sigma error that the source of a path states.
+    """One-sigma error of a path as its source states it.
 
     Attributes
     ----------
     words : str
         The statement in reports.
     covariance : (3, 3) or (6, 6), optional
-        Covariance of the position [m²], or of position and velocity [m², m²/s, m²/s²], along the axes of the Earth or
-        of a scene.
+        Covariance of position [m²], or of position and velocity [m², m²/s, m²/s²], along Earth-fixed axes or
+        along the axes of a scene.
     total : float
-        Error without a direction, from a source without covariance. [m]
+        Error without a direction, from a source without a covariance. [m]
     is_typical : bool
-        Whether the figure is not stated, but usual for the quality that the source states.
+        Whether the error is not stated, but is the usual error for the quality that the source states.
     """
 
     words: str
@@ -50,7 +50,7 @@ class StatedAccuracy(NamedTuple):
 
     @property
     def position_m(self) -> float:
-        """Root-sum-square of the stated position error over its axes, or `total` without a covariance. [m]"""
+        """Root sum of squares of the position errors of all axes, or `total` without a covariance. [m]"""
         variances = (
             [row[axis] for axis, row in enumerate(self.covariance[:3])] if self.covariance else [self.total**2]
         )
@@ -58,10 +58,10 @@ class StatedAccuracy(NamedTuple):
 
 
 class PathNoise(NamedTuple):
-    """The error of a path by the noise of its log, as polynomials of slow time over the aperture.
+    """Error of a path due to the noise of its log, as polynomials of slow time over the aperture.
 
-    `modes` (modes, orders, 3) are coefficients of slow time to the power 0, 1, … [m], [m/s], …. Each mode is an error
-    of one sigma along one axis of the scene, and is independent of all further modes. Errors beyond order 8 are left
+    `modes` (modes, orders, 3) are coefficients of slow time to the power 0, 1, … [m], [m/s], …. Each mode is a
+    one-sigma error along one axis of the scene, and is independent of all other modes. Errors above order 8 are left
     out.
     """
 
@@ -69,32 +69,32 @@ class PathNoise(NamedTuple):
 
 
 class CovarianceError(ValueError):
-    """Numbers that are no covariance."""
+    """Error for a matrix that is not a covariance."""
 
 
 def as_matrix(values: Floats) -> Matrix:
-    """A symmetric matrix as tuples of plain numbers."""
+    """Convert an array to a symmetric matrix, as tuples of plain numbers."""
     return tuple(tuple(float(value) for value in row) for row in (values + values.T) / 2)
 
 
 def as_rows(values: Floats) -> Matrix:
-    """A matrix as tuples of plain numbers."""
+    """Convert a matrix to tuples of plain numbers."""
     return tuple(tuple(row) for row in np.asarray(values, dtype=float).tolist())
 
 
 def diagonal(variances: Sequence[float]) -> Matrix:
-    """Covariance of independent errors."""
+    """Covariance matrix of independent errors, from their variances."""
     return as_matrix(np.diag(np.asarray(variances, dtype=float)))
 
 
 def block_turned(covariance: Floats, axes: Floats) -> Floats:
-    """A covariance (3, 3) or (6, 6) along other axes, the rows of a matrix (3, 3)."""
+    """Convert a covariance (3, 3) or (6, 6) to other axes, whose unit vectors are the rows of a matrix (3, 3)."""
     full = np.kron(np.eye(len(covariance) // 3), axes)
     return np.asarray(full @ covariance @ full.T)
 
 
 def correlations(covariance: Floats) -> Matrix:
-    """Correlation matrix of a covariance. An error without variance has no correlation."""
+    """Correlation matrix of a covariance. Correlations with an error of zero variance are 0."""
     sigmas = np.sqrt(np.diag(covariance))
     scale = np.where(sigmas > 0, sigmas, 1.0)
     matrix = covariance / np.outer(scale, scale)
@@ -103,9 +103,10 @@ def correlations(covariance: Floats) -> Matrix:
 
 
 def covering_sigmas(covariance: Floats) -> Vector:
-    """Sigmas of independent errors with at least the variance of a covariance (3, 3) in every direction. [m], [m/s]
+    """Sigmas of independent errors that have at least the variance of a covariance (3, 3). [m], [m/s]
 
-    For independent errors they are the sigmas of the covariance, and otherwise up to √3 times as large.
+    This holds in every direction. If the covariance is diagonal, these are its own sigmas. Otherwise they are larger
+    by a factor of up to √3.
     """
     largest = float(np.linalg.eigvalsh(np.array(correlations(covariance)))[-1])
     factor = math.sqrt(largest) if largest > 1 + _EQUAL_VARIANCE_FRACTION else 1.0
@@ -114,7 +115,7 @@ def covering_sigmas(covariance: Floats) -> Vector:
 
 
 def held_to_covariance(values: Floats) -> Floats:
-    """The nearest covariance to a matrix that is not quite a covariance because of rounding.
+    """Correct the rounding errors of a matrix that is nearly a covariance; return the nearest covariance.
 
     Raises
     ------
@@ -135,12 +136,12 @@ def held_to_covariance(values: Floats) -> Floats:
 
 # ---------------------------------------------------------------------- covariances of an orbit
 def turns_with_orbit(name: str) -> bool:
-    """Whether a name of CCSDS for axes of an orbit says that velocities are those in axes that turn with it."""
+    """Whether the CCSDS name of orbit axes states that velocities are relative to axes that turn with the orbit."""
     return name.endswith("_ROTATING")
 
 
 def local_axes(name: str) -> str | None:
-    """`RTN` or `TNW` from a name of CCSDS for axes that turn with an orbit; None for any further name."""
+    """`RTN` or `TNW` from the CCSDS name of axes that turn with an orbit; None for any other name."""
     for suffix in _AXES_SUFFIXES:
         name = name.removesuffix(suffix)
     name = _AXES_SYNONYMS.get(name, name)
@@ -151,9 +152,9 @@ def local_axes(name: str) -> str | None:
 class EpochCovariance:
     """Covariance (6, 6) of position and velocity at an epoch of TAI. [m², m²/s, m²/s²]
 
-    `axes` are `RTN` or `TNW`, `earth` for axes that are fixed to the Earth, or `stars` for axes that `turn` turns to
-    the Earth. None means unknown axes: then only the total variance counts. Velocities in axes of an orbit are
-    against the stars, or in axes that turn with the orbit if `is_rotating`.
+    `axes` are `RTN` or `TNW`, `earth` for Earth-fixed axes, or `stars` for axes that `turn` converts to Earth-fixed
+    axes. None means that the axes are unknown; then only the total position variance is used. Velocities along the
+    axes of an orbit are relative to the stars, or relative to axes that turn with the orbit if `is_rotating`.
     """
 
     epoch: Instant
@@ -164,7 +165,7 @@ class EpochCovariance:
 
 
 class OrbitState(NamedTuple):
-    """Position, and velocity against the stars, along the axes of the Earth. [m], [m/s]"""
+    """Position, and velocity relative to the stars, along Earth-fixed axes. [m], [m/s]"""
 
     position: Vector
     velocity: Vector
@@ -181,7 +182,7 @@ class OrbitState(NamedTuple):
         return np.array((first, np.cross(across, first), across))
 
     def rate(self, name: str) -> float:
-        """Rate at which `RTN` or `TNW` turn about the orbit's normal, against the stars. [rad/s]"""
+        """Rate at which the axes `RTN` or `TNW` turn about the orbit's normal, relative to the stars. [rad/s]"""
         position, velocity = np.array(self.position), np.array(self.velocity)
         momentum = float(np.linalg.norm(np.cross(position, velocity)))
         if name == "RTN":
@@ -192,7 +193,10 @@ class OrbitState(NamedTuple):
 
 
 def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: tuple[Instant, Instant]) -> OrbitState:
-    """State of an orbit from its Earth-fixed positions near an instant of a span, by a central difference."""
+    """State of an orbit at an instant, from its Earth-fixed positions.
+
+    The velocity is a central difference of positions within the span of the orbit.
+    """
     first = max(instant.after(-_VELOCITY_STEP_S), span[0])
     last = min(instant.after(_VELOCITY_STEP_S), span[1])
     position_before, position, position_after = (np.array(position_at(time)) for time in (first, instant, last))
@@ -203,9 +207,9 @@ def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: t
 
 
 def with_rate(covariance: Floats, rate: Sequence[float] | Floats) -> Floats:
-    """Covariance (6, 6) in axes that turn less by a rate [rad/s]: δv becomes δv + rate × δr.
+    """Change a covariance (6, 6) to velocities in axes that turn more slowly by a rate: δv becomes δv + rate × δr.
 
-    A velocity of which only rounding is left has no variance.
+    `rate` is a vector. [rad/s]
     """
     x, y, z = rate
     matrix = np.eye(6)
@@ -222,10 +226,11 @@ def stated_of_orbit(
     instant: Instant,
     span: tuple[Instant, Instant],
 ) -> StatedAccuracy | None:
-    """Accuracy that the covariances of an ephemeris state at an instant of its span, along the axes of the Earth.
+    """Accuracy at an instant of an ephemeris, from its stated covariances, along Earth-fixed axes.
 
-    Between two epochs the covariance is interpolated linearly in the orbit's axes. Outside all epochs the nearest
-    epoch counts. None without a covariance; a covariance of zero counts as missing.
+    Between two epochs the covariance is interpolated linearly along the orbit's axes. Before the first and after the
+    last epoch, the nearest epoch counts. A covariance of zero counts as missing. Returns None if no covariance is
+    stated.
     """
     nonzero = (covariance for covariance in covariances if np.trace(covariance.values[:3, :3]) > 0)
     stated = sorted(nonzero, key=lambda covariance: covariance.epoch)
@@ -256,7 +261,7 @@ def stated_of_orbit(
 
 
 def _covariance_along_orbit(covariance: EpochCovariance, state: OrbitState, instant: Instant) -> Floats:
-    """A covariance along radial, in-track and cross-track, for a velocity against the stars."""
+    """Convert a covariance to radial, in-track and cross-track axes, with the velocity relative to the stars."""
     if covariance.axes in LOCAL_AXES:
         values = covariance.values
         if covariance.is_rotating:

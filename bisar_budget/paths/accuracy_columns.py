@@ -1,8 +1,9 @@
-"""Names of columns that state the accuracy of the places beside them.
+"""Names of columns that state the accuracy of the positions beside them.
 
-Programs name such columns as they like: `sigma_east`, `sde`, `SD-E`, `lat std dev`, `hAcc`, `cov_ee`. A column that
-looks like an accuracy is read where its name says of what, and left alone where that is no position. Another one has
-to be refused: passed over, it would let a smaller declared error pass.
+Programs use many names for such columns: `sigma_east`, `sde`, `SD-E`, `lat std dev`, `hAcc`, `cov_ee`. A column that
+looks like an accuracy is read if its name states an axis or direction of the position. It is ignored if it belongs to
+another quantity than a position. Any other such column has to be refused: if it were ignored, the declared error
+could be too small.
 """
 
 import re
@@ -104,11 +105,12 @@ _COLUMN_SPELLINGS = (
 
 
 def meaning_of(name: str, unit: str | None) -> tuple[str | None, str | None]:
-    """Meaning of a column, and its unit, as stated or by the end of its name.
+    """Meaning of a column, and its unit: the stated unit, or else the unit at the end of the column's name.
 
-    It is `sigma_east` or of another axis, `variance_east`, `horizontal_accuracy`, `vertical_accuracy`,
-    `position_accuracy` without a direction, `sigma_h` where another column has to say what h is, `CROSS_COVARIANCE`,
-    `UNCLEAR`, or None of a column that is no accuracy of a position.
+    The meaning is `sigma_east` or the sigma of another axis, `variance_east` or the variance of another axis,
+    `horizontal_accuracy`, `vertical_accuracy`, or `position_accuracy` for an accuracy without a direction. It is
+    `sigma_h` if other columns have to decide what h means, `CROSS_COVARIANCE`, or `UNCLEAR`. It is None for a column
+    that is no accuracy of a position.
     """
     split, lower = _tokens(_CAMELS.sub("_", name)), _tokens(name)
     stated_unit = unit
@@ -139,7 +141,7 @@ def _without(tokens: list[str], tail: Sequence[str]) -> list[str]:
 
 
 def _of_tokens(tokens: Sequence[str]) -> str | None:
-    """Meaning of a name by its words; None where it looks like no accuracy."""
+    """Meaning of a column from the words of its name; None if the name looks like no accuracy of a position."""
     words = [token for token in tokens if token in _SIGMA_WORDS | _VARIANCES]
     is_unclear = any(_UNCLEAR_MEASURES.fullmatch(token) for token in tokens) or _LOOKS_LIKE.search("_".join(tokens))
     is_error = not words and not _ERROR_WORDS.isdisjoint(tokens)
@@ -176,7 +178,7 @@ def _of_tokens(tokens: Sequence[str]) -> str | None:
 
 
 def _of_variance(axis_tokens: Sequence[str]) -> str:
-    """Meaning of a variance or a covariance by the names of its axes: `ee`, `e`, `e e`, `east`."""
+    """Meaning of a variance or a covariance from the names of its axes, such as `ee`, `e`, `e e` or `east`."""
     pair = (
         list(axis_tokens[0])
         if len(axis_tokens) == 1 and re.fullmatch(r"[enudxyz]{2}", axis_tokens[0])
@@ -191,19 +193,20 @@ def _of_variance(axis_tokens: Sequence[str]) -> str:
 
 
 def _is_cross(token: str) -> bool:
-    """Whether a word is of two different axes of a level frame."""
+    """Whether a word names two different axes among east, north, up and down."""
     return re.fullmatch(r"[enud]{2}", token) is not None and token[0] != token[1]
 
 
 def _is_velocity(tokens: Sequence[str]) -> bool:
-    """Whether a v stands before an axis."""
+    """Whether the word v comes directly before the name of an axis."""
     return any(first == "v" and second in "enudxyz" for first, second in pairwise(tokens))
 
 
 def _may_be_of_positions(meaning: str, unit: str) -> bool:
-    """Whether a unit leaves a column the accuracy of a position.
+    """Whether a column with this unit may be the accuracy of a position.
 
-    A length and an area do. An angle is refused where an axis of the place has it, as one that nobody knows.
+    A length, an area or an unknown unit may be one. An angle may be one too, but not for a meaning that an angle
+    cannot have, such as a vertical accuracy. The reader then refuses an angle along an axis.
     """
     dimension = next((candidate for candidate in units.DIMENSIONS if _is_unit_of(unit, candidate)), None)
     if dimension in _OF_POSITIONS or dimension is None:

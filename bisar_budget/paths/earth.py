@@ -1,6 +1,6 @@
-"""The Earth by WGS-84: geodetic coordinates, and the axes of a scene on the ground.
+"""The Earth as the WGS-84 ellipsoid: geodetic coordinates, and the axes of a scene on the ground.
 
-Earth-fixed axes: x through Greenwich on the equator, z through the north pole. [m]
+The Earth-fixed x axis points to Greenwich on the equator, and the z axis to the north pole. Coordinates are in m.
 """
 
 import math
@@ -38,18 +38,18 @@ class Geodetic(NamedTuple):
 
 @dataclass(frozen=True)
 class SceneAxes:
-    """East, north and up at an origin, and the origin itself, in Earth-fixed axes."""
+    """Axes of a scene: origin, and unit vectors east, north and up at the origin, in Earth-fixed axes."""
 
     origin: Vector
     axes: Axes
 
     def place(self, earth_fixed: Vector) -> Vector:
-        """A position in the scene's axes. [m]"""
+        """Convert an Earth-fixed position to the axes of the scene. [m]"""
         x, y, z = earth_fixed
         return self.turned((x - self.origin[0], y - self.origin[1], z - self.origin[2]))
 
     def places(self, earth_fixed: Floats) -> Floats:
-        """Positions (n, 3) in the scene's axes. [m]"""
+        """Convert Earth-fixed positions (n, 3) to the axes of the scene. [m]"""
         turned: Floats = (earth_fixed - np.array(self.origin)) @ np.array(self.axes).T
         return turned
 
@@ -58,7 +58,7 @@ class SceneAxes:
     @overload
     def turned(self, earth_fixed: Vectors) -> Vectors: ...
     def turned(self, earth_fixed: Vectors) -> Vectors:
-        """A direction or velocity in the scene's axes."""
+        """Convert an Earth-fixed direction or velocity to the axes of the scene."""
         east, north, up = self.axes
         return (dot(east, earth_fixed), dot(north, earth_fixed), dot(up, earth_fixed))
 
@@ -67,7 +67,7 @@ class SceneAxes:
     @overload
     def earth_fixed(self, position: Vectors) -> Vectors: ...
     def earth_fixed(self, position: Vectors) -> Vectors:
-        """A position in the scene in Earth-fixed axes. [m]"""
+        """Convert a position in the axes of the scene to Earth-fixed axes. [m]"""
         x, y, z = self.turned_back(position)
         return (x + self.origin[0], y + self.origin[1], z + self.origin[2])
 
@@ -76,16 +76,17 @@ class SceneAxes:
     @overload
     def turned_back(self, vector: Vectors) -> Vectors: ...
     def turned_back(self, vector: Vectors) -> Vectors:
-        """A direction or velocity of the scene in Earth-fixed axes."""
+        """Convert a direction or velocity in the axes of the scene to Earth-fixed axes."""
         x, y, z = (dot(axis, vector) for axis in zip(*self.axes, strict=True))
         return (x, y, z)
 
     def radial(self, position: Vectors, velocity: Vectors) -> Axes:
-        """Axes of the `ric` frame of a platform, in the scene's axes.
+        """Unit vectors of a platform's `ric` frame (radial, in-track, cross-track), in the axes of the scene.
 
-        Radial: away from the Earth's centre. Cross-track: normal of the plane of the position and of the velocity
-        against the stars, v + ω×r. In-track completes them, and differs slightly from the velocity on an eccentric
-        orbit (CCSDS 502.0-B, RTN).
+        The radial axis points away from the Earth's centre. The cross-track axis is normal to the position and to the
+        velocity relative to the stars, v + ω×r, where v is the velocity in Earth-fixed axes, ω the Earth's rotation
+        rate and r the position. The in-track axis completes the frame. On an eccentric orbit it differs slightly from
+        the direction of the velocity (CCSDS 502.0-B, RTN).
         """
         r = self.earth_fixed(position)
         x, y, z = self.turned_back(velocity)
@@ -107,13 +108,13 @@ def free_fall(position: Vectors, velocity: Vectors, axes: SceneAxes | None) -> V
     position, velocity : (3,)
         East, north, up; numbers or arrays (cases,). [m, m/s]
     axes : SceneAxes or None
-        Axes of a scene on the Earth. Without them the Earth does not turn, and is a sphere of its mean radius below
-        the scene.
+        Axes of a scene on the Earth. None means an Earth that does not turn, a sphere of mean radius below the scene.
 
     Notes
     -----
-    Derived here. On the Earth −∇U − 2ω×v − ω×(ω×r): r against the stars, written in axes that turn at ω, and the
-    potential of a flattened Earth, (μ/r)·[1 − J₂·(a/r)²·(3z²/r² − 1)/2]. Without: −μr/r³.
+    Derived here. With `axes` the acceleration is −∇U − 2ω×v − ω×(ω×r). The vector r from the Earth's centre is
+    written in axes that turn at the rate ω, and v is its rate in these axes. The potential of a flattened Earth is
+    −U = (μ/r)·[1 − J₂·(a/r)²·(3z²/r² − 1)/2]. Without `axes` the acceleration is −μr/r³.
     """
     if axes is None:
         x, y, up = position
@@ -136,7 +137,10 @@ def free_fall(position: Vectors, velocity: Vectors, axes: SceneAxes | None) -> V
 
 
 def earth_fixed_places(latitude: PerCase, longitude: PerCase, height: PerCase) -> Floats:
-    """Earth-fixed coordinates (..., 3) [m] of geodetic places, each (...), [rad], [rad], [m]."""
+    """Earth-fixed coordinates (..., 3) of geodetic positions. [m]
+
+    Latitude [rad], longitude [rad] and height [m] are each (...).
+    """
     sine, cosine = np.sin(latitude), np.cos(latitude)
     _, normal = curvature_radii(sine)
     level = (normal + height) * cosine
@@ -150,21 +154,22 @@ def earth_fixed(position: Geodetic) -> Vector:
 
 
 def _vector(coordinates: Floats) -> Vector:
-    """Three numbers of coordinates (3,), or three arrays (cases,) of (cases, 3)."""
+    """Convert coordinates (3,) to three numbers, or coordinates (cases, 3) to three arrays (cases,)."""
     x, y, z = (coordinate if coordinate.ndim else coordinate.item() for coordinate in np.moveaxis(coordinates, -1, 0))
     return (x, y, z)
 
 
 def curvature_radii(sine: PerCase) -> tuple[PerCase, PerCase]:
-    """Radii of curvature along the meridian and across it, by the sine of the latitude. [m]"""
+    """Radii of curvature of the ellipsoid along the meridian and across it, from the sine of the latitude. [m]"""
     across = EQUATORIAL_RADIUS_M / np.sqrt(1 - _SQUARED_ECCENTRICITY_RATIO * sine * sine)
     return across**3 * (1 - _SQUARED_ECCENTRICITY_RATIO) / EQUATORIAL_RADIUS_M**2, across
 
 
 def geodetic_places(points: Floats) -> tuple[Floats, Floats, Floats]:
-    """Latitude and longitude [rad] and height [m] of Earth-fixed coordinates (..., 3), each (...).
+    """Latitude [rad], longitude [rad] and height [m], each (...), of Earth-fixed coordinates (..., 3).
 
-    Bowring's iteration, on the reduced latitude; for places more than a few kilometres from the Earth's centre.
+    Bowring's iteration on the reduced latitude is used. It is valid for places more than a few kilometres from the
+    Earth's centre.
     """
     x, y, z = np.moveaxis(points, -1, 0)
     level = np.hypot(x, y)
@@ -208,41 +213,47 @@ def _directions(latitude: PerCase, longitude: PerCase) -> Floats:
 
 
 def axes_at_places(latitude: Floats, longitude: Floats) -> Floats:
-    """East, north and up at places, each (n,): (3, 3, n), by axis, Earth-fixed component and place."""
+    """Unit vectors east, north and up at n places, indexed (axis, Earth-fixed component, place), (3, 3, n).
+
+    `latitude` and `longitude` are (n,). [rad]
+    """
     return np.ascontiguousarray(np.moveaxis(_directions(latitude, longitude), -1, 1))
 
 
 def axes_at(position: Geodetic) -> SceneAxes:
-    """East, north and up at a position, or at positions of many cases."""
+    """Axes of a scene at a geodetic position, or at the positions of many cases."""
     east, north, up = map(_vector, _directions(*np.broadcast_arrays(position.latitude, position.longitude)))
     return SceneAxes(earth_fixed(position), (east, north, up))
 
 
 def flown(position: Geodetic, heading: float, speed: float, climb: float, times_s: PerCase) -> Floats:
-    """Earth-fixed positions (..., 3) after flights along the geodesic, at a height that `climb` changes. [m]
+    """Earth-fixed positions (..., 3) at times along a flight on a geodesic with constant speed and climb rate. [m]
 
     Parameters
     ----------
     position : Geodetic
-        At the beginning.
+        Position at time 0.
     heading : float
-        There, from north, clockwise. [rad]
-    speed, climb : float
-        Level, at the height that is flown, and vertical; both constant. [m/s]
+        Heading at time 0, clockwise from north. [rad]
+    speed : float
+        Horizontal speed at the flown height. [m/s]
+    climb : float
+        Vertical speed. [m/s]
     times_s : (...) array_like
-        May be negative.
+        Times from the start of the flight; may be negative. [s]
 
     Notes
     -----
-    Derived here. The direction turns with the ellipsoid's normal alone, at speed over radius of curvature, which is
-    Euler's formula. Runge and Kutta's fourth order, in Earth-fixed axes: there a pole is a place like others.
+    Derived here. The direction of flight turns only with the normal of the ellipsoid, at the rate of speed divided by
+    the radius of curvature. Euler's formula gives this radius. The Runge-Kutta method of fourth order integrates in
+    Earth-fixed axes, where the poles need no special treatment.
     """
     axes = axes_at(position)
     start = np.array(axes.origin)
     step = np.asarray(times_s, dtype=float)[..., None] / _RUNGE_KUTTA_STEPS
 
     def rates(state: Floats) -> Floats:
-        """Rates of the way from the start and of the direction, (2, ..., 3)."""
+        """Rates of the displacement from the start and of the direction of flight, (2, ..., 3)."""
         displacement, direction = state
         latitude, longitude, height = geodetic_places(start + displacement)
         east, north, up = _directions(latitude, longitude)

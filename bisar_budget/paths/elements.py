@@ -1,14 +1,14 @@
 """Mean elements of orbits: two-line sets and orbit mean-elements messages (OMM), propagated by SGP4.
 
-A position by SGP4 is about 1 km off at the epoch of the elements, and 1 to 3 km more with each day from the epoch
-(documentation of the package sgp4; Vallado and others, Revisiting Spacetrack Report #3, AIAA 2006-6753). The
-constants of WGS-72 are used, as in the making of elements. Positions in the true equator and mean equinox of date
-turn to the Earth by the mean sidereal time of 1982.
+The error of a position from SGP4 is about 1 km at the epoch of the elements, and grows by 1 to 3 km with each day
+from the epoch (documentation of the package sgp4; Vallado and others, Revisiting Spacetrack Report #3, AIAA
+2006-6753). The constants of WGS-72 are used, because the elements are made with them. The mean sidereal time of 1982
+turns positions from the true equator and mean equinox of date to Earth-fixed axes.
 
 Two-line sets follow Hoots & Roehrich, Spacetrack Report No. 3, 1980, section 12, with Space-Track's alpha-5 catalogue
-numbers. Messages follow CCSDS 502.0-B, as text of keywords and values, as XML, JSON or CSV. JSON and CSV have the
-keywords of the message. CelesTrak leaves out keywords there that can have one value only; Space-Track writes all
-keywords.
+numbers. Messages follow CCSDS 502.0-B, as text of keywords and values, as XML, JSON or CSV. JSON and CSV use the
+keywords of the message. In JSON and CSV, CelesTrak leaves out keywords that can have only one value; Space-Track
+writes all keywords.
 """
 
 import csv
@@ -84,7 +84,7 @@ class Elements:
 
     @property
     def object(self) -> str:
-        """Name and catalogue number."""
+        """Name and catalogue number of the object, for messages."""
         return f"{self.name} ({self.number})" if self.name else str(self.number)
 
     @property
@@ -95,7 +95,7 @@ class Elements:
 
 @dataclass(frozen=True, kw_only=True)
 class BrokenEntry:
-    """An entry of a catalogue that cannot be used: the reason, and the names of its object that can be read."""
+    """An unusable entry of a catalogue: the reason, and the names of its object as far as they can be read."""
 
     problem: str
     names: tuple[str, ...] = ()
@@ -147,12 +147,12 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
 
 
 def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
-    """The positions of a function without the steps of their rounding, which grow with the age of the elements.
+    """Remove the rounding steps from the positions of a function, which grow with the age of the elements.
 
-    SGP4 counts minutes and angles from the epoch. A week from the epoch a position is rounded to 2e-6 m, 100 days
-    from it to 4e-5 m, and a polynomial of slow time would follow these steps as bends of the path. Lagrange's
-    polynomial through eight positions 30 s apart has an error of 1e-8 m in a low orbit, by its remainder. It also
-    smooths the millimetres by which SGP4 jumps every half day in resonant orbits.
+    SGP4 counts minutes and angles from the epoch. So a position is rounded to 2e-6 m a week from the epoch, and to
+    4e-5 m 100 days from the epoch. A polynomial of slow time would follow these steps as bends of the path. Instead,
+    Lagrange's polynomial goes through eight positions 30 s apart. Its error in a low orbit is 1e-8 m, from its
+    remainder term. It also smooths the jumps of a few millimetres that SGP4 makes every half day in resonant orbits.
     """
 
     @lru_cache(maxsize=64)
@@ -176,12 +176,12 @@ def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
 def orbit_of(
     entries: Sequence[Entry], name: str, object_name: str | None, center: Instant, orientation: Orientation
 ) -> Orbit:
-    """Orbit of an object from the elements with the nearest epoch, and from the last of equally near elements.
+    """Orbit of an object from the elements with the nearest epoch; of equally near elements, the last are used.
 
-    `entries` are the entries of a file, and the remaining arguments those of its reader; `object_name` is a name or a
-    catalogue number. Broken entries of further objects are left out, and counted in the words of the orbit. Raises
-    `PathFileError` if there are no elements, or elements of several objects and no name. Raises it if an entry of the
-    object is broken, or any entry if no object is named. Raises it if SGP4 is missing or refuses the elements.
+    `entries` are the entries of a file. The other arguments are those of the file's reader. `object_name` is a name
+    or a catalogue number. Broken entries of other objects are left out, and counted in the words of the orbit. Raises
+    `PathFileError` in these cases: there are no elements; there are elements of several objects and no name; an entry
+    of the object is broken; an entry is broken and no object is named; SGP4 is missing or refuses the elements.
     """
     sets = [entry for entry in entries if isinstance(entry, Elements)]
     broken = [entry for entry in entries if isinstance(entry, BrokenEntry)]
@@ -248,14 +248,14 @@ def _hold_to_type(kind: str, location: str) -> None:
 
 
 def _angle(degrees: float, max_degrees: float, quantity: str, location: str) -> float:
-    """An angle of a file, in rad, which must be within its range."""
+    """Convert an angle from degrees to radians; raises `PathFileError` if it is not from 0 to `max_degrees`. [rad]"""
     if not 0 <= degrees <= max_degrees:
         raise PathFileError(f"{location}: {quantity} must be from 0 to {max_degrees:g} degrees (got {degrees:g})")
     return math.radians(degrees)
 
 
 def _mean_motion(turns: float, location: str) -> float:
-    """From revolutions a day, to rad/min."""
+    """Convert a mean motion from revolutions per day to rad/min; raises `PathFileError` outside 0 to 20 per day."""
     if not 0 < turns < 20:
         raise PathFileError(f"{location}: mean motion must be more than 0 and less than 20 a day (got {turns:g})")
     return turns * 2 * math.pi / 1440
@@ -390,7 +390,10 @@ def _column(line: str, location: str, start: int, end: int, quantity: str, form:
 
 
 def _catalogue_number(line: str, location: str) -> int:
-    """Catalogue number from five digits, or from four digits after a letter (10 for A on, without I and O)."""
+    """Catalogue number from five digits, or from a letter and four digits.
+
+    The letter A is 10, and the letters I and O are skipped.
+    """
     text = line[2:7].strip()
     if re.fullmatch(r"\d{1,5}", text, re.ASCII):
         return int(text)
@@ -412,7 +415,7 @@ def _epoch(line: str, location: str) -> Instant:
 
 
 def _drag(line: str, location: str) -> float:
-    """B* from five digits, after an implied decimal point, and an exponent of a sign and a digit."""
+    """Drag term B* from five digits after an implied decimal point, and an exponent of a sign and a digit."""
     text = line[53:61].strip()
     match = re.fullmatch(r"([+-]?)\.?(\d{1,5})\s?([+-]\d)", text, re.ASCII)
     if match is None:
@@ -426,7 +429,7 @@ _VERSION_KEYWORD = "CCSDS_OMM_VERS"
 
 @dataclass(frozen=True, kw_only=True)
 class _Message:
-    """Keywords and values of a message, the fault of its form, and whether it must have all mandatory keywords."""
+    """A message: its keywords and values, any fault of its form, and whether all mandatory keywords are required."""
 
     where: str
     leaves: Mapping[str, object]
@@ -486,7 +489,7 @@ def _from_markup(data: bytes, name: str) -> Iterator[_Message]:
 
 
 def _from_keywords(text: str, name: str) -> Iterator[_Message]:
-    """Messages of a text with a keyword and a value in each line. Each message begins with its version."""
+    """Split a text with a keyword and a value in each line into messages. Each message begins with its version."""
     leaves: dict[str, str] = {}
     first_line, problem = 0, ""
     for line_number, line in enumerate(text.split("\n"), 1):
@@ -553,7 +556,7 @@ _COVARIANCE_KEYWORD = re.compile(r"C[XYZ](_DOT)?_[XYZ](_DOT)?", re.ASCII)
 def _covariance(
     record: Mapping[str, object], epoch: Instant, orientation: Orientation, location: str
 ) -> EpochCovariance | None:
-    """The covariance that a message states at the epoch of its elements; None for a message without covariance."""
+    """Covariance that a message states for the epoch of its elements; None if it states no covariance."""
     elements = {key: str(value).strip() for key, value in record.items() if _COVARIANCE_KEYWORD.fullmatch(key)}
     if not any(elements.values()):
         return None

@@ -98,12 +98,12 @@ def read_eof(
 
 
 def _dropped(repeated: int) -> str:
-    """Words for repeated state vectors, which joined files have."""
+    """Words for the number of repeated state vectors, which occur in joined files; empty if there are none."""
     return f", {repeated} repeated state vector{'s' * (repeated > 1)} left out" if repeated else ""
 
 
 def _short(satellite: str) -> str:
-    """S1A for Sentinel-1A."""
+    """Short name of a satellite, such as `s1a` for `Sentinel-1A`."""
     return object_key(satellite).replace("sentinel-", "s").replace("sentinel", "s").replace(" ", "")
 
 
@@ -113,7 +113,11 @@ def _text(file: MessageElement, key: str) -> str | None:
 
 
 def _samples(file: MessageElement, system: str, name: str) -> tuple[list[Sample], list[int], list[str], int]:
-    """State vectors, their lines, qualities that are not nominal, and the number of repeated state vectors."""
+    """Read the state vectors of a file, without repetitions.
+
+    Returns the state vectors, their lines, the qualities that are not nominal, and the number of repeated state
+    vectors.
+    """
     samples: list[Sample] = []
     lines: list[int] = []
     flawed = []
@@ -152,7 +156,7 @@ def _numbers(vector: MessageElement, elements: dict[str, MessageElement], name: 
 
 
 def _time(vector: MessageElement, elements: dict[str, MessageElement], system: str, name: str) -> Instant:
-    """Time of a state vector, of TAI, from its time in the time system of the file."""
+    """Time of a state vector, converted from the time system of the file to TAI."""
     if system not in elements:
         raise PathFileError(f"{name}:{vector.line}: the state vector has no {system}")
     text = elements[system].text.strip()

@@ -1,7 +1,7 @@
-"""Ephemerides: positions of an object at times, often with velocities, and the orbit through these samples.
+"""Ephemerides: positions of an object at given times, often with velocities, and the orbit through these samples.
 
-A position is interpolated in the axes and the time of the file, then turned to the Earth. The differences between the
-`ITRF` of several years, centimetres, are ignored.
+A position is interpolated in the axes and the time system of the file, and then converted to Earth-fixed axes. The
+`ITRF` of different years differ by centimetres; these differences are ignored.
 """
 
 import math
@@ -36,14 +36,14 @@ _GAUSS_NODES = ((0.5 - math.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + math.sqrt
 
 @dataclass(frozen=True)
 class Interpolation:
-    """The polynomial between samples: Hermite's through positions and velocities, or Lagrange's through positions."""
+    """Polynomial between samples: Hermite's through positions and velocities, or Lagrange's through positions."""
 
     is_hermite: bool
     degree: int
 
     @property
     def nodes(self) -> int:
-        """Number of samples on the polynomial."""
+        """Number of samples through which the polynomial goes."""
         return (self.degree + 1) // 2 if self.is_hermite else self.degree + 1
 
     @property
@@ -99,23 +99,22 @@ class Segment:
     remarks: tuple[str, ...] = ()
 
     def is_useable(self, time: Instant) -> bool:
-        """Whether a time of TAI is within the useable time."""
+        """Whether a time of TAI is from the first to the last useable time."""
         return time.since(self.first) >= -_EDGE_S and time.since(self.last) <= _EDGE_S
 
 
 def orbit_through(
     segments: Sequence[Segment], name: str, object_name: str | None, center: Instant, orientation: Orientation
 ) -> Orbit:
-    """Orbit of an object through the segment with the middle of the aperture.
+    """Orbit of an object through the segment that contains the middle of the aperture.
 
-    If there are several such segments, the segment that reaches farthest around the middle serves all instants. The
-    difference to an interpolation with two more degrees estimates the error of the interpolation, which is a doubt
-    from 1 m on.
+    If there are several such segments, the segment that reaches farthest around the middle is used for all instants.
+    The error of the interpolation is estimated from the difference to an interpolation with two more degrees. An
+    error of 1 m or more is a doubt.
 
-    `segments` are the segments of a file, and the remaining arguments those of its reader. Raises `PathFileError` if
-    the choice of the object is open, or if the file has no position at `center`, or is too sparse there.
-    `Orbit.place`
-    raises it outside the span.
+    `segments` are the segments of a file. The other arguments are those of the file's reader. Raises `PathFileError`
+    if several objects are possible, if the file has no position at `center`, or if it is too sparse there.
+    `Orbit.place` raises it outside the span.
     """
     if not segments:
         raise PathFileError(f"{name}: has no ephemeris")
@@ -125,7 +124,7 @@ def orbit_through(
 
 
 class _Between:
-    """An orbit through the samples of a segment."""
+    """Orbit through the samples of a segment."""
 
     def __init__(
         self, segment: Segment, interpolation: Interpolation, orientation: Orientation, center: Instant
@@ -219,12 +218,12 @@ class _Between:
 
 
 def every(samples: Sequence[Sample]) -> str:
-    """Words for the usual step between the states of an ephemeris."""
+    """Words for the median step between the states of an ephemeris."""
     return f"one state every {minutes(usual_step(samples))}"
 
 
 def minutes(duration_s: float) -> str:
-    """A time between two states in words, in minutes from one minute on."""
+    """Words for a time between two states, in s below one minute and in min above."""
     return f"{duration_s / 60:.3g} min" if duration_s >= 60 else f"{duration_s:.3g} s"
 
 
@@ -241,16 +240,16 @@ def usual_step(samples: Sequence[Sample]) -> float:
 
 
 def _times_around(samples: Sequence[Sample], time: Instant) -> tuple[Instant, Instant]:
-    """Times of the two samples around an instant, or of the nearest two for an instant outside."""
+    """Times of the two samples around an instant; the nearest two if the instant is outside the samples."""
     after = min(max(bisect_right(samples, time, key=lambda sample: sample.time), 1), len(samples) - 1)
     return samples[after - 1].time, samples[after].time
 
 
 def _error_around(samples: Sequence[Sample], time: Instant, interpolation: Interpolation) -> float:
-    """Distance between an interpolation and an interpolation with two more degrees. [m]
+    """Estimated error of an interpolation near a time: its distance from an interpolation with two more degrees. [m]
 
-    The larger distance at a time and at the middle between the samples around it. Without further samples the second
-    interpolation has two degrees less, and is worse.
+    It is the larger distance at the time itself and midway between the samples around it. If there are too few
+    samples for two more degrees, the second interpolation has two degrees less.
     """
     step = 1 if interpolation.is_hermite else 2
     nodes, is_hermite = interpolation.nodes, interpolation.is_hermite
@@ -268,7 +267,7 @@ def _error_around(samples: Sequence[Sample], time: Instant, interpolation: Inter
 
 
 def _fitting(samples: Sequence[Sample], center: Instant) -> Interpolation:
-    """Lagrange's interpolation with the smallest estimated error around an instant."""
+    """Lagrange interpolation with the smallest estimated error around an instant."""
     candidates = [Interpolation(False, degree) for degree in _TRIED_DEGREES if degree + 3 <= len(samples)]
     if not candidates:
         return Interpolation(False, min(DEFAULT_DEGREE, len(samples) - 1))
@@ -277,7 +276,7 @@ def _fitting(samples: Sequence[Sample], center: Instant) -> Interpolation:
 
 
 def _segment_at(segments: Sequence[Segment], name: str, center: Instant) -> Segment:
-    """The segment with an instant; of several segments the segment that reaches farthest around the instant."""
+    """Segment that contains an instant; if there are several, the segment that reaches farthest around it."""
     time = tai(center)
     useable = [segment for segment in segments if segment.is_useable(time)]
     if not useable:
@@ -290,9 +289,10 @@ def _segment_at(segments: Sequence[Segment], name: str, center: Instant) -> Segm
 
 
 def velocity_error(samples: Sequence[Sample]) -> float:
-    """Largest difference between velocities and the motion of positions, over the speed; NaN if it is unknown.
+    """Largest relative difference between stated velocities and the velocities of the positions.
 
-    Sixteen pairs of neighbours are compared: near a pole the Earth's rotation hardly moves a position.
+    About sixteen pairs of neighbouring samples are compared, because near a pole the Earth's rotation hardly moves a
+    position. The result is 0 for too few samples, and NaN if a difference is not finite.
     """
     last = len(samples) - _NEIGHBOUR_SAMPLES
     if last < _NEIGHBOUR_SAMPLES:
@@ -303,7 +303,7 @@ def velocity_error(samples: Sequence[Sample]) -> float:
 
 
 def _velocity_error_at(samples: Sequence[Sample], middle: int) -> float:
-    """Difference between velocities and the motion of positions before a sample, over the speed.
+    """Relative difference between stated velocities and the velocity of positions, in the interval before a sample.
 
     The interpolated velocities are integrated by Gauss-Legendre quadrature. Derived here.
     """

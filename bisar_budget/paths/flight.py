@@ -1,8 +1,8 @@
-"""A platform's path as a file knows it, and the function of slow time that a budget flies.
+"""The path of a platform from a file, and its conversion to the function of slow time that a budget uses.
 
-Exact ranges, images and every other command take a path as a polynomial over the aperture, or as several in pieces.
-An orbit gives a position at any time: its polynomial interpolates. A log gives measured fixes: one polynomial smooths
-them by least squares, or a spline with the number of pieces that the log needs. Both paths come with their distance
+All commands take a path as one polynomial over the aperture, or as several polynomials in pieces. An orbit gives a
+position at any time, and its polynomial interpolates positions. A log gives measured fixes. A polynomial or a spline
+smooths them by least squares; a spline has as many pieces as the log needs. Both kinds of path state their distance
 from the positions of the file.
 """
 
@@ -107,11 +107,11 @@ NO_MATRIX: Matrix = ((0.0,) * 3,) * 3
 
 
 class PathFileError(Exception):
-    """A file that gives no path. The message names the file, and its line, byte or record.
+    """Error for a file that gives no path. The message names the file, and its line, byte or record.
 
-    `accepted` describes an accepted file, `hint` a remedy. `key` is the key of the mission file that the file
-    contradicts; empty: the file itself is wrong. `spans` are the times that the file covers, if it does not cover the
-    requested time.
+    `accepted` describes an accepted file, and `hint` a remedy. `key` is the key of the mission file that contradicts
+    the file; it is empty if the file itself is wrong. `spans` are the times that the file covers, if it does not
+    cover the requested time.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ def hold_to_bytes(data: bytes, max_bytes: int, name: str) -> None:
 
 
 class PathDoubt(NamedTuple):
-    """How far the true path may lie from a known path: the largest distance `size` [m], and `words` for its cause."""
+    """Uncertainty of a path: the largest distance `size` [m] of the true path from it, and its cause in `words`."""
 
     size: float
     words: str
@@ -144,7 +144,7 @@ NO_DOUBT = PathDoubt(0.0, "")
 
 @dataclass(frozen=True)
 class Orbit:
-    """A path that is known at any instant of a span.
+    """A path that is known at every instant of a span.
 
     Attributes
     ----------
@@ -159,15 +159,15 @@ class Orbit:
     doubts : callable
         Warnings at an instant where the doubt is larger than usual.
     doubt : callable
-        Largest distance of the truth from the path at an instant. [m]
+        Largest distance of the true path from the known path at an instant. [m]
     remedy : str
         Words for a way to reduce the doubt.
     is_turned : bool
-        Whether the orbit comes from axes of the stars.
+        Whether the file states the orbit along axes that are fixed to the stars.
     turning_doubt, turning_doubts : callable
-        The share of `doubt` and of `doubts` that comes from the Earth's orientation.
+        The part of `doubt` and of `doubts` that is due to the Earth's orientation.
     stated : callable
-        Accuracy that the file states at an instant, along the axes of the Earth.
+        Accuracy that the file states at an instant, along Earth-fixed axes.
     """
 
     place: Callable[[Instant], Vector]
@@ -188,14 +188,14 @@ class Orbit:
         return replace(self, words=words, doubt=self.turning_doubt, doubts=self.turning_doubts)
 
     def largest_doubt_m(self, instant: Instant) -> float:
-        """Largest distance of the truth from the path at an instant, by its doubt and by its stated accuracy. [m]"""
+        """Largest distance of the true path at an instant, from its doubt and its stated accuracy. [m]"""
         stated = self.stated(instant)
         return max(self.doubt(instant).size, 0.0 if stated is None else stated.position_m)
 
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """Unusable records of a log: the number of usable records before each (m,), and a message about each."""
+    """Unusable records of a log: for each, the number of usable records before it (m,), and a message."""
 
     before: NDArray[np.int64]
     faults: Sequence[str]
@@ -298,16 +298,16 @@ class Fitted:
 def interpolated(
     positions_at: Callable[[Floats], Floats], aperture_time_s: float, widest_s: float = math.inf
 ) -> Fitted:
-    """Path through positions at Chebyshev points around the aperture.
+    """Polynomial path through positions at Chebyshev points around the aperture.
 
     Parameters
     ----------
     positions_at : callable
-        From slow times (n,) [s] to positions (n, 3) in the scene's axes [m].
+        Function from slow times (n,) [s] to positions (n, 3) in the axes of the scene [m].
     aperture_time_s : float
         Length of the aperture. [s]
     widest_s : float
-        Longest time around the middle in which positions are known. [s]
+        Length of the longest time span around the middle in which positions are known. [s]
     """
     half = min(max(aperture_time_s, _MIN_WINDOW_S), widest_s) / 2
     nodes = chebyshev.chebpts1(_CHEBYSHEV_NODES)
@@ -325,9 +325,9 @@ def interpolated(
 
 
 def stretch_around(times: Floats, aperture_time_s: float) -> float:
-    """Shortest time around the middle of an aperture whose fixes are smoothed. [s]
+    """Length of the shortest time span around mid-aperture whose fixes are smoothed. [s]
 
-    The time is the aperture, or longer until it holds nine fixes: a log at 1 Hz has three fixes in 3 s.
+    The span is the aperture, or longer until it contains nine fixes: a log at 1 Hz has only three fixes in 3 s.
     """
     distances = np.sort(np.abs(times))[: _SMOOTHING.noise_fixes]
     return max(aperture_time_s, 2 * float(distances.max(initial=0.0)))
@@ -335,7 +335,7 @@ def stretch_around(times: Floats, aperture_time_s: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _SmoothFit:
-    """A path through the fixes of a stretch: a Legendre series or a spline.
+    """Least-squares path through the fixes of a stretch: a Legendre series or a spline.
 
     Attributes
     ----------
@@ -346,11 +346,11 @@ class _SmoothFit:
     series : (coefficients, 3)
         Coefficients of the path. [m]
     residuals : (n, 3)
-        Fixes less the path. [m]
+        Positions of the fixes minus the path. [m]
     independent : float
         Number of independent fixes with the same information.
     root : (coefficients, coefficients)
-        Its product with its transpose is the covariance of the coefficients over the variance of white fixes.
+        Matrix whose product with its transpose is the covariance of the coefficients for white fixes of variance 1.
     spline : SplineFit, optional
         The spline; None for a Legendre series.
     """
@@ -377,7 +377,7 @@ class _SmoothFit:
 
     @property
     def covariance(self) -> Floats:
-        """Covariance of the coefficients over the variance of a fix. Correlated fixes count as fewer fixes."""
+        """Covariance of the coefficients for fixes of variance 1. Correlated fixes count as fewer fixes."""
         return np.asarray(self.root @ self.root.T * (len(self.residuals) / self.independent))
 
     @property
@@ -388,9 +388,10 @@ class _SmoothFit:
 
     @property
     def common_motion(self) -> tuple[float, float]:
-        """Mean product of a residual and the next residual, and its standard deviation. White fixes give zero. [m²]
+        """Mean product of each residual and the next residual, and its standard deviation. [m²]
 
-        A fit removes a common share of white noise from neighbouring residuals. The share is added again.
+        The mean is zero for white fixes. A fit reduces the product of neighbouring residuals of white noise; the mean
+        is corrected for this.
         """
         products = (self.residuals[1:] * self.residuals[:-1]).sum(axis=1)
         mean, square = float(products.mean()), float(np.mean(np.sum(self.residuals**2, axis=1)))
@@ -414,11 +415,11 @@ class _SmoothFit:
         return positions if self.spline is None else positions + self.spline.center
 
     def leverage(self, times: Floats) -> Floats:
-        """Variance of the path at slow times (m,) [s] over the variance of a fix."""
+        """Variance of the path at slow times (m,) [s], divided by the variance of a fix."""
         return np.asarray(np.sum((self.basis(times) @ self.root) ** 2, axis=1))
 
     def state(self) -> PlatformState:
-        """The path."""
+        """The path as a function of slow time."""
         return path_of(powers_of(self.series, self.half_s)) if self.spline is None else self.spline.state()
 
     def sample_times(self, aperture_time_s: float) -> Floats:
@@ -427,16 +428,19 @@ class _SmoothFit:
         return np.asarray(aperture_time_s / 2 * np.linspace(-1, 1, count))
 
     def noise(self, times: Floats, left_out: Floats) -> float:
-        """Mean square of the path's error over times (m,) by noise of the fixes, less a projection (m, m). [m²]"""
+        """Mean square of the path's error over times (m,) due to noise of the fixes. [m²]
+
+        The projection `left_out` (m, m) is removed from the error first.
+        """
         basis = self.basis(times)
         basis = basis - left_out @ basis
         return float(np.einsum("mi,ij,mj->", basis, self.covariance, basis) / times.size * self.variances.sum())
 
     def acceleration_noise(self, aperture_time_s: float) -> Floats:
-        """Covariance of the error of the acceleration, (3, 3). [m²/s⁴]
+        """Covariance (3, 3) of the error of the acceleration due to noise of the fixes. [m²/s⁴]
 
-        For a polynomial, the error at mid-aperture. The pieces of a spline have different errors, so the acceleration
-        of the parabola through the error over the aperture counts.
+        For a polynomial, this is the error at mid-aperture. The pieces of a spline have different errors. So for a
+        spline, it is the acceleration of the parabola that fits the error over the aperture.
         """
         if self.spline is None:
             bends = np.array([legendre.legval(0.0, legendre.legder(series, 2)) for series in np.eye(self.order + 1)])
@@ -449,7 +453,7 @@ class _SmoothFit:
         return np.diag(variance * self.variances)
 
     def path_noise(self, aperture_time_s: float, excess: float) -> PathNoise:
-        """The error of the path over the aperture by noise of the fixes, with its variance times `excess`."""
+        """Error of the path over the aperture due to noise of the fixes, with its variance multiplied by `excess`."""
         sample_times, half_s = self.sample_times(aperture_time_s), aperture_time_s / 2
         through = np.linalg.pinv(legendre.legvander(sample_times / half_s, _SMOOTHING.max_order)) @ self.basis(
             sample_times
@@ -471,10 +475,10 @@ class _SmoothFit:
 
 
 def _information(residuals: Floats, coefficients: int, independent: float) -> float:
-    """Information criterion of a fit with residuals (n, 3) [m]: the smaller, the better.
+    """Information criterion of a fit with residuals (n, 3) [m]. A smaller value is better.
 
-    Each axis has its own noise, and the same number of coefficients. The last factor is the factor of AICc (Hurvich &
-    Tsai 1989): a small number of fixes is fitted too well by chance.
+    Each axis has its own noise, and the same number of coefficients. The last factor of the cost is that of AICc
+    (Hurvich & Tsai 1989). It corrects for a small number of fixes, which chance fits too well.
     """
     count, squares = len(residuals), (residuals**2).mean(axis=0) + _ROUNDING_M**2
     cost = 3 * coefficients * math.log(independent) * count / (count - coefficients - 1)
@@ -482,7 +486,7 @@ def _information(residuals: Floats, coefficients: int, independent: float) -> fl
 
 
 def _fit(times: Floats, log_positions: Floats, half_s: float, *, may_have_pieces: bool) -> _SmoothFit:
-    """The path with the smallest Bayesian information criterion (Schwarz 1978) through the fixes of a stretch."""
+    """Path through the fixes of a stretch with the smallest Bayesian information criterion (Schwarz 1978)."""
     inside = np.abs(times) <= half_s * (1 + 1e-9)
     times_inside, positions, count = times[inside], log_positions[inside], int(inside.sum())
     normalised_times = times_inside / half_s
@@ -496,7 +500,7 @@ def _fit(times: Floats, log_positions: Floats, half_s: float, *, may_have_pieces
 
 
 def _in_pieces(fit: _SmoothFit, positions: Floats) -> _SmoothFit:
-    """The polynomial, or a spline through its fixes (n, 3) [m] if its information criterion is smaller.
+    """Replace a polynomial by a spline through the same fixes (n, 3) [m] if its information criterion is smaller.
 
     Pieces are halved, see `splines`, as long as neighbouring residuals are correlated.
     """
@@ -527,14 +531,18 @@ def _in_pieces(fit: _SmoothFit, positions: Floats) -> _SmoothFit:
 def _widened(
     narrowest: _SmoothFit, times: Floats, positions: Floats, aperture_time_s: float, widest_s: float
 ) -> tuple[_SmoothFit, float]:
-    """The fit with the smallest predicted error over the aperture, and that squared error over its squared noise.
+    """Find the fit with the smallest predicted error over the aperture; return it and its error ratio.
 
-    A longer stretch averages more noise: the acceleration of a parabola has an error of σ√(720/(n·T⁴)). But a longer
-    stretch may smear the motion of the platform, and the smear is unknown. The distance of the path from the paths of
-    narrower stretches is known. The expectation of its square is the square of the smear plus the noise that the
-    wider fit avoids. The excess over that noise counts as smear (rule of Goldenshluger & Lepski 2011; Lepski 1991).
-    The error that counts is the error beyond a straight line, which defocuses. In addition the whole path must not
-    become worse, and the residual in the aperture must not grow.
+    The error ratio is the squared predicted error divided by the squared error due to noise.
+
+    A longer stretch averages more noise: the acceleration of a parabola through n fixes of noise σ over the time T
+    has an error of σ√(720/(n·T⁴)). But a longer stretch may smear the motion of the platform. The smear is unknown,
+    and is estimated from the distance between the path and the paths of narrower stretches. The expected square of
+    this distance is the square of the smear plus the noise that the wider fit avoids. The excess over that noise
+    counts as smear (rule of Goldenshluger & Lepski 2011; Lepski 1991).
+
+    Only the error beyond a straight line is minimised, because it defocuses. In addition, the error of the whole path
+    and the residual in the aperture must not grow.
     """
     sample_times, has_pieces = narrowest.sample_times(aperture_time_s), narrowest.spline is not None
     straight = np.linalg.qr(np.vander(sample_times, 2))[0]
@@ -584,39 +592,42 @@ def _residual_within(fit: _SmoothFit, aperture_time_s: float) -> float:
 def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s: float = 0.0) -> Fitted:
     """Path that fits the fixes of a log around the aperture by least squares.
 
-    The order has the smallest Bayesian information criterion (Schwarz 1978), and is at most 8 and at most half the
-    number of fixes. If one polynomial leaves motion, the path is a spline, and the same criterion chooses the number
-    of its pieces, see `splines`. Faster motion of a platform is noise of the log, or vibration. Fixes with correlated
-    residuals count as fewer fixes. A slow error of the log, which looks like motion, is then not fitted as if it were
-    white noise.
+    The order has the smallest Bayesian information criterion (Schwarz 1978). It is at most 8, and at most half the
+    number of fixes. If the residual of one polynomial still contains motion, the path is a spline. The same criterion
+    chooses the number of its pieces, see `splines`. Faster motion of the platform counts as noise of the log, or as
+    vibration. Fixes with correlated residuals count as fewer fixes, so that a slow error of the log, which looks like
+    motion, is not fitted.
 
     The stretch is the shortest stretch around the aperture, or a longer stretch with a smaller predicted error of the
-    path, see `_widened`: noise of the log is an acceleration of the path, and makes allowables wrong.
+    path, see `_widened`. This matters because noise of the log becomes an acceleration of the path, which makes
+    allowables wrong.
 
-    `missed` leaves out each fix in the aperture, and the fixes next to it, in turn (Allen 1974). It holds the noise,
-    the motion that the polynomial does not follow, and the motion between two fixes, which a log that is slow for its
-    motion does not show. Where the path has more noise than a fix, as in a gap, `missed` is larger by that ratio.
+    `missed` is computed by leaving out each fix in the aperture, and the fixes next to it, in turn (Allen 1974). It
+    contains the noise, the motion that the polynomial does not follow, and the motion between two fixes, which a log
+    with a low rate does not show. If the path has more noise than a fix, as in a gap, `missed` is larger by that
+    ratio.
 
     Parameters
     ----------
     times : (n,) ndarray
-        Slow time, rising; fixes outside the stretch are not used. [s]
+        Slow times, rising; fixes outside the stretch are not used. [s]
     positions : (n, 3) ndarray
-        Positions of the fixes in the scene's axes. [m]
+        Positions of the fixes in the axes of the scene. [m]
     aperture_time_s : float
         Length of the aperture. [s]
     widest_s : float
-        Longest time around the middle whose fixes may be smoothed; omitted: the shortest stretch that is needed. [s]
+        Length of the longest time span around the middle whose fixes may be smoothed. If omitted, the shortest
+        stretch is used. [s]
 
     Raises
     ------
     PathFileError
-        Fewer than five fixes in all.
+        There are fewer than five fixes around the aperture.
 
     Notes
     -----
-    A fix with the residual r and the leverage h is r/(1 - h) off the path that is fitted without the fix (Belsley,
-    Kuh & Welsch 1980, 2.1).
+    The distance of a fix from the path that is fitted without it is r/(1 - h), with the residual r and the leverage
+    h of the fix (Belsley, Kuh & Welsch 1980, 2.1).
     """
     half = stretch_around(times, aperture_time_s) / 2
     count = int((np.abs(times) <= half * (1 + 1e-9)).sum())
@@ -666,10 +677,10 @@ def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s:
 
 
 def around_aperture(times: Floats, aperture_time_s: float) -> slice:
-    """Indices of the fixes in the aperture or next to it, from slow times (n,) [s].
+    """Slice of the fixes in the aperture and of the fixes directly before and after it, from slow times (n,) [s].
 
-    The largest sigma of these fixes counts. Their mean would declare a smaller error than the log has at some time of
-    the aperture.
+    The largest sigma of these fixes is used. With their mean, the declared error would be smaller than the error of
+    the log at some times of the aperture.
     """
     half = aperture_time_s / 2
     first = max(int(np.searchsorted(times, -half, "right")) - 1, 0)
@@ -723,7 +734,7 @@ def slow_times(
     slow, half = times - middle, aperture_time_s / 2
 
     def cause(index: int) -> str:
-        """Message about an unusable record directly before the fix of an index; empty without such a record."""
+        """Message about an unusable record directly before the fix of an index; empty if there is none."""
         if log.left_out is None or index not in log.left_out.before:
             return ""
         return f"; {log.left_out.faults[int((log.left_out.before == index).argmax())]}"
@@ -753,7 +764,10 @@ def slow_times(
 
 
 def _hold_to_clock(log: Log, center: Instant | None, center_seconds: float | None, name: str) -> None:
-    """Refuse an aperture with a middle in UTC for a log of times of day without a date, or of an unknown week."""
+    """Refuse a log of times of day without a date, and a log of seconds of an unknown GPS week.
+
+    Such a log is accepted if `center_seconds` gives the middle of the aperture on the clock of the log.
+    """
     if log.start is not None or center_seconds is not None:
         return
     if log.clock == "day":
@@ -772,7 +786,7 @@ def _hold_to_clock(log: Log, center: Instant | None, center_seconds: float | Non
 
 
 def dated(log: Log, center: Instant | None) -> Log:
-    """A log of times of day with the date nearest to the middle of the aperture. Any other log is unchanged."""
+    """Give a log of times of day the date nearest to the middle of the aperture. Any other log is unchanged."""
     if log.clock != "day" or log.start is not None or center is None:
         return log
     middle_time = float(log.times[len(log.times) // 2])
@@ -784,9 +798,9 @@ def dated(log: Log, center: Instant | None) -> Log:
 def track_around(
     log: Log, center: Instant | None, center_seconds: float | None, aperture_time_s: float, name: str
 ) -> Log:
-    """The log itself, or the track that covers the aperture in a log of several tracks.
+    """Track that covers the aperture in a log of several tracks; a log without several tracks is returned unchanged.
 
-    Parameters are as in `slow_times`.
+    The parameters are the same as in `slow_times`.
 
     Raises
     ------
@@ -881,9 +895,10 @@ def widest_stretch(log: Log, times: Floats, aperture_time_s: float) -> float:
 
 
 def _independent(residuals: Floats) -> float:
-    """Number of independent samples with the information of residuals (n, 3).
+    """Number of independent samples with the same information as residuals (n, 3).
 
-    It is n over the sum of the autocorrelation up to its first zero, and n for white noise. All axes count equally.
+    The number is n for white noise. Otherwise, n is divided by the sum of the autocorrelation up to its first zero.
+    All axes count equally.
     """
     count = len(residuals)
     spectrum = np.abs(np.fft.rfft(residuals, 2 * count, axis=0)) ** 2
@@ -895,19 +910,19 @@ def _independent(residuals: Floats) -> float:
 
 # ---------------------------------------------------------------------- polynomials of slow time
 def least_squares(normalised_times: Floats, positions: Floats, order: int) -> tuple[Floats, Floats]:
-    """Legendre series of an order that fits positions, and its residuals.
+    """Least-squares fit of a Legendre series of the given order to positions.
 
     Parameters
     ----------
     normalised_times : (n,) ndarray
         Times of the positions, scaled to -1 … 1.
     positions : (n, 3) ndarray
-        [m]
+        Positions to fit. [m]
 
     Returns
     -------
     (order + 1, 3) ndarray, (n, 3) ndarray
-        Coefficients, and positions less the series. [m]
+        Coefficients, and residuals, which are the positions minus the series. [m]
     """
     basis = legendre.legvander(normalised_times, order)
     coefficients: Floats = np.asarray(np.linalg.lstsq(basis, positions, rcond=None)[0], dtype=float)
@@ -919,7 +934,7 @@ def powers_of(
 ) -> Floats:
     """Coefficients (order + 1, 3) of τ⁰, τ¹, … of a series over -`half_s` … `half_s`. [m], [m/s], …
 
-    `convert` turns coefficients of the series into coefficients of powers; omitted: from a Legendre series.
+    `convert` converts coefficients of the series to coefficients of powers. The default is for a Legendre series.
     """
     powers = np.zeros_like(coefficients)
     for axis in range(3):
@@ -934,7 +949,7 @@ def _vector(values: Floats) -> Vector:
 
 
 def path_of(powers: Iterable[Iterable[float]]) -> PlatformState:
-    """A path from its coefficients of τ⁰, τ¹, …, at least two. The highest coefficients are left out if zero."""
+    """Path from at least two coefficients, of τ⁰, τ¹, …. Zero coefficients of the highest powers are left out."""
     vectors: list[Vector] = [(float(x), float(y), float(z)) for x, y, z in powers]
     position, velocity, (x, y, z), *bends = vectors if len(vectors) > 2 else [*vectors, STRAIGHT]
     while bends and bends[-1] == STRAIGHT:
@@ -944,7 +959,7 @@ def path_of(powers: Iterable[Iterable[float]]) -> PlatformState:
 
 # ---------------------------------------------------------------------- positions between the samples of a table
 class Sample(NamedTuple):
-    """A time of days without leap seconds, and position and velocity. [m], [m/s]"""
+    """A sample of an orbit: time of a time system without leap seconds, position [m] and velocity [m/s]."""
 
     time: Instant
     place: Vector
@@ -952,10 +967,10 @@ class Sample(NamedTuple):
 
 
 def interpolate(samples: Sequence[Sample], time: Instant, count: int, is_hermite: bool) -> Vector:
-    """Position at a time, from the samples around it. [m]
+    """Position at a time, interpolated from the `count` samples around it. [m]
 
-    All times between two neighbouring samples use the same samples. Neighbouring intervals share the sample between
-    them, for even and odd counts: the path has no jumps.
+    All times between two neighbouring samples use the same samples. Neighbouring intervals both use the sample
+    between them, for even and odd `count`, so the path has no jumps.
     """
     after = bisect_right(samples, time, key=lambda sample: sample.time)
     first = min(max(after - (count + 1) // 2, 0), len(samples) - count)
@@ -964,7 +979,9 @@ def interpolate(samples: Sequence[Sample], time: Instant, count: int, is_hermite
 
 
 def _through(samples: Sequence[Sample], times: Sequence[float], is_hermite: bool) -> Vector:
-    """Value at time 0 of Lagrange's polynomial through positions, or of Hermite's through velocities too.
+    """Value at time 0 of a polynomial through samples: Lagrange's, or Hermite's if velocities are used too.
+
+    `times` are the times of the samples. [s] The result is NaN if it overflows.
 
     Sources: Abramowitz & Stegun, equations 25.2.1 and 25.2.2; Burden & Faires, Numerical Analysis, theorem 3.9.
     """

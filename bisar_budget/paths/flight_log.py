@@ -1,17 +1,21 @@
-"""Logs of flights as CSV: a header that names quantity and unit of each column, then a place in each line.
+"""Reader of flight logs as CSV: a header with the quantity and unit of each column, then one position per line.
 
     # comment
     time [s], latitude [deg], longitude [deg], height [m]
     0.00, 48.086600, 11.279700, 3000.0
 
-Time is `time [s]`, counted from anywhere, or stamps of ISO 8601: `utc` with a Z at the end, `gpst` or `tai` without.
-`time [UTC]` is the same as `utc`, and a `time` without a unit is in the scale that the mission file says. Places are
-`latitude`, `longitude` and `height` above the ellipsoid of WGS-84 or `altitude` above mean sea level, or Earth-fixed
-`x`, `y`, `z`, or `east`, `north`, `up` of the scene's centre. `geoid_separation` makes a height of an altitude.
-`sigma_east`, `sigma_north`, `sigma_up`, or what other programs call them, are one-sigma errors of a place; a cell of
-them without a number above 0 says nothing. A column that may be an accuracy, and is none that is known, is refused;
-other columns are not read. Cells are parted by commas, semicolons or tabs. Exporters have headers of their own, see
-below.
+The time column is `time [s]`, counted from any origin, or it has ISO 8601 time stamps. The stamps of a column `utc`
+end with Z; the stamps of `gpst` and `tai` have no zone. `time [UTC]` means the same as `utc`. A `time` column without
+a unit is in the time scale that the mission file states.
+
+A position is `latitude` and `longitude` with `height` above the WGS-84 ellipsoid or `altitude` above mean sea level.
+It may also be Earth-fixed `x`, `y`, `z`, or `east`, `north`, `up` from the scene centre. `geoid_separation` converts
+an altitude into a height.
+
+`sigma_east`, `sigma_north` and `sigma_up`, or the names that other programs use, are one-sigma errors of the
+position. A cell in these columns without a number above 0 is ignored. A column that may be an accuracy, but is not a
+known one, is refused. Other columns are not read. Cells are separated by commas, semicolons or tabs. The headers of
+some exporters are also accepted; they are listed below.
 """
 
 import csv
@@ -84,10 +88,10 @@ _CLOCKS_APART_S = 1.0  # of an exporter's two clocks, beyond the second to which
 
 
 class _Column(NamedTuple):
-    """A column that is read: its name, unit as written, factor to SI and place in a row. An instant has no unit.
+    """A column that is read: its name, unit as written, factor to SI, and index in a row. A time stamp has no unit.
 
-    Names of exporters' columns are those of plain logs, and `altitude` above mean sea level, `unix` since 1970 in
-    UTC, GPS `week`, kind of `fix`, number of the `receiver`.
+    The columns of exporters get the names of plain logs. They may also be `altitude` above mean sea level, `unix`
+    (time since 1970 in UTC), `week` (GPS week), `fix` (kind of fix), or `receiver` (number of the receiver).
     """
 
     name: str
@@ -97,9 +101,9 @@ class _Column(NamedTuple):
 
 
 class _Vendor(NamedTuple):
-    """Whose columns: words for reports, names that tell it, and what columns mean; names are in small letters.
+    """An exporter of logs: its name in reports, the column names that identify it, and the meaning of its columns.
 
-    `least_fix` is the kind of fix from which a place has a height.
+    Column names are in lower case. `least_fix` is the lowest kind of fix that has a height.
     """
 
     words: str
@@ -110,10 +114,11 @@ class _Vendor(NamedTuple):
 
 @dataclass(frozen=True)
 class _Header:
-    """Line of the header, what parts its cells and how many there are, and the columns that are read.
+    """The header of a log: its line, the delimiter and number of cells, and the columns that are read.
 
-    `numbers` are columns of numbers, `accuracy` those of errors, whose cells may be empty. `stamp` is one of instants
-    of a `scale`, which need a zone, have none or either.
+    `numbers` are the columns of numbers. `accuracy` are the columns of position errors, whose cells may be empty.
+    `stamp` is the column of time stamps in the time scale `scale`. `zone` matches the end of a stamp, and decides
+    whether a time zone is required, forbidden or optional.
     """
 
     line: int
@@ -128,7 +133,7 @@ class _Header:
 
     @property
     def columns(self) -> tuple[_Column, ...]:
-        """Columns of a table: numbers, then errors."""
+        """All columns of a table: the columns of numbers, then the columns of position errors."""
         return (*self.numbers, *self.accuracy)
 
     @property
@@ -141,14 +146,15 @@ class _Header:
         return next((kind for kind in _POSITION_COLUMNS if kind[1] in self.names), _GEODETIC)
 
     def index_of(self, name: str) -> int | None:
-        """Place of a column in a table; None where there is none."""
+        """Index of a column in a table; None if there is no such column."""
         return self.names.index(name) if name in self.names else None
 
 
 class _Table(NamedTuple):
-    """Lines (n,) of rows, their numbers (n, columns) in units of the file, and their instants.
+    """Rows of a log: their line numbers (n,), numbers (n, columns) in units of the file, and time stamps.
 
-    An instant is whole minutes since MJD 0 and the seconds after, [s]; NaN where an exporter leaves it out.
+    A time stamp is split into whole minutes since MJD 0, in seconds, and the remaining seconds. [s] The minutes are
+    NaN if an exporter leaves the stamp out.
     """
 
     lines: NDArray[np.int64]
@@ -158,7 +164,7 @@ class _Table(NamedTuple):
 
 
 def is_csv(data: bytes) -> bool:
-    """Whether the first line that says something names columns of places."""
+    """Whether the first line that is neither blank nor a comment names columns of positions."""
     head = data[:100_000].decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     line = next(filter(_has_content, _dataflash_as_csv(head)), "")
     cells = line.split(max(",;\t", key=line.count))
@@ -167,9 +173,9 @@ def is_csv(data: bytes) -> bool:
 
 
 def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
-    """Read a log of a flight, UTF-8 of at most `MAX_CSV_BYTES` bytes, as every reader of `LOG_FORMATS` does.
+    """Read a flight log in UTF-8, of at most `MAX_CSV_BYTES` bytes, as every reader of `LOG_FORMATS` does.
 
-    Geodetic places become Earth-fixed ones. Instants become seconds after the first of them.
+    Geodetic positions become Earth-fixed positions. Time stamps become seconds after the first time stamp.
     """
     lines = _dataflash_as_csv(_text(data, name).split("\n"))
     header = _header(lines, name, keys)
@@ -201,9 +207,11 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
 
 
 def _with_fix(table: _Table, header: _Header, keys: LogKeys, name: str) -> tuple[_Table, int]:
-    """The rows of an exporter that have a place, of the receiver that is chosen; and how many have none.
+    """Select the rows that have a position; return them and the number of rows without a position.
 
-    Rows of several receivers are refused where the mission file does not choose one of them.
+    The rows of a plain log are unchanged. From the rows of an exporter, those without a fix are left out, and those
+    of other receivers than the chosen one. Raises `PathFileError` if no row has a fix, if there are several receivers
+    and the mission file does not choose one, or if it chooses one and the log has no column of receivers.
     """
     receiver = header.index_of("receiver")
     if keys.instance is not None and receiver is None:
@@ -229,7 +237,7 @@ def _with_fix(table: _Table, header: _Header, keys: LogKeys, name: str) -> tuple
 
 
 def _hold_to_datum(lines: Sequence[str], name: str) -> None:
-    """Refuse places of another datum than WGS-84, which a comment before the header says."""
+    """Refuse a log if a comment before the header states a datum other than WGS-84 or ITRF."""
     for number, line in enumerate(lines, 1):
         match = _DATUM.match(line.strip())
         if match is not None and not is_wgs84(match[1]):
@@ -240,9 +248,9 @@ def _hold_to_datum(lines: Sequence[str], name: str) -> None:
 
 
 def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats, Instant | None, str]:
-    """Times [s], the instant in the scale of the header from which the times count, and words for its accuracy.
+    """Times of the rows [s], the instant from which they count, and words for the accuracy of this instant.
 
-    The instant is None if the log does not state it, and the words may be empty.
+    The instant is in the time scale of the header. It is None if the log does not state it. The words may be empty.
     """
     time_index = header.index_of("time")
     counted_s = np.zeros(len(table.lines))
@@ -279,10 +287,12 @@ def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats,
 
 
 def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> tuple[Floats, Instant, str]:
-    """Times of a clock that counts fractions, in UTC by another that writes whole seconds.
+    """Convert the times of a fine clock to UTC with the stamps of a second clock that writes whole seconds.
 
-    An instant is cut to its second: the start is at or behind every instant less its time, and less than a second
-    behind. Between the latest and the earliest such bound it is taken in the middle.
+    Stamps are truncated to whole seconds. So the start is at or after every difference of stamp and time, and less
+    than 1 s after it. These differences bound the start, and the middle between the bounds is taken. Returns the
+    times from the first row on [s], the instant of the first row, and words for the accuracy of UTC. Raises
+    `PathFileError` if there is no stamp, or if the clocks drift apart.
     """
     has_instant = np.isfinite(instants) & records.is_usable
     if not has_instant.any():
@@ -307,7 +317,11 @@ def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> 
 
 
 def _positions(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) -> Floats:
-    """Coordinates (3, n) of the header's axes, a height above the ellipsoid; those that cannot be are left out."""
+    """Coordinates (3, n) along the axes of the header. [rad] for latitude and longitude, otherwise [m]
+
+    An altitude is converted to a height above the ellipsoid. Rows with impossible coordinates are left out of
+    `records`.
+    """
     kind = header.axes
     is_geodetic = kind == _GEODETIC
     is_above_sea = is_geodetic and "height" not in header.names
@@ -354,14 +368,18 @@ def _positions(table: _Table, header: _Header, records: LogRecords, keys: LogKey
 
 
 def _earth_fixed(coordinates: Floats, header: _Header) -> Floats:
-    """Places (n, 3) from coordinates (3, n): Earth-fixed, or those of the scene. [m]"""
+    """Positions (n, 3) from coordinates (3, n), in Earth-fixed or scene axes. [m]
+
+    Coordinates `east`, `north`, `up` stay in scene axes; geodetic coordinates are converted.
+    """
     return earth_fixed_places(*coordinates) if header.axes == _GEODETIC else np.ascontiguousarray(coordinates.T)
 
 
 def _figures(table: _Table, header: _Header, records: LogRecords) -> tuple[dict[str, Floats], str]:
-    """Figures (n,) of each error [m], and how many cells have one that cannot be used.
+    """One-sigma errors (n,) [m] by the name of the error, and words for the number of unusable cells.
 
-    Rows with a cell that no program writes are left out. Of a sigma and its variance the larger one counts.
+    Rows are left out if a cell has a text that no program writes for a missing value. If a log states both a sigma
+    and its variance, the larger error counts.
     """
     figures: dict[str, Floats] = {}
     negative = 0
@@ -382,9 +400,10 @@ def _figures(table: _Table, header: _Header, records: LogRecords) -> tuple[dict[
 
 
 def _sigmas(figures: Mapping[str, Floats], header: _Header, positions: Floats) -> Floats | None:
-    """One-sigma errors (n, 3) east, north, up of places (3, n), NaN where none is stated; None without any. [m]
+    """One-sigma errors (n, 3) east, north, up of positions (3, n); NaN for an unknown error. [m]
 
-    Of what several columns state of the same axis the largest counts.
+    If several columns state the error of the same axis, the largest error counts. Returns None if no row states an
+    error.
     """
     local, fixed = (
         known_sigmas(np.column_stack([figures[name] for name in names])) if figures.keys() >= set(names) else None
@@ -399,7 +418,7 @@ def _sigmas(figures: Mapping[str, Floats], header: _Header, positions: Floats) -
 
 
 def _level_axes(fixed: Floats, header: _Header, positions: Floats) -> Floats:
-    """Sigmas (n, 3) east, north, up from independent ones along the axes of the Earth. [m]"""
+    """Convert independent one-sigma errors along Earth-fixed axes to errors (n, 3) east, north, up. [m]"""
     if header.axes == _GEODETIC:
         latitude, longitude = positions[:2]
     else:
@@ -410,7 +429,7 @@ def _level_axes(fixed: Floats, header: _Header, positions: Floats) -> Floats:
 
 
 def _text(data: bytes, name: str) -> str:
-    """Text of the file, with a line feed at the end of each line."""
+    """Decode a file to text, with a line feed at the end of each line; raises `PathFileError` if it is not UTF-8."""
     hold_to_bytes(data, MAX_CSV_BYTES, name)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise PathFileError(f"{name}:1: is in UTF-16; save it in UTF-8")
@@ -440,13 +459,13 @@ def _has_content(line: str) -> bool:
 
 
 def _name_of(cell: str) -> tuple[str, str | None]:
-    """Name of a column in small letters, as far as a bracket, and the unit in square ones."""
+    """Name of a column in lower case, up to the first bracket, and the unit in square brackets or None."""
     name, unit = _written_name(cell)
     return name.lower().replace(" ", "_"), unit
 
 
 def _written_name(cell: str) -> tuple[str, str | None]:
-    """The same in the letters of the file."""
+    """Name of a column as the file writes it, up to the first bracket, and the unit in square brackets or None."""
     cell = cell.strip()
     match = _COLUMN_HEADER_PATTERN.fullmatch(cell)
     name = (match[1] if match else re.split(r"[\[(]", cell)[0]).strip().strip('"')
@@ -459,7 +478,11 @@ def _accuracy_columns(
     refuse: Callable[[str], NoReturn],
     level_columns: Mapping[str, _Column] = MappingProxyType({}),
 ) -> tuple[_Column, ...]:
-    """Columns of the errors of places of a kind, those that are `level_columns` first."""
+    """Columns that state errors of positions; `kind` are the names of the coordinates.
+
+    `level_columns` are columns that are known already, and come first. `refuse` raises the error for a column that is
+    unclear, given twice, or incomplete without another column.
+    """
     columns = dict(level_columns)
     has_covariance = False
     for index, cell in enumerate(cells):
@@ -494,9 +517,11 @@ def _accuracy_columns(
 
 
 def _with_plain_heights(columns: dict[str, _Column], refuse: Callable[[str], NoReturn]) -> dict[str, _Column]:
-    """The columns with an h that is level beside a v, and the height beside east and north.
+    """Resolve ambiguous columns of height errors.
 
-    The error of a height without those of east and north is a vertical one.
+    A `sigma_h` is a horizontal error if the log has a vertical error. It is a height error if the log has an east
+    error and no other error of the height. Any other `sigma_h` is refused. A height error without errors of east and
+    north, beside a horizontal error, becomes a vertical error.
     """
     level, vertical = _LEVEL_ACCURACIES
     if "sigma_h" in columns:
@@ -513,7 +538,10 @@ def _with_plain_heights(columns: dict[str, _Column], refuse: Callable[[str], NoR
 
 
 def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
-    """Columns that the first line names."""
+    """Read the header of a log from its first line that is neither blank nor a comment.
+
+    Raises `PathFileError` if the header is empty, or its columns are missing, given twice or contradictory.
+    """
     at = next((n for n, line in enumerate(lines) if _has_content(line)), None)
     if at is None:
         raise PathFileError(f"{name}:1: is empty; its first line names columns, like 'time [s], x [m], y [m], z [m]'")
@@ -589,7 +617,7 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
 def _vendor_header(
     vendor: _Vendor, cells: Sequence[str], delimiter: str, line: int, where: str, keys: LogKeys
 ) -> _Header:
-    """Columns that an exporter names."""
+    """Read the header of an exporter's log."""
     columns: dict[str, _Column] = {}
     for index, cell in enumerate(cells):
         column = vendor.columns.get(cell.strip().lower())
@@ -630,7 +658,7 @@ def _measured(
     refuse: Callable[[str], NoReturn],
     dimension: units.Dimension | None = None,
 ) -> _Column:
-    """A column of numbers, whose unit is known and of the right dimension."""
+    """Make a column of numbers; refuse a unit that is missing, unknown or of the wrong dimension."""
     dimension = dimension or _COLUMN_DIMENSIONS.get(name, units.LENGTH)
     example = (
         "time [s]', 'time [UTC]' or 'time [GPST]" if dimension is units.TIME else f"{name} [{_usual(dimension)}]"
@@ -646,7 +674,7 @@ def _measured(
 
 @dataclass(eq=False)
 class _Rows:
-    """Rows that are read, messages about those that cannot be by their lines, and how many an exporter left empty."""
+    """Rows read so far, messages about unusable rows by line, and the number of rows that an exporter left empty."""
 
     tables: list[_Table]
     broken: dict[int, str]
@@ -655,12 +683,12 @@ class _Rows:
 
     @property
     def table(self) -> _Table:
-        """All rows."""
+        """All rows as one table."""
         return _Table(*(np.concatenate(columns) for columns in zip(*self.tables, strict=True)))
 
 
 def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
-    """Every row behind the header; a chunk of lines at a time, which is fast and needs little memory."""
+    """Read all rows after the header, in chunks of lines, which is fast and needs little memory."""
     nothing = np.zeros(0)
     empty = _Table(np.zeros(0, dtype=np.int64), np.zeros((0, len(header.columns))), nothing, nothing)
     rows = _Rows([empty], {}, most_left_out(len(lines) - header.line))
@@ -677,7 +705,11 @@ def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
 
 
 def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name: str, rows: _Rows) -> None:
-    """Read some rows at once; where that fails, halve them until the rows that are none are found."""
+    """Read several rows at once, and add them to `rows`.
+
+    If this fails, the rows are split in halves until the unusable rows are found. Raises `PathFileError` if too many
+    rows are unusable.
+    """
     read = _plain_cells(texts, header) or _quoted_cells(texts, header)
     if read is not None and np.isfinite(read[0][:, : len(header.numbers)]).all():
         numbers, stamps = read
@@ -711,7 +743,7 @@ def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name
 
 
 def _is_complete(text: str, header: _Header) -> bool:
-    """Whether no number of a row is left out; what is wrong otherwise is said elsewhere."""
+    """Whether no number of a row is missing. A row with a wrong number of cells counts as complete here."""
     cells = _cells(text, header.delimiter)
     if isinstance(cells, str) or len(cells) != header.width:
         return True
@@ -719,7 +751,7 @@ def _is_complete(text: str, header: _Header) -> bool:
 
 
 def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
-    """Numbers (n, 3 or 4) and stamps of rows without quotes; None where they are something else."""
+    """Numbers (n, columns) and time stamps of rows without quotes; None if the rows cannot be read in this way."""
     delimiter = header.delimiter
     if {text.count(delimiter) for text in texts} != {header.width - 1} or any(map(_QUOTED, texts)):
         return None
@@ -741,7 +773,10 @@ def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] |
 
 
 def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
-    """The same of rows with quotes, which takes six times as long."""
+    """Numbers (n, columns) and time stamps of rows with quotes; None if the rows cannot be read.
+
+    This takes six times as long as for rows without quotes.
+    """
     try:
         rows = list(csv.reader(texts, delimiter=header.delimiter, skipinitialspace=True))
         if len(rows) != len(texts) or set(map(len, rows)) != {header.width}:
@@ -757,7 +792,10 @@ def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] 
 
 
 def _or_nan(cell: str) -> float:
-    """The number of a cell of an accuracy; NaN of an empty one, a negative number of others that give none."""
+    """Number in a cell of an accuracy column.
+
+    The result is NaN for an empty cell, -1 for a word that means no value, and `_NO_NUMBER` for any other text.
+    """
     try:
         return float(cell)
     except ValueError:
@@ -766,9 +804,9 @@ def _or_nan(cell: str) -> float:
 
 
 def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None:
-    """Minutes since MJD 0 [s] and the seconds after; None where one of them is no instant.
+    """Minutes since MJD 0, in seconds, and the remaining seconds of time stamps; None if a text is no time stamp. [s]
 
-    NaN where an exporter leaves one out.
+    Minutes are NaN and seconds are 0 if an exporter leaves a stamp out.
     """
     has_text = [bool(text) or header.vendor is None for text in texts]
     minutes = [_minute(text[:17]) if is_stated else math.nan for text, is_stated in zip(texts, has_text, strict=True)]
@@ -783,7 +821,10 @@ def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None
 
 @lru_cache(maxsize=256)
 def _minute(text: str) -> float | None:
-    """Seconds since MJD 0 of the beginning of a stamp, which is that of many rows; None if it is none."""
+    """Seconds from MJD 0 to the whole minute at the beginning of a time stamp; None if the text is no time stamp.
+
+    Many rows share a minute, so results are cached.
+    """
     instant = parse_instant(f"{text}00Z")
     return None if instant is None else instant.day * DAY_S + instant.seconds
 
@@ -793,7 +834,7 @@ def _usual(dimension: units.Dimension) -> str:
 
 
 def _cells(text: str, delimiter: str) -> list[str] | str:
-    """Cells of a line, or why it has none."""
+    """Cells of a line, or the reason why the line cannot be split into cells."""
     try:
         rows = list(csv.reader([text, ""], delimiter=delimiter, skipinitialspace=True))
     except csv.Error:
@@ -926,15 +967,16 @@ _VENDORS = (
 
 
 def _vendor_of(cells: Sequence[str]) -> _Vendor | None:
-    """Whose columns these are; None where they are nobody's."""
+    """The exporter whose column names the cells contain; None if there is no such exporter."""
     names = [cell.strip().lower() for cell in cells]
     return next((vendor for vendor in _VENDORS if vendor.signs.issubset(names)), None)
 
 
 def _dataflash_as_csv(lines: list[str]) -> list[str]:
-    """Lines of a dataflash log with its GPS rows alone, and their FMT row as the header; other lines as they are.
+    """Convert the lines of a dataflash log to CSV with a header and GPS rows; other logs are unchanged.
 
-    Each line keeps its number. HAcc and VAcc of the row GPA of the same time and receiver are two cells more.
+    The FMT row of GPS becomes the header. All further lines become empty, so that each line keeps its number. HAcc
+    and VAcc of the GPA row with the same time and receiver are appended to a GPS row as two cells.
     """
     if not any(line.startswith("FMT,") for line in lines[:100]):
         return lines

@@ -1,7 +1,8 @@
 """Errors of platforms in free fall, which follow the linearised dynamics of the orbit.
 
-A satellite whose measured state is wrong at mid-aperture flies another orbit. The difference of both orbits is no
-straight line: an error of the height changes the period, and gravity pulls the wrong place otherwise.
+A satellite whose measured state is wrong at mid-aperture is assumed on a slightly different orbit. The difference
+between both orbits is not a straight line: a height error changes the orbital period, and gravity is evaluated at a
+wrong position.
 """
 
 from dataclasses import dataclass
@@ -21,17 +22,17 @@ _NODE_COUNT = 12  # of the collocation; over half a radian of an orbit its error
 
 @dataclass(frozen=True)
 class FreeFall:
-    """The dynamics of the errors of a platform in free fall, in the axes of a scene.
+    """Dynamics of the errors of a platform in free fall, in the axes of a scene.
 
     Attributes
     ----------
     centre : Vectors
-        The Earth's centre. [m]
+        Position of the Earth's centre. [m]
     rotation : Vectors
-        Rate at which the axes turn against the stars; zero for a scene without a place on the Earth. [rad/s]
+        Rate at which the axes turn relative to the stars; zero for a scene without a place on the Earth. [rad/s]
     share : float or (cases,)
-        1 in cases in which the platform is in free fall, 0 in cases in which it is not: there errors are those of a
-        body that nothing turns, p + vτ + aτ²/2.
+        1 in cases with a platform in free fall, and 0 in all other cases. There, errors are p + vτ + aτ²/2, without
+        gravity and rotation.
     """
 
     centre: Vectors
@@ -39,7 +40,7 @@ class FreeFall:
     share: PerCase = 1.0
 
     def motions(self, path: PlatformState, half: Floats, places: Floats) -> Floats:
-        """Motion over the aperture by a unit error of the state at mid-aperture.
+        """Motion over the aperture due to a unit error of the state at mid-aperture.
 
         Parameters
         ----------
@@ -48,20 +49,20 @@ class FreeFall:
         half : (cases,)
             Half the aperture time. [s]
         places : (nodes,)
-            Slow times from -1 to 1, in half apertures.
+            Slow times from -1 to 1, in units of `half`.
 
         Returns
         -------
         (3, 3, 3, nodes, cases)
-            By error (1 m of position, 1 m/s of velocity, 1 m/s² of acceleration), axis of the error, and component:
-            east, north, up. [m] The velocity is the rate of the vector in the axes of the scene. The acceleration
-            has a constant direction in these axes.
+            Indices are the error (1 m of position, 1 m/s of velocity, 1 m/s² of acceleration), the axis of the error,
+            and the component east, north or up. [m] The velocity error is the rate of the position error in the axes
+            of the scene. The acceleration error has a constant direction in these axes.
 
         Notes
         -----
-        Derived here. In axes that turn at ω, δr̈ = Gδr − ω×(ω×δr) − 2ω×δṙ + a with the gradient of gravity
-        G = μ/r³·(3r̂r̂ᵀ − 1). The accelerations at the nodes of Gauss and Legendre, where their polynomial solves the
-        equation, are the solution of one linear system per case.
+        Derived here. In axes that turn at the rate ω, δr̈ = Gδr − ω×(ω×δr) − 2ω×δṙ + a with the gravity gradient
+        G = μ/r³·(3r̂r̂ᵀ − 1). The accelerations are a polynomial that solves the equation at Gauss-Legendre nodes.
+        Their values at the nodes are the solution of one linear system per case.
         """
         collocation = _collocation()
         cases, count = half.size, collocation.times.size
@@ -84,7 +85,10 @@ class FreeFall:
         return np.asarray(bent)
 
     def _matrices(self, path: PlatformState, times: Floats, cases: int) -> tuple[Floats, Floats]:
-        """G − ω×(ω×·) at slow times (nodes, cases), (cases, nodes, 3, 3) [1/s²], and ω×·, (cases, 3, 3). [1/s]"""
+        """Matrices of the linearised dynamics: G − ω×(ω×·) (cases, nodes, 3, 3) [1/s²] and ω×· (cases, 3, 3) [1/s].
+
+        G is the gravity gradient, and ω the rate at which the axes turn. `times` are slow times (nodes, cases). [s]
+        """
         share = np.broadcast_to(self.share, (cases,))
         offset = np.stack(
             [np.broadcast_to(x - c, times.shape) for x, c in zip(path.place(times), self.centre, strict=True)],
@@ -100,15 +104,15 @@ class FreeFall:
         return gravity, spin
 
     def rate_against_stars(self, position: Vectors) -> Vectors:
-        """Rate −ω×p, in the scene's axes, of a position error p that is constant relative to the stars.
+        """Rate −ω×p, in the axes of the scene, of a position error p that is constant relative to the stars.
 
-        The result is in m/s for `position` in m, and in 1/s for a unit vector.
+        ω is the rate at which the axes turn. The result is in m/s for `position` in m, and in 1/s for a unit vector.
         """
         x, y, z = cross(self.rotation, position)
         return (-x * self.share, -y * self.share, -z * self.share)
 
     def orbit_rate(self, path: PlatformState) -> Vectors:
-        """Angular rate of the orbit about the Earth's centre at mid-aperture, against the stars. [rad/s]"""
+        """Angular rate of the orbit about the Earth's centre at mid-aperture, relative to the stars. [rad/s]"""
         x, y, z = (p - c for p, c in zip(path.position, self.centre, strict=True))
         turned = cross(self.rotation, (x, y, z))
         u, v, w = (rate + more for rate, more in zip(path.velocity, turned, strict=True))
@@ -117,7 +121,7 @@ class FreeFall:
         return (a / square, b / square, c / square)
 
     def of(self, cases: Any) -> "FreeFall":
-        """The dynamics in some of the cases, by their indices."""
+        """The dynamics of some of the cases; `cases` are their indices."""
 
         def chosen(number: PerCase) -> PerCase:
             return number[cases] if isinstance(number, np.ndarray) and number.ndim else number
@@ -131,8 +135,8 @@ class FreeFall:
 def of_scene(axes: SceneAxes | None) -> FreeFall:
     """Dynamics of free fall in the axes of a scene.
 
-    If the scene has no place on the Earth (None), the Earth's centre is one Earth radius below the scene centre, and
-    the axes do not turn.
+    If `axes` is None, the scene has no place on the Earth. Then the Earth's centre is one Earth radius below the
+    scene centre, and the axes do not turn.
     """
     if axes is None:
         return FreeFall((0.0, 0.0, -EARTH_RADIUS_M), (0.0, 0.0, 0.0))
@@ -140,9 +144,10 @@ def of_scene(axes: SceneAxes | None) -> FreeFall:
 
 
 def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
-    """The dynamics of a path above 100 km whose acceleration is that of free fall within 5 %; None for other paths.
+    """Dynamics of free fall for a path above 100 km in free fall; None for any other path.
 
-    Numbers of the path may be arrays (cases,). The 5 % are those of gravity μ/r².
+    A path is in free fall if its acceleration differs from free fall by at most 5 % of gravity, μ/r². Numbers of the
+    path may be arrays (cases,).
     """
     fall = of_scene(axes)
     x, y, z = (component - centre for component, centre in zip(path.position, fall.centre, strict=True))
@@ -161,9 +166,10 @@ def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
 
 @dataclass(frozen=True, eq=False)
 class _Collocation:
-    """Gauss-Legendre nodes (N,) over -1 … 1, and integrals from 0 to the nodes, once and twice, of values at them.
+    """Gauss-Legendre nodes (N,) over -1 … 1, and matrices (N, N) that integrate values at the nodes.
 
-    `to_coefficients` (N, N) gives the Legendre coefficients of the polynomial through values at the nodes.
+    `once` and `twice` give the single and the double integral from 0 to the nodes. `to_coefficients` gives the
+    Legendre coefficients of the polynomial through the values.
     """
 
     times: Floats
@@ -172,12 +178,12 @@ class _Collocation:
     to_coefficients: Floats
 
     def twice_at(self, places: Floats) -> Floats:
-        """Weights (places, N) of the double integral from 0 to other places."""
+        """Weights (places, N) of the values at the nodes in the double integral from 0 to each place."""
         return _integral(places, 2) @ self.to_coefficients
 
 
 def _integral(places: Floats, times: int) -> Floats:
-    """Values at places of the polynomials whose derivatives of an order are the Legendre polynomials, (places, N)."""
+    """Values (places, N) at places of the Legendre polynomials integrated `times` times from 0."""
     of_each = np.polynomial.legendre.legint(np.eye(_NODE_COUNT), m=times, lbnd=0.0)
     return np.asarray(np.polynomial.legendre.legvander(places, _NODE_COUNT - 1 + times) @ of_each)
 

@@ -48,8 +48,8 @@ def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
     """Read the track of a file, as every reader of `LOG_FORMATS` does.
 
     If the mission file states the time scale utc, times need no zone. If there are several tracks, the mission file
-    may choose one by its name or number. Otherwise the log has all `tracks` that can be read; any further track is no
-    flight.
+    may choose one by its name or number. Otherwise, `tracks` of the log has all tracks that can be read. A track that
+    cannot be read is no flight.
     """
     hold_to_scale("utc", keys, name)
     hold_to_size(len(data), name, "track")
@@ -76,7 +76,7 @@ def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
 
 
 def _chosen(tracks: Sequence[MessageElement], track_name: str, name: str) -> int:
-    """Index, counted from 0, of the track with the given name or, if no track has it, with that number, from 1."""
+    """Index from 0 of the track with the given name; if no track has this name, it is read as a number from 1."""
     matches = [number for number, track in enumerate(tracks) if _name_of(track) == track_name.strip()]
     if len(matches) == 1:
         return matches[0]
@@ -96,7 +96,7 @@ def _name_of(track: MessageElement) -> str:
 
 
 def _track_words(tracks: Sequence[MessageElement], index: int) -> str:
-    """A track's number and name."""
+    """Number and name of a track, for messages."""
     track_name = _name_of(tracks[index])
     return f"{index + 1} of {len(tracks)}" + (f" ({shown(track_name)})" if track_name else "")
 

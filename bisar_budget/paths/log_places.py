@@ -1,4 +1,4 @@
-"""Fixes of a flight from a log of any format: time scale, heights, rising times, and a motion that is possible."""
+"""Checks and conversions of fixes from a log of any format: time scale, heights, rising times, possible motion."""
 
 import re
 from bisect import bisect_left
@@ -28,11 +28,11 @@ _MIN_HEIGHT_M, _MAX_HEIGHT_M = -12e3, 100e3  # from the deepest trench to the bo
 
 
 class LogKeys(NamedTuple):
-    """Keys of a mission file about a log.
+    """Keys of a mission file that describe a log.
 
-    The GPS week in which the log begins, the scale of its times, and the height of the geoid above the ellipsoid [m].
-    Three keys choose a log in a file with several: the talker of NMEA, the track of GPX by name or number, the
-    instance of a receiver.
+    They are the GPS week in which the log begins, the time scale, and the height of the geoid above the ellipsoid
+    [m]. Three more keys choose one log in a file with several: the talker of NMEA, the track of GPX by name or
+    number, and the instance of a receiver.
     """
 
     week: int | None = None
@@ -58,26 +58,26 @@ def most_left_out(count: int) -> int:
 
 
 class LogRecords:
-    """Records of a log that have a fix: their names in messages, and whether they can be used.
+    """Records of a log that have a fix: their names in messages, and whether they are usable.
 
     Parameters
     ----------
     name : str
-        The file in messages.
+        Name of the file in messages.
     count : int
         Number of records that are read.
     lines : (count,) array_like, optional
-        Their lines in the file, rising; omitted: records are numbered from 1.
+        Lines of the records in the file, rising. If omitted, records are numbered from 1.
     broken : mapping, optional
         Messages about further records that cannot be read, by their lines or numbers.
     lost : int
-        Number of further records that were damaged on the way and are missing.
+        Number of further records that were damaged during recording or transfer, and are missing.
 
     Raises
     ------
     PathFileError
-        More records than `most_left_out` cannot be used, or no record can be used. Methods that leave records out
-        raise it too.
+        More records than `most_left_out` are unusable, or no record is usable. Methods that leave records out raise
+        it too.
     """
 
     def __init__(
@@ -106,15 +106,15 @@ class LogRecords:
         return int(self.is_usable.argmax())
 
     def where(self, index: int) -> str:
-        """The beginning of a message about a record."""
+        """Beginning of a message about a record: the file and the place of the record."""
         return f"{self.name}{':' if self._is_in_lines else ': record '}{self._numbers[index]}"
 
     def words(self, index: int) -> str:
-        """The record in a sentence."""
+        """The record in words, for use within a sentence."""
         return f"{'line' if self._is_in_lines else 'record'} {self._numbers[index]}"
 
     def leave_out(self, is_unusable: Booleans | np.bool_, reason: Callable[[int], str]) -> None:
-        """Leave out records (count,) that cannot be used; `reason` gives the reason for the record of an index."""
+        """Mark records (count,) as unusable; `reason` gives the reason for the record with a given index."""
         indices = np.flatnonzero(is_unusable & self.is_usable)
         if indices.size:
             self.is_usable[indices] = False
@@ -124,7 +124,7 @@ class LogRecords:
             )
 
     def keep_what_rises(self, times: Floats, start: Instant | None) -> None:
-        """Leave out records whose times (count,) after `start` do not rise from the record before to the next. [s]"""
+        """Leave out records so that the remaining times (count,) rise strictly; times count from `start`. [s]"""
         indices = np.flatnonzero(self.is_usable)
         usable_times = times[indices]
         steps = np.diff(usable_times)
@@ -170,7 +170,7 @@ class LogRecords:
         return LeftOut(before, tuple(self._faults[number] for number in numbers))
 
     def left_out_words(self) -> str:
-        """The number of records that are left out, and their names, for reports; empty if all are used."""
+        """Words for the number of records that are left out, and for their places; empty if all records are used."""
         if not self._faults:
             return ""
         numbers = sorted(self._faults)
@@ -179,7 +179,7 @@ class LogRecords:
         return f", {counted(len(numbers), 'record')} that cannot be used left out ({noun} {listed})"
 
     def _add(self, faults: Mapping[int, str], count: int) -> None:
-        """Add records that are left out; refuse the log if they are too many."""
+        """Add records that are left out; raises `PathFileError` if there are too many."""
         self._faults |= faults
         unusable = len(self._faults) - len(faults) + count + self._lost
         if unusable > most_left_out(self._total) or unusable >= self._total:
@@ -190,7 +190,10 @@ class LogRecords:
 
 
 def _longest_rise(times: Floats) -> NDArray[np.bool_]:
-    """Whether times (n,) belong to the longest rising selection of them. The first of equal times belongs to it."""
+    """Mask (n,) of the times in their longest rising subsequence.
+
+    If times are equal, only the first of them may belong to it.
+    """
     rises = np.ones(len(times), dtype=bool)
     highest = np.maximum.accumulate(times)
     lowest = np.minimum.accumulate(times[::-1])[::-1]
@@ -222,7 +225,7 @@ def _longest_rise(times: Floats) -> NDArray[np.bool_]:
 
 
 def _whole_seconds(times: Floats, start: Instant | None) -> str:
-    """The reason for repeated times, if a recorder has cut the fractions of seconds off all times; else empty."""
+    """Reason for repeated times: a recorder that has truncated all times to whole seconds; empty if it has not."""
     seconds = times + (start.seconds if start else 0.0)
     fixes_per_stamp = len(times) / max(len(np.unique(times)), 1)
     if (
@@ -250,7 +253,7 @@ def hold_to_scale(log_scale: str, keys: LogKeys, name: str) -> None:
 
 
 def one_instance(counts: Mapping[float, int], keys: LogKeys, name: str) -> float:
-    """The instance of the receiver that is read: the only instance with fixes, or the choice of the mission file.
+    """Instance of the receiver that is read: the instance that the mission file chooses, or the only one.
 
     `counts` has the number of fixes by instance. Raises `PathFileError` if the chosen instance has no fix, or if
     there are several instances and no choice.
@@ -268,12 +271,12 @@ def one_instance(counts: Mapping[float, int], keys: LogKeys, name: str) -> float
 
 
 def is_wgs84(datum: str) -> bool:
-    """Whether a datum, or a reference system, is WGS-84 or a frame of the ITRF by its name."""
+    """Whether the name of a datum or reference system means WGS-84 or a frame of the ITRF."""
     return _WGS84.fullmatch(datum.strip()) is not None
 
 
 def utc_of(instant: Instant, scale: str) -> Instant:
-    """Instant of UTC from an instant of a scale."""
+    """Convert an instant of the time scale `scale` to UTC."""
     return instant if scale == "utc" else utc(instant.after(TAI_LESS[scale.upper()]))
 
 
@@ -293,7 +296,7 @@ def scale_words(start: Instant, scale: str) -> str:
 
 
 def hold_to_ellipsoid(keys: LogKeys, name: str, log_words: str = "has heights above the ellipsoid") -> None:
-    """Refuse a separation of the mission file for a log that needs none."""
+    """Refuse a geoid separation in the mission file for a log whose heights do not need it."""
     if keys.geoid_separation is not None:
         raise PathFileError(
             f"{name}: {log_words}, and trajectory.geoid_separation is given beside it",
@@ -303,7 +306,7 @@ def hold_to_ellipsoid(keys: LogKeys, name: str, log_words: str = "has heights ab
 
 
 def from_sea_level(heights: Floats, separations: Floats | None, keys: LogKeys, name: str) -> Floats:
-    """Heights (n,) above the ellipsoid of WGS-84 from heights above mean sea level, which is the geoid. [m]
+    """Convert heights (n,) above mean sea level, which is the geoid, to heights above the WGS-84 ellipsoid. [m]
 
     The geoid separation, which is the height of the geoid above the ellipsoid, comes from the log (n,) or from the
     mission file. Raises `PathFileError` if both give a separation, or neither.
@@ -327,10 +330,11 @@ def needs_separation(problem: str) -> PathFileError:
 
 
 def level_sigmas(horizontal: Floats | None, vertical: Floats | None) -> Floats | None:
-    """Sigmas (n, 3) east, north, up from horizontal and vertical accuracy; None without any positive figure. [m]
+    """One-sigma errors (n, 3) east, north, up from a horizontal and a vertical accuracy. [m]
 
-    A horizontal error has no direction: it may lie along one axis, so each level axis gets all of it. If only one of
-    the two figures is known, it counts along every axis. A figure that is not positive is unknown.
+    A horizontal error has no direction. It may lie along one axis, so each horizontal axis gets all of it. If only
+    one of the two accuracies is known, it counts along every axis. A number that is not positive is unknown. Returns
+    None if no number is positive.
     """
     if horizontal is None:
         horizontal = vertical
@@ -343,15 +347,18 @@ def level_sigmas(horizontal: Floats | None, vertical: Floats | None) -> Floats |
 
 
 def known_sigmas(sigmas: Floats) -> Floats | None:
-    """Sigmas (n, 3) of a log, NaN for each figure that is not positive; None where no place has any. [m]"""
+    """Replace one-sigma errors (n, 3) that are not positive by NaN; None if no error is positive. [m]
+
+    Larger errors than the largest possible error of a log are reduced to it.
+    """
     found = np.where(sigmas > 0, np.minimum(sigmas, _MAX_LOG_SIGMA_M), np.nan)
     return None if np.isnan(found).all() else found
 
 
 def filled_sigmas(sigmas: Floats) -> Floats:
-    """Sigmas (…, 3) with the largest known one along the axes of which none is known. [m]
+    """Replace unknown one-sigma errors (…, 3) by the largest known error of the same position. [m]
 
-    The error there may be as large: what is left out must not count as 0.
+    The unknown error may be as large as the known one, and must not count as 0.
     """
     return np.where(sigmas > 0, sigmas, np.fmax.reduce(sigmas, axis=-1, keepdims=True))
 
@@ -412,11 +419,11 @@ def usable_log(
     sigmas: Floats | None = None,
     geodetic: Sequence[Floats] | None = None,
 ) -> Log:
-    """The log of the records that can be used and whose times rise.
+    """Make a log from the usable records whose times rise.
 
-    `positions_of` gives positions (m, 3) of the records that are kept (n,) [m]. `clock_words` gives the accuracy of
-    the times. `geodetic` are latitude, longitude and height of each record, if the log has them. The remaining
-    parameters are as in `geodetic_log`.
+    `positions_of` gives positions (m, 3) of the m records that a mask (n,) keeps [m]. `clock_words` states the
+    accuracy of the times. `geodetic` are latitude, longitude and height of each record, if the log has them. The
+    other parameters are as in `geodetic_log`.
     """
     start_utc = None if start is None else utc_of(start, scale)
     records.keep_what_rises(times, start_utc)
@@ -445,7 +452,7 @@ def usable_log(
 
 
 def counted(number: int, noun: str = "fix") -> str:
-    """A number with its noun."""
+    """A number followed by its noun, in the plural if needed."""
     return f"{number} {noun}" + ("" if number == 1 else "es" if noun.endswith("x") else "s")
 
 
@@ -468,20 +475,21 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
     Parameters
     ----------
     times : (n,) ndarray
-        Slow time, rising; fixes far outside the stretch are ignored. [s]
+        Slow times, rising; fixes far outside the stretch are ignored. [s]
     positions : (n, 3) ndarray
         Positions of the fixes in any axes. [m]
     stretch_s : float
-        Time around the middle of the aperture whose fixes are used. [s]
+        Length of the time span around mid-aperture whose fixes are used. [s]
     name : str
-        The log in messages.
+        Name of the log in messages.
 
     Raises
     ------
     PathFileError
-        All fixes in the stretch agree to 1 mm. Or fixes repeat the fix before while the platform, at its mean speed
-        in the aperture, moves by more than 0.1 m. Or a step differs from the median of the seven steps around it by
-        more than 0.1 m, by more than 3 g explains, and by more than 20 times the median difference.
+        The log fails one of three checks. All fixes in the stretch agree to 1 mm. Or fixes repeat the fix before them
+        for so long that the platform, at its mean speed, moves by more than 0.1 m. Or a step differs from the median
+        of the seven steps around it by more than 0.1 m, by more than 3 g can cause, and by more than 20 times the
+        median of such differences.
     """
     half = stretch_s / 2 * (1 + 1e-9)
     first, last = int(np.searchsorted(times, -half, "left")), int(np.searchsorted(times, half, "right"))
@@ -502,7 +510,7 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
 
 
 def _hold_to_new_fixes(times: Floats, positions: Floats, extent: float, name: str) -> None:
-    """Refuse fixes that repeat the fix before while the platform moves."""
+    """Refuse a log that repeats a fix while the platform moves."""
     is_repeated = np.linalg.norm(np.diff(positions, axis=0), axis=1) <= _SAME_FIX_M
     if not is_repeated.any():
         return

@@ -1,6 +1,6 @@
-"""Files of orbits and logs: texts, times and numbers, and XML as a tree whose elements know their lines.
+"""Helpers to read files of orbits and logs: texts, times, numbers, and XML as a tree whose elements know their lines.
 
-XML comes from strangers: no reference is followed, no entity is expanded.
+XML files may come from strangers, so no reference is followed, and no entity is expanded.
 """
 
 import math
@@ -22,13 +22,16 @@ _DECIMAL_PATTERN = re.compile(r"\s*[+-]?(\d+(?:\.\d*)?|\.\d+)([eEdD][+-]?\d+)?\s
 
 
 def hold_to_size(size: int, name: str, part: str = "objects") -> None:
-    """Refuse a file above `MAX_MARKUP_BYTES`; the message advises the user to keep only the `part` that is needed."""
+    """Refuse a file larger than `MAX_MARKUP_BYTES`.
+
+    The message advises the user to keep only the needed `part` of the file.
+    """
     if size > MAX_MARKUP_BYTES:
         raise PathFileError(f"{name}: is larger than {MAX_MARKUP_BYTES // 1_000_000} MB; keep the {part} needed")
 
 
 def decoded(data: bytes, name: str) -> str:
-    """The text of a file, which is UTF-8."""
+    """Text of a file in UTF-8; raises `PathFileError` for other bytes."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -37,12 +40,15 @@ def decoded(data: bytes, name: str) -> str:
 
 
 def is_markup(data: bytes) -> bool:
-    """Whether a file is XML, and not text of keywords."""
+    """Whether a file is XML instead of text of keywords."""
     return data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<"
 
 
 def epoch_in(text: str) -> Instant | None:
-    """Instant from a calendar date, or a year and its day: CCSDS 301.0-B, ASCII time codes A and B."""
+    """Read an instant from a calendar date, or from a year and a day of the year; None for any other text.
+
+    The forms are the ASCII time codes A and B of CCSDS 301.0-B.
+    """
     text = text.strip()
     match = re.fullmatch(r"(\d{4})-(\d{3})(T.*)", text, re.ASCII)
     if match is None:
@@ -68,7 +74,10 @@ def number_in(text: object) -> float | None:
 
 
 def coordinate_in(text: str, location: str, requirement: str) -> float:
-    """A coordinate of a position or velocity from a text; `requirement` is the message for no number, or over 1e9."""
+    """Read a coordinate of a position or velocity from a text.
+
+    Raises `PathFileError` with the message `requirement` if the text is no number, or a number beyond 1e9.
+    """
     number = number_in(text)
     if number is None or abs(number) > _MAX_COORDINATE_LEVEL:
         raise PathFileError(f"{location}: {requirement} (got {shown(text.strip())})")
@@ -94,7 +103,7 @@ _Candidate = TypeVar("_Candidate", bound=_Named)
 
 
 def object_key(text: str) -> str:
-    """A name or number for comparisons: without case and extra spaces, and a number without leading zeros."""
+    """Form of a name or number for comparisons: no case, no extra spaces, and no leading zeros of a number."""
     text = " ".join(text.split()).casefold()
     return text.lstrip("0") or "0" if text.isdecimal() and text.isascii() else text
 
@@ -102,9 +111,10 @@ def object_key(text: str) -> str:
 def one_object(
     blocks: Sequence[_Candidate], name: str, object_name: str | None, number: str = "OBJECT_ID"
 ) -> Sequence[_Candidate]:
-    """Blocks of a file about the object of a name, or about the only object.
+    """Blocks of a file that belong to the object with a given name, or to the only object if no name is given.
 
-    The last of an object's `names` is unique to the object; `number` is the word for it in messages.
+    The last of an object's `names` is unique to the object. `number` is the word for this name in messages. Raises
+    `PathFileError` if there is no such object, or if there are several.
     """
     if object_name is not None:
         key = object_key(object_name)
@@ -127,7 +137,7 @@ def _listed(objects: Sequence[_Named]) -> str:
 
 
 def cut(text: str) -> str:
-    """A list, cut to a length that fits into a message."""
+    """Shorten the text of a list so that it fits into a message."""
     return text if len(text) <= _MAX_LIST_CHARACTERS else f"{text[:_MAX_LIST_CHARACTERS]}..."
 
 
@@ -140,7 +150,7 @@ _MAX_ELEMENT_CHARACTERS = 10_000  # in the text of an element
 
 @dataclass(eq=False, slots=True)
 class MessageElement:
-    """An element: its name without namespace, the line where it begins, its units, text, children and attributes."""
+    """An XML element: name without namespace, line where it begins, units, text, children and attributes."""
 
     name: str
     line: int
@@ -150,7 +160,7 @@ class MessageElement:
     attributes: Mapping[str, str] = field(default_factory=lambda: _NO_ATTRIBUTES)
 
     def all(self, name: str) -> Iterator["MessageElement"]:
-        """Elements of a name anywhere below, in the order of the file."""
+        """All elements with a given name below this element, in the order of the file."""
         for child in self.children:
             if child.name == name:
                 yield child
@@ -159,7 +169,7 @@ class MessageElement:
 
 
 def parse_markup(data: bytes, name: str) -> MessageElement:
-    """Read XML.
+    """Parse XML to a tree of elements.
 
     Raises
     ------

@@ -1,14 +1,17 @@
-"""Logs of NMEA 0183: places from sentences GGA or GNS, the date from RMC or ZDA, in UTC.
+"""Reader of NMEA 0183 logs: positions from GGA or GNS sentences and dates from RMC or ZDA sentences, in UTC.
 
     $GNRMC,052001.25,A,4805.196000,N,01116.782000,E,116.6,045.0,010626,,,R*43
     $GNGGA,052001.25,4805.196000,N,01116.782000,E,4,12,0.7,2953.100,M,46.900,M,1.0,0000*7C
     $GNGST,052001.25,0.012,0.011,0.008,45.0,0.010,0.008,0.020*7C
 
-A height of a sentence is above mean sea level, and the geoid separation beside it makes one above the ellipsoid.
-Sentences may stand among other lines or behind something on their line. Fixes are those of one talker. A sentence
-whose checksum is wrong or missing is left out, and counted; of DTM only where another one is sound. GST states
-one-sigma errors of latitude, longitude and height, or the semi-major axis of the ellipse on the level alone. DTM
-states a datum, which has to be W84. Without a date, fixes have times of day.
+The height in a sentence is above mean sea level. The geoid separation in the same sentence converts it to a height
+above the ellipsoid. Sentences may be mixed with other lines, and may follow other text on their line. All fixes come
+from one talker.
+
+A sentence with a wrong or missing checksum is left out and counted. A DTM sentence of this kind is left out only if
+the talker has another DTM sentence with a right checksum. GST states one-sigma errors of latitude, longitude and
+height. Some receivers state only the semi-major axis of the horizontal error ellipse. DTM states the datum, which has
+to be W84. Without a date, the times of fixes are times of day.
 
 Source: NMEA 0183 4.10 as RTKLIB 2.4.3 reads it (src/solution.c, decode_nmeagga, decode_nmearmc, decode_nmeazda: a
 time of day is within half a day of the date before it). The fields of GNS, GST and DTM are those of pynmea2, which
@@ -62,9 +65,9 @@ _GST_REACH_S = 5.0  # from a fix to a GST that speaks for it; receivers write on
 
 
 class _Quality(NamedTuple):
-    """The quality that a receiver states of a fix: its words, and the one-sigma error that is usual then [m].
+    """Quality of a fix as the receiver states it: words for reports, and the usual one-sigma error. [m]
 
-    The words begin with the sentence that states it.
+    The words begin with the kind of sentence that states the quality.
     """
 
     words: str
@@ -93,9 +96,9 @@ _MODES = {
 
 
 class _Fix(NamedTuple):
-    """Line of a sentence, seconds of its day, latitude and longitude [rad], height and geoid separation [m].
+    """A fix: line of the sentence, second of the day, latitude and longitude [rad], height and geoid separation [m].
 
-    The separation is NaN where the sentence has none.
+    The separation is NaN if the sentence states none.
     """
 
     line: int
@@ -107,16 +110,16 @@ class _Fix(NamedTuple):
     quality: _Quality
 
     def distance(self, other: "_Fix") -> float:
-        """Distance of another place, a short one. [m]"""
+        """Distance to another fix, for short distances. [m]"""
         north = EQUATORIAL_RADIUS_M * (self.latitude - other.latitude)
         turned = math.remainder(self.longitude - other.longitude, 2 * math.pi)
         return math.hypot(north, EQUATORIAL_RADIUS_M * math.cos(self.latitude) * turned, self.height - other.height)
 
 
 class _Accuracy(NamedTuple):
-    """Line of a GST, seconds of its day, and one-sigma errors east, north and up; NaN for those it leaves out [m].
+    """A GST sentence: its line, second of the day, and one-sigma errors east, north and up, NaN if unknown. [m]
 
-    `unusable` is how many of its figures are no error.
+    `unusable` is the number of figures in the sentence that are not valid errors.
     """
 
     line: int
@@ -132,7 +135,7 @@ class _Accuracy(NamedTuple):
 
 
 class _Datum(NamedTuple):
-    """The datum of a DTM: its code, how far its places are from the reference datum, and the code of that."""
+    """Datum of a DTM sentence: its code, the offsets from a reference datum, and the code of that datum."""
 
     code: str
     offsets: tuple[str, str, str]
@@ -141,7 +144,7 @@ class _Datum(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The datum in a sentence."""
+        """Words that describe the datum within a sentence."""
         north, east, up = (shown(offset) for offset in self.offsets)
         code_words = {"999": "a user datum (999)", "": "a datum without a code"}
         if self.reference in _REFERENCES:
@@ -153,14 +156,15 @@ class _Datum(NamedTuple):
 
 
 def is_nmea(data: bytes) -> bool:
-    """Whether a file has a sentence with a place or a date, with a checksum, in its first megabyte."""
+    """Whether the first megabyte of a file has a sentence with a checksum that states a position or a date."""
     return bool(_ANYWHERE.search(data[:1_000_000]))
 
 
 def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read a log of NMEA 0183 of at most `MAX_NMEA_BYTES`, as every reader of `LOG_FORMATS` does; needs pynmea2.
+    """Read an NMEA 0183 log of at most `MAX_NMEA_BYTES` bytes, as every reader of `LOG_FORMATS` does.
 
-    Of GGA and GNS those count of which there are more; both must have the same places, and the worse quality counts.
+    The fixes come from GGA or GNS sentences, whichever are more numerous. If both exist, their positions must agree,
+    and the worse quality counts. The package pynmea2 is required.
     """
     hold_to_scale("utc", keys, name)
     hold_to_bytes(data, MAX_NMEA_BYTES, name)
@@ -174,11 +178,12 @@ def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
 
 @dataclass(eq=False)
 class _Sentences:
-    """Sentences of a log that are read: fixes by talker and kind, other ones by talker, dates and datums with lines.
+    """The sentences of a log that are read.
 
-    `broken` are messages about fixes that cannot be used, by their lines, `undated` those about dates that are none.
-    `lost` counts sentences with a wrong checksum, `doubtful_datums` are what such a DTM says. `unusable` counts
-    figures of GST that are no error, by talker.
+    Fixes are grouped by talker and kind of sentence; dates, accuracies and datums are grouped by talker. Dates and
+    datums come with their lines. `broken` are messages about unusable fixes, by line. `undated` are messages about
+    invalid dates. `lost` counts sentences with a wrong checksum. `doubtful_datums` are the datums of DTM sentences
+    with a wrong checksum. `unusable` counts invalid figures of GST sentences by talker.
     """
 
     fixes: defaultdict[tuple[str, str], list[_Fix]]
@@ -192,7 +197,7 @@ class _Sentences:
     unusable: Counter[str]
 
     def talker_of_fixes(self, keys: LogKeys, name: str) -> str:
-        """The talker whose fixes are read: the one that the mission file chooses, or the only one."""
+        """Talker whose fixes are read: the talker that the mission file chooses, or the only talker with fixes."""
         counts = Counter[str]()
         for (talker, _), fixes in self.fixes.items():
             counts[talker] += len(fixes)
@@ -216,16 +221,22 @@ class _Sentences:
         return next(iter(+counts))
 
     def _words(self, talker: str) -> str:
-        """How many fixes of which quality a talker has, the most frequent first."""
+        """Number of a talker's fixes of each quality, in words; the most frequent two, the most frequent first."""
         of_talker = (fix.quality.words for kind in _FIX_SENTENCES for fix in self.fixes.get((talker, kind), ()))
         return ", ".join(f"{count} of {words}" for words, count in Counter(of_talker).most_common(2))
 
     def other_receivers(self, talker: str) -> set[str]:
-        """Talkers that have fixes of their own, besides one: what they say of datum and accuracy is of those."""
+        """All other talkers with fixes.
+
+        They are other receivers, so the datum and accuracy that they state are their own.
+        """
         return {speaker for (speaker, _), fixes in self.fixes.items() if fixes} - {talker}
 
     def hold_to_datum(self, talker: str, name: str) -> None:
-        """Refuse places of another datum than WGS-84, which a talker says itself, or another that has no places."""
+        """Refuse a log whose datum is not WGS-84.
+
+        Only the datums that the talker states count, and those of talkers without fixes.
+        """
         # A datum that no sound sentence states counts as it reads: left out, its places would pass for WGS-84.
         datums = {**self.doubtful_datums, **self.datums}
         for speaker in datums.keys() - self.other_receivers(talker):
@@ -240,7 +251,10 @@ class _Sentences:
                     )
 
     def hold_to_one_solution(self, talker: str, kind: str, name: str) -> None:
-        """Refuse GGA and GNS of two solutions; give fixes of a kind the worse quality of both at their time."""
+        """Refuse GGA and GNS sentences whose positions come from two different solutions.
+
+        If the solutions agree, each fix of `kind` gets the worse quality of the two sentences with its time.
+        """
         other_kind = next(candidate for candidate in _FIX_SENTENCES if candidate != kind)
         fixes, counterparts = self.fixes[talker, kind], self.fixes[talker, other_kind]
         if not counterparts:
@@ -282,28 +296,34 @@ class _Sentences:
         )
 
     def dates_for(self, talker: str) -> Sequence[tuple[int, Instant]]:
-        """Lines of dates and the dates: those of a talker, or else of all."""
+        """Dates with their lines: the dates of a talker, or of all talkers if this talker states none."""
         return self.dates.get(talker) or sorted(date for dates in self.dates.values() for date in dates)
 
     def accuracies_for(self, talker: str) -> Sequence[_Accuracy]:
-        """Errors that a talker states, or else those of talkers without fixes: names of the same receiver."""
+        """Errors that a talker states, or else the errors of talkers without fixes.
+
+        A talker without fixes is another name of the same receiver.
+        """
         speakers = self.accuracies.keys() - self.other_receivers(talker)
         return self.accuracies.get(talker) or sorted(gst for speaker in speakers for gst in self.accuracies[speaker])
 
     def unusable_words(self, talker: str) -> str:
-        """How many figures of accuracy of a talker, or of talkers without fixes, are none, for reports."""
+        """Words for the number of invalid accuracy figures; empty if there are none.
+
+        The figures of the talker count, and the figures of talkers without fixes.
+        """
         count = sum(self.unusable[speaker] for speaker in self.unusable.keys() - self.other_receivers(talker))
         return f", {counted(count, 'figure')} of accuracy that cannot be used left out" if count else ""
 
     def lost_words(self) -> str:
-        """How many sentences are left out whose checksum is wrong or whose date is none, for reports."""
+        """Words for the number of sentences with a wrong checksum or an invalid date; empty if there are none."""
         lost, undated = self.lost.total(), len(self.undated)
         words = f", {counted(lost, 'sentence')} with a wrong checksum left out" if lost else ""
         return words + (f", {counted(undated, 'sentence')} without a date that there is left out" if undated else "")
 
 
 def _sentences(data: bytes, name: str) -> _Sentences:
-    """Read every sentence."""
+    """Read all sentences of a log; raises `PathFileError` if the package pynmea2 is not installed."""
     try:
         from pynmea2 import ParseError
         from pynmea2 import parse as parse_sentence
@@ -366,7 +386,7 @@ def _sentences(data: bytes, name: str) -> _Sentences:
 
 
 def _log(talker: str, kind: str, sentences: _Sentences, name: str, keys: LogKeys) -> Log:
-    """The log of a talker's sentences of one kind."""
+    """Make a log from a talker's fixes of one kind of sentence, GGA or GNS."""
     fixes, dates = sentences.fixes[talker, kind], sentences.dates_for(talker)
     records = LogRecords(
         name,
@@ -404,9 +424,10 @@ def _log(talker: str, kind: str, sentences: _Sentences, name: str, keys: LogKeys
 def _sigmas(
     times: Floats, stated: Sequence[_Accuracy], dates: Sequence[tuple[int, Instant]], middle: float
 ) -> Floats | None:
-    """One-sigma errors (n, 3) of fixes at rising times: the larger one of the GST before a fix and of that behind it.
+    """One-sigma errors (n, 3) east, north, up of fixes at rising times, from GST sentences. [m]
 
-    NaN where both are farther than 5 s, and for what they leave out; None where no fix has any. [m]
+    The larger error of the GST before a fix and the GST after it counts. A GST more than 5 s from the fix is ignored.
+    An error is NaN if no GST states it. Returns None if no fix has an error.
     """
     if not stated:
         return None
@@ -426,9 +447,10 @@ def _sigmas(
 def _dated(
     fixes: Sequence[_Fix | _Accuracy], dates: Sequence[tuple[int, Instant]], middle: float
 ) -> tuple[Floats, Floats]:
-    """Modified Julian days of fixes and seconds of them: within half a day of the date before, or the first.
+    """Modified Julian days of fixes, and their seconds of the day.
 
-    Without dates, days are counted from that of a second of the day in the middle of the log.
+    A fix is within half a day of the last date before it, or of the first date if there is none before it. Without
+    any dates, days are counted from the day of `middle`, a second of the day in the middle of the log.
     """
     seconds = np.array([fix.seconds for fix in fixes])
     if not dates:
@@ -440,7 +462,10 @@ def _dated(
 
 # ---------------------------------------------------------------------- sentences
 def _checked_fields(sentence: str) -> list[str]:
-    """Fields of a sentence whose checksum is right, as pynmea2 splits them and in a tenth of its time."""
+    """Fields of a sentence with a right checksum; raises `ValueError` for any other sentence.
+
+    The fields are split as by pynmea2, in a tenth of the time.
+    """
     match = _CHECKED.fullmatch(sentence)
     if match is None or reduce(xor, match[1].encode()) != int(match[2], 16):
         raise ValueError("wrong checksum")
@@ -448,7 +473,7 @@ def _checked_fields(sentence: str) -> list[str]:
 
 
 def _unchecked_fields(sentence: str) -> list[str]:
-    """The same, whatever its checksum; empty ones behind them."""
+    """Fields of a sentence, whatever its checksum, followed by empty fields."""
     return [field.strip() for field in sentence.partition("*")[0].split(",")[1:]] + [""] * 14
 
 
@@ -481,7 +506,10 @@ def _metres(text: str, unit: str, where: str) -> float:
 def _fix(
     fields: Sequence[str], where: str, line: int, quality: _Quality | None, height: Sequence[str]
 ) -> _Fix | None:
-    """A place, where there is a quality; `height` has the fields height, its unit, the separation and its unit."""
+    """Make a fix from the fields of a sentence; None if its quality is None, which means no position.
+
+    `height` has four fields: height, unit of the height, geoid separation, and unit of the separation.
+    """
     if quality is None:
         return None
     altitude, unit, separation, its_unit = height
@@ -523,7 +551,7 @@ def _gst(fields: Sequence[str], where: str, line: int) -> _Accuracy | None:
 
 
 def _dtm(fields: Sequence[str], where: str, line: int) -> _Datum | None:
-    """A datum; none where the receiver leaves it empty."""
+    """Datum of a DTM sentence; None if the receiver states no datum."""
     code, subdivision, north, north_side, east, east_side, up, reference = fields[:8]
     offsets = (f"{north or 0}' {north_side}".strip(), f"{east or 0}' {east_side}".strip(), f"{up or 0} m")
     is_zero = all(number_in(offset or "0") == 0 for offset in (north, east, up))
@@ -560,7 +588,7 @@ def _dated_at(date: str, clock: str, text: str, where: str) -> Instant:
 
 @lru_cache(maxsize=64)
 def _day(date: str) -> int | None:
-    """Modified Julian day of a date like 2026-06-01; None where there is none."""
+    """Modified Julian day of a date like 2026-06-01; None if the date does not exist."""
     midnight = parse_instant(f"{date}T00:00:00Z")
     return None if midnight is None else midnight.day
 

@@ -56,7 +56,10 @@ _CELESTIAL_AXES = (*_EQUINOX_OF_DATE, *_CELESTIAL)
 
 @dataclass
 class CovarianceBlock:
-    """A covariance as written in a message: line, epoch, frame (empty: as the ephemeris) and rows of its triangle."""
+    """A covariance as written in a message: line, epoch, frame and rows of its triangle.
+
+    An empty frame means the frame of the ephemeris.
+    """
 
     line: int
     epoch: str
@@ -91,9 +94,9 @@ def read_oem(
 ) -> Orbit:
     """Orbit from an orbit ephemeris message, as every reader of `ORBIT_FORMATS` gives it.
 
-    A message that names no interpolation is interpolated by Hermite's polynomial of degree 7 if its velocities agree
-    with its positions, and otherwise by Lagrange's polynomial of degree 7. A polynomial of degree n goes through n +
-    1 samples for Lagrange, and through half that number for Hermite.
+    If the message states no interpolation, it is interpolated by Hermite's polynomial of degree 7 if its velocities
+    agree with its positions, and otherwise by Lagrange's polynomial of degree 7. A polynomial of degree n goes
+    through n + 1 samples for Lagrange, and through half that number for Hermite.
 
     `object_name` is an OBJECT_NAME or an OBJECT_ID.
     """
@@ -197,7 +200,10 @@ def _segment(block: _EphemerisBlock, name: str, orientation: Orientation) -> Seg
 def read_covariance(
     block: CovarianceBlock, time: Instant, frame: str, orientation: Orientation, name: str
 ) -> EpochCovariance:
-    """A covariance of a message of CCSDS at a time of TAI, in metres and seconds. `frame` is the message's frame."""
+    """Convert a covariance of a CCSDS message to metres and seconds; `time` is its epoch of TAI.
+
+    `frame` is the reference frame of the message.
+    """
     location = f"{name}:{block.line}" if block.line else name
     if [len(cells) for _, cells in block.rows] != list(range(1, 7)):
         counts = ", ".join(str(len(cells)) for _, cells in block.rows) or "no"
@@ -228,7 +234,7 @@ def read_covariance(
 
 
 def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
-    """Words for an interpolation, or a degree, that is chosen here because the message does not state it."""
+    """Words that say that the message does not state the interpolation, or its degree; empty if it states both."""
     kind, degree = (metadata.get(key, (0, ""))[1].upper() for key in ("INTERPOLATION", "INTERPOLATION_DEGREE"))
     if not kind:
         return " (the file states no interpolation)"
@@ -280,7 +286,7 @@ def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str
 
 
 def _time(line: int, text: str, system: str, name: str) -> Instant:
-    """A time of TAI from a time of the message."""
+    """Convert a time of the message to TAI."""
     head, _, seconds = text.rpartition(":")
     minute = _minute(head)
     # A leap second is part of the last minute of its day.
@@ -387,7 +393,7 @@ def _matrix(matrix: MessageElement) -> CovarianceBlock:
 
 
 def named_covariance(leaves: Mapping[str, str], line: int) -> CovarianceBlock:
-    """A covariance from elements by their keywords. An empty element counts as missing."""
+    """A covariance from elements with keywords, such as CX_X. An empty element counts as missing."""
     rows: list[tuple[int, Sequence[str]]] = [
         (line, [leaves[key] for key in keywords if leaves.get(key)]) for keywords in _TRIANGLE_KEYWORDS
     ]

@@ -1,9 +1,9 @@
-"""How the Earth is turned below the stars: sidereal time, precession and nutation, UT1 and the motion of the pole.
+"""Orientation of the Earth relative to the stars: sidereal time, precession and nutation, UT1 and polar motion.
 
-UT1 - UTC and polar motion come from tables which the IERS issues every week. UT1 - UTC is kept below 0.9 s: 1 ms
-turns the Earth by 0.51 m at the distance of a low orbit. Polar motion is up to 0.6", which is 20 m there. If a
-mission states neither, orbits are turned with UT1 = UTC and without polar motion. The error of the turn is constant
-throughout an aperture: it shifts the path, and does not bend it.
+UT1 - UTC and polar motion come from tables that the IERS issues every week. UT1 - UTC is kept below 0.9 s. An error
+of 1 ms turns the Earth by 0.51 m at the distance of a low orbit. Polar motion is up to 0.6", which is 20 m there. If
+a mission states neither, orbits are converted with UT1 = UTC and without polar motion. The resulting error of the
+orientation is constant throughout an aperture: it shifts the path, and does not bend it.
 """
 
 import math
@@ -40,12 +40,12 @@ class Orientation(NamedTuple):
     pole : tuple of float
         Position of the pole, x towards Greenwich and y towards 90° west. [rad]
     ut1_doubt, pole_doubt : float
-        Largest distance of both from the truth. Without figures: 0.1 s, which a report warns of, and the largest
-        distance that the pole reaches. [s], [rad]
+        Largest errors of UT1 - UTC and of the pole. [s], [rad] Without values they are 0.1 s, which a report warns
+        of, and the largest distance that the pole reaches.
     day : int, optional
         Day of UTC to which UT1 - UTC belongs, so that a leap second does not turn the Earth. None is any day.
     is_predicted : bool
-        Whether the figures are predictions, for reports.
+        Whether the values are predictions, for reports.
     """
 
     ut1_minus_utc: float = 0.0
@@ -57,7 +57,7 @@ class Orientation(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Figures of the turn, for reports; empty without figures."""
+        """Words for UT1 - UTC in reports; empty if the orientation is unknown."""
         if self._replace(day=None) == UNKNOWN:
             return ""
         return f", UT1 - UTC {self.ut1_minus_utc:.6g} s" + (" (predicted)" if self.is_predicted else "")
@@ -68,7 +68,7 @@ class Orientation(NamedTuple):
         return instant.after(self.ut1_minus_utc + leaps)
 
     def misplaced(self, position: Vector) -> tuple[float, float]:
-        """Largest errors of a position by the doubts of UT1 and of the pole. [m]"""
+        """Largest errors of a position due to the doubts of UT1 and of the pole. [m]"""
         turned = ROTATION_RATE_RAD_PER_S * self.ut1_doubt * math.hypot(position[0], position[1])
         return turned, self.pole_doubt * math.hypot(*position)
 
@@ -77,7 +77,7 @@ UNKNOWN = Orientation()
 
 
 def from_teme(position: Vector, instant: Instant, orientation: Orientation = UNKNOWN) -> Vector:
-    """Earth-fixed coordinates from coordinates in the true equator and mean equinox of date. [m]"""
+    """Convert coordinates in the true equator and mean equinox of date to Earth-fixed coordinates. [m]"""
     angle = sidereal_time(orientation.ut1(instant))
     sine, cosine = math.sin(angle), math.cos(angle)
     x, y, z = position
@@ -85,7 +85,10 @@ def from_teme(position: Vector, instant: Instant, orientation: Orientation = UNK
 
 
 def _from_true_pole(position: Vector, pole: tuple[float, float]) -> Vector:
-    """Turn from axes with z along the pole of rotation to Earth-fixed axes: R₁(-y)·R₂(-x), IERS Conventions, 5.1."""
+    """Convert a position from axes with z along the pole of rotation to Earth-fixed axes.
+
+    The rotation is R₁(-y)·R₂(-x) for the pole x, y (IERS Conventions, 5.1).
+    """
     (sine_x, cosine_x), (sine_y, cosine_y) = ((math.sin(angle), math.cos(angle)) for angle in pole)
     x, y, z = position
     x, z = cosine_x * x + sine_x * z, cosine_x * z - sine_x * x
@@ -93,11 +96,11 @@ def _from_true_pole(position: Vector, pole: tuple[float, float]) -> Vector:
 
 
 def sidereal_time(ut1: Instant) -> float:
-    """Greenwich mean sidereal time of the IAU, 1982. [rad]
+    """Greenwich mean sidereal time as defined by the IAU in 1982. [rad]
 
     Source: Vallado, Fundamentals of Astrodynamics and Applications, 4th edition, equation 3-45 (also Aoki and others,
-    1982). Its 876600 hours a century are a turn a day, which the seconds of the day give here: the equation as
-    written would round to 1e-7 s.
+    1982). The 876600 hours per century in the equation are one turn per day. Here the seconds of the day give this
+    turn, because the equation as written would round to 1e-7 s.
     """
     centuries = (ut1.day - _J2000_DAY - 0.5 + ut1.seconds / DAY_S) / _CENTURY_DAYS
     at_midnight = (ut1.day - _J2000_DAY - 0.5) / _CENTURY_DAYS
@@ -110,7 +113,7 @@ def sidereal_time(ut1: Instant) -> float:
 
 
 def celestial_turn(is_j2000: bool, orientation: Orientation = UNKNOWN) -> Turn:
-    """Turn from the axes of the GCRF, or the mean equator and equinox of J2000, to Earth-fixed axes.
+    """Return a function that converts from the GCRF, or the mean equator and equinox of J2000, to Earth-fixed axes.
 
     Precession and nutation follow the IAU, 2006 and 2000A (IERS Conventions 2010, chapter 5). The axes of J2000
     differ from the axes of the GCRF by 0.023", which is 0.8 m at the distance of a low orbit. A file that calls the
@@ -158,7 +161,7 @@ _ACCEPTED_TABLES = "accepted: finals2000A.all or .csv of the IERS, its C04, or E
 
 
 class _TableRow(NamedTuple):
-    """Texts of a day in a table: MJD, pole and UT1 - UTC, each with its error; an error may be empty."""
+    """Texts of one day in a table: MJD, pole and UT1 - UTC. Pole and UT1 - UTC have errors, which may be empty."""
 
     line: int
     cells: list[str]
@@ -247,7 +250,7 @@ _MAX_HEADER_LINES = 40  # lines of text above the rows of C04
 
 
 def _unreadable_table(text: str) -> str | None:
-    """Words for a common table of the Earth's rotation that cannot be read; None for any further text."""
+    """Words for a common table of the Earth's rotation that cannot be read; None for any other text."""
     beginning = text[:2000]
     if re.search(r"(?m)^\s*NUM_OBSERVED_POINTS|^BEGIN OBSERVED", beginning):
         return "the text form of CelesTrak's EOP"
@@ -271,7 +274,7 @@ def _of_finals(lines: Sequence[tuple[int, str]]) -> Iterator[_TableRow]:
 
 
 def _is_empty(cells: Sequence[str]) -> bool:
-    """Whether a row is a future day without values."""
+    """Whether a row is for a future day and has no values."""
     return bool(cells[0]) and not any(cells[1:])
 
 
@@ -331,7 +334,7 @@ def _column_of(header: Sequence[str], keys: Sequence[str], name: str) -> int:
 
 
 def _row_of(line: str, separator: str, header: Sequence[str], location: str) -> list[str]:
-    """Cells of a line. A line that was cut off, with fewer cells than the header, is refused."""
+    """Split a line into cells. A truncated line, with fewer cells than the header, is refused."""
     cells = [cell.strip() for cell in line.split(separator)]
     if len(cells) < len(header):
         raise PathFileError(f"{location}: has {len(cells)} values, the header {len(header)}")
@@ -339,7 +342,10 @@ def _row_of(line: str, separator: str, header: Sequence[str], location: str) -> 
 
 
 def _numbers(row: _TableRow, last_measured: float | None, location: str) -> list[float]:
-    """Numbers of a row. Errors that the table does not state get their usual values."""
+    """Numbers of a row. If the row states no errors, the usual errors are used.
+
+    Raises `PathFileError` for a cell that is no number, and for values that are not possible.
+    """
     numbers: list[float] = []
     is_stated = any(row.cells[n] for n in (2, 4, 6))
     for index, (cell, quantity) in enumerate(zip(row.cells, _QUANTITIES, strict=True)):
@@ -371,7 +377,7 @@ def _numbers(row: _TableRow, last_measured: float | None, location: str) -> list
 
 
 def _between(first: list[float], second: list[float], fraction: float) -> Orientation:
-    """Orientation between the numbers of two days, at a fraction of the first day."""
+    """Orientation interpolated linearly between the numbers of two days; `fraction` is the part of the first day."""
     leaps = tai_less_utc(int(second[0])) - tai_less_utc(int(first[0]))
     change = [end - start for start, end in zip(first, second, strict=True)]
     change[5] -= leaps

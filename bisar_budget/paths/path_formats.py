@@ -22,21 +22,21 @@ from bisar_budget.paths.ulog import is_ulog, read_ulog
 
 
 class OrbitFormat(NamedTuple):
-    """A format of orbits.
+    """A format of orbit files.
 
     Attributes
     ----------
     words : str
         The format in messages.
     sign : re.Pattern
-        Content of the first lines that identifies the format, in text.
+        Pattern in the first lines that identifies the format, for text.
     element : bytes
-        Name of an element that identifies the format, in XML; empty for a format that is not XML.
+        Name of an element that identifies the format, for XML; empty for a format that is not XML.
     read : callable
-        Reader: takes the bytes of a file, the name of the file in messages, the name of the object (needed if there
-        are several), the middle of the aperture, and the orientation for turning axes of the stars to the Earth.
-        Raises `PathFileError` if the file breaks its format, has several objects or no object of the name, or has no
-        position at the middle of the aperture.
+        Reader. Its arguments are the bytes of a file, the name of the file in messages, the name of the object
+        (needed if there are several), the middle of the aperture, and the orientation that converts from celestial to
+        Earth-fixed axes. Raises `PathFileError` if the file breaks its format, has several objects or no object of
+        the name, or has no position at the middle of the aperture.
     """
 
     words: str
@@ -91,7 +91,7 @@ _EXAMINED_BYTES = 4096  # that identify a format
 
 
 def orbit_format(data: bytes) -> str | None:
-    """Key of an orbit's format in `ORBIT_FORMATS` by its content; None for any further content."""
+    """Key in `ORBIT_FORMATS` of the format that the content has; None for any other content."""
     beginning = data[:_EXAMINED_BYTES].removeprefix(b"\xef\xbb\xbf")
     if is_markup(beginning):
         names = re.findall(rb"<(?:\w+:)?(\w+)[\s>]", beginning)
@@ -100,7 +100,7 @@ def orbit_format(data: bytes) -> str | None:
 
 
 def hold_to_format(data: bytes, name: str, form: str) -> None:
-    """Refuse a file of another format than `form`; the message names the key that reads it."""
+    """Refuse a file of another format than `form`; the message names the key of the mission file that reads it."""
     actual = orbit_format(data)
     if actual == form:
         return
@@ -112,12 +112,12 @@ def hold_to_format(data: bytes, name: str, form: str) -> None:
 
 
 def hold_to_log(data: bytes, name: str) -> None:
-    """Refuse a file that is known to be no log of a flight; the message names the key that reads it."""
+    """Refuse a file that is known to be no flight log; the message names the mission file's key that reads it."""
     _refuse(data, name, orbit_format(data), f"accepted: a log of a flight, {_words_of_logs()}")
 
 
 def _words_of_logs() -> str:
-    """Formats of logs, each with its word in the mission file."""
+    """List of all log formats in words, each with its name in the mission file."""
     return ", ".join(f"{format.words} ({key})" for key, format in LOG_FORMATS.items())
 
 
@@ -134,7 +134,7 @@ def _refuse(data: bytes, name: str, actual: str | None, accepted: str) -> None:
 
 
 def _has_ubx(data: bytes) -> bool:
-    """Whether bytes have a complete message of u-blox: two bytes of sync, class, id, length, payload, two sums."""
+    """Whether bytes contain a complete u-blox message: sync bytes, class, id, length, payload and checksum."""
     start = data.find(b"\xb5b")
     while start >= 0:
         end = start + 6 + int.from_bytes(data[start + 4 : start + 6], "little")
@@ -145,7 +145,7 @@ def _has_ubx(data: bytes) -> bool:
 
 
 def _ubx_sums(data: bytes) -> bytes:
-    """Checksum of a message of u-blox, after Fletcher."""
+    """Fletcher checksum of a u-blox message, two bytes."""
     first = second = 0
     for byte in data:
         first = (first + byte) & 0xFF
@@ -195,15 +195,16 @@ _KEYS_OF_FORMATS = {
 
 
 def log_format(data: bytes) -> str | None:
-    """Key of a log's format in `LOG_FORMATS` by its content; None for any further content."""
+    """Key in `LOG_FORMATS` of the format that the content has; None for any other content."""
     return next((name for name in reversed(LOG_FORMATS) if LOG_FORMATS[name].is_format(data)), None)
 
 
 def read_log(data: bytes, name: str, stated_format: str | None, keys: LogKeys) -> Log:
-    """Read a log of the format that the mission file states.
+    """Read a log in the format that the mission file states.
 
-    If `stated_format` is None, the content decides, or else the ending of the name. The remaining arguments are those
-    of the reader. Raises `PathFileError` for content of another format or of no format, and for faults of the reader.
+    If `stated_format` is None, the format follows from the content, or else from the ending of the name. The other
+    arguments are those of the reader. Raises `PathFileError` for content of another format or of no format, and for
+    faults that the reader finds.
     """
     actual = log_format(data)
     if actual is None and is_accuracy(data):

@@ -1,9 +1,9 @@
-"""The grid on which a log writes its fixes: a position is known to a step of the grid, for a receiver of any quality.
+"""Rounding of the fixes in a log to a grid, which limits how well a position is known for any receiver.
 
-A log writes degrees, minutes and metres with a number of decimals. The grid is the coarsest decimal step on which all
-fixes lie, from the numbers alone: zeros at the end of a cell are not evidence. The step counts as a grid only if the
-fixes deviate from a smooth path by about the rounding to the step. Fixes of an invented platform, at rest or at a
-round speed, lie on any grid.
+A log writes degrees, minutes and metres with a fixed number of decimals. The grid is the coarsest decimal step on
+which all fixes lie. It is found from the numbers alone: zeros at the end of a cell are not evidence. A step counts as
+a grid only if the fixes deviate from a smooth path by about the rounding to the step. Fixes of an invented platform,
+at rest or at a round speed, lie on any grid.
 """
 
 import math
@@ -27,7 +27,7 @@ _MAX_ROUNDING_RATIO = 0.05  # of binary rounding to a step; with more, no grid c
 
 
 def decimal_step(times: Floats, values: Floats, units: Sequence[float]) -> float:
-    """The largest decimal step of a unit on which all values lie; 0 if there is no such step.
+    """Largest decimal step of a unit on which all values lie; 0 if there is no such step.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def decimal_step(times: Floats, values: Floats, units: Sequence[float]) -> float
     values : (n,) ndarray
         Values of a coordinate. [SI]
     units : sequence of float
-        Units in which the log may write the coordinate. [SI]
+        Sizes of the units in which the log may write the coordinate. [SI]
     """
     stride = -(-len(values) // _MAX_FIXES)
     values, times = values[::stride], times[::stride]
@@ -59,7 +59,7 @@ def decimal_step(times: Floats, values: Floats, units: Sequence[float]) -> float
 
 
 def _roughness(times: Floats, values: Floats) -> float:
-    """Root mean square deviation of values from a polynomial that fits them."""
+    """Root mean square deviation of values from a polynomial that is fitted to them, in the unit of the values."""
     normalised_times = 2 * (times - times[0]) / (times[-1] - times[0]) - 1
     basis = chebyshev.chebvander(normalised_times, min(_PATH_ORDER, len(values) // 3))
     centred = values - values.mean()
@@ -68,7 +68,10 @@ def _roughness(times: Floats, values: Floats) -> float:
 
 
 def geodetic_grid(times: Floats, latitude: Floats, longitude: Floats, height: Floats) -> Matrix:
-    """Vectors of one grid step in latitude, longitude and height, in Earth-fixed axes; zeros without a grid. [m]"""
+    """Vectors of one grid step in latitude, longitude and height, in Earth-fixed axes. [m]
+
+    A coordinate without a grid has a zero vector.
+    """
     middle = len(times) // 2
     middle_fix = np.array([latitude[middle], longitude[middle], height[middle]])
     units = (_ARC_UNITS_RAD, _ARC_UNITS_RAD, _LENGTH_UNITS_M)
@@ -84,6 +87,9 @@ def geodetic_grid(times: Floats, latitude: Floats, longitude: Floats, height: Fl
 
 
 def cartesian_grid(times: Floats, positions: Floats) -> Matrix:
-    """One step along each axis of positions (n, 3); zeros for a coordinate without a grid. [m]"""
+    """Vectors of one grid step along each axis of positions (n, 3). [m]
+
+    A coordinate without a grid has a zero vector.
+    """
     steps = [decimal_step(times, values, _LENGTH_UNITS_M) for values in positions.T]
     return tuple(tuple(row) for row in np.diag(steps).tolist())

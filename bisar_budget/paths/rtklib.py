@@ -1,12 +1,13 @@
-"""Solutions of RTKLIB (`.pos`): a line of % that names time scale and columns, then lines with a fix and its errors.
+"""Solutions of RTKLIB (`.pos`): a header line that names time scale and columns, then one fix per line.
 
     % (lat/lon/height=WGS84/ellipsoidal,Q=1:fix,2:float,3:sbas,4:dgps,5:single,6:ppp,ns=# of satellites)
     %  GPST                  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m) ...
     2026/06/01 05:20:19.250   48.086600000   11.279700000  3000.0000   1  12   0.0100   0.0080   0.0200 ...
 
-Times are in GPST, UTC or JST (UTC + 9 h), as a date or as a GPS week and its seconds in that scale. A fix has
-latitude and longitude in degrees or in degrees, minutes and seconds with a height, or Earth-fixed x, y, z. Heights
-are `ellipsoidal`, or `geodetic`, which RTKLIB counts above the geoid. Cells are separated by blanks, or by the
+The header line begins with %. Each fix is followed by its errors. Times are in GPST, UTC or JST (UTC + 9 h), as a
+date and time, or as a GPS week and seconds of the week in that scale. A fix has latitude, longitude and height, or
+Earth-fixed x, y, z. Latitude and longitude are in degrees, or in degrees, minutes and seconds. Heights are
+`ellipsoidal`, or `geodetic`, which means above the geoid in RTKLIB. Cells are separated by blanks, or by the
 character after the name of the first column.
 
 Source: RTKLIB 2.4.3, src/solution.c, functions outsolheads, outsols, outpos and outecef, which write such files.
@@ -61,9 +62,9 @@ class _Columns(NamedTuple):
     system : str
         Time system.
     delimiter : str
-        Character between cells; empty: blanks.
+        Character between cells; empty for blanks.
     indices : dict
-        Index of each column by its name. The time has the first two cells.
+        Index of each column by its name. The first two cells are the time.
     width : int
         Number of cells in a line.
     is_in_minutes : bool
@@ -85,7 +86,7 @@ def is_solution(data: bytes) -> bool:
 def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
     """Read a solution of at most `MAX_SOLUTION_BYTES` bytes, as every reader of `LOG_FORMATS` does.
 
-    The log has standard deviations of each fix along east, north and up, unless the file has none or zeros alone.
+    The log has standard deviations of each fix east, north and up, unless the file has none or only zeros.
     """
     hold_to_bytes(data, MAX_SOLUTION_BYTES, name)
     header: _Columns | None = None
@@ -139,7 +140,7 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
 
 
 def _header(text: str, location: str) -> _Columns | None:
-    """Columns that a line of % names; None for any other line."""
+    """Columns that a header line, beginning with %, names; None for any other line."""
     match = _HEADER_LINE.match(" ".join(text.split()))
     if match is None:
         return None
@@ -165,7 +166,7 @@ def _header(text: str, location: str) -> _Columns | None:
 
 
 def _row(text: str, header: _Columns, location: str) -> tuple[int, list[float]]:
-    """Modified Julian day, and the numbers of a line, followed by the seconds of the day."""
+    """Modified Julian day of a line, and its numbers, with the seconds of the day as the last number."""
     cells = (text.replace(header.delimiter, " ") if header.delimiter else text).split()
     if len(cells) != header.width:
         raise PathFileError(f"{location}: has {counted(len(cells), 'cell')}, the columns need {header.width}")
@@ -225,14 +226,17 @@ def _radians(table: Floats, header: _Columns, axis: str, records: LogRecords) ->
 
 
 def _hold_to_datum(datum_line: str, name: str) -> None:
-    """Refuse fixes of another datum than WGS-84 or a frame of the ITRF, by the line of % that states the datum."""
+    """Refuse fixes of another datum than WGS-84 or an ITRF frame; a line that begins with % states the datum."""
     match = _DATUM_WORDS.search(datum_line)
     if match is not None and not is_wgs84(match[1]):
         raise PathFileError(f"{name}: has positions of the datum {shown(match[1])}", "accepted: WGS84")
 
 
 def _heights(heights: Floats, datum_line: str, keys: LogKeys, name: str) -> Floats:
-    """Heights above the ellipsoid, by the line of % that states the datum and the reference of heights. [m]"""
+    """Convert heights to heights above the ellipsoid. [m]
+
+    The line that begins with % states the datum, and whether heights are above the ellipsoid or the geoid.
+    """
     match = re.search(r"height=[^/,)]+/(\w+)", datum_line)
     if match is not None and match[1] == "ellipsoidal":
         hold_to_ellipsoid(keys, name)
@@ -245,7 +249,7 @@ def _heights(heights: Floats, datum_line: str, keys: LogKeys, name: str) -> Floa
 
 
 def _qualities(table: Floats, header: _Columns) -> str:
-    """Number of fixes of each quality, in words, the most frequent first; empty without the column of quality."""
+    """Number of fixes of each quality, in words, the most frequent first; empty without a column of the quality."""
     if "Q" not in header.indices:
         return ""
     values, counts = np.unique(table[:, header.indices["Q"]], return_counts=True)
@@ -259,9 +263,10 @@ def _qualities(table: Floats, header: _Columns) -> str:
 def _sigmas(
     table: Floats, header: _Columns, latitude: Floats, longitude: Floats, records: LogRecords
 ) -> Floats | None:
-    """Standard deviations (n, 3) east, north, up; None if the file has none, or zeros alone. [m]
+    """Standard deviations (n, 3) east, north, up; None if the file has none, or only zeros. [m]
 
-    A 0 states nothing. Those of x, y, z are turned with their covariances, of which the file has the signed roots.
+    A zero means unknown. Standard deviations of x, y, z are converted with their covariances. The file states each
+    covariance as a root of its absolute value, with its sign.
     """
     is_turned = "sdx(m)" in header.indices
     names = ("sdx(m)", "sdy(m)", "sdz(m)") if is_turned else ("sde(m)", "sdn(m)", "sdu(m)")

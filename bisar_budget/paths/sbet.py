@@ -1,13 +1,14 @@
 """Trajectories of Applanix POSPac: SBET, smoothed best estimate of trajectory, and its accuracy file, smrmsg.
 
-An SBET is records of 17 little-endian doubles, without a header: time of the GPS week [s]; latitude, longitude [rad];
-height above the ellipsoid [m]; velocities along x, y, z of the wander frame [m/s]; roll, pitch, heading, wander angle
-[rad]; accelerations [m/s²] and angular rates [rad/s] of the body. An smrmsg is records of 10: time; one-sigma (RMS)
-errors of position north, east, down [m], of velocity [m/s], of roll, pitch, heading [arcmin].
+An SBET has no header, and consists of records of 17 little-endian doubles: time of the GPS week [s]; latitude,
+longitude [rad]; height above the ellipsoid [m]; velocities along x, y, z of the wander frame [m/s]; roll, pitch,
+heading, wander angle [rad]; accelerations [m/s²] and angular rates [rad/s] of the body. An smrmsg consists of records
+of 10 doubles: time; one-sigma (RMS) errors of position north, east, down [m], of velocity [m/s], of roll, pitch,
+heading [arcmin].
 
 Source: the tables of both files in Applanix' POSPac MMS user guide. The frame of the velocities follows from the
-heading, which is true when the wander angle is taken off: x is the wander angle west of north, y west of x, z up.
-`test_a_real_flight_has_the_wander_frame` holds this to a flight.
+heading, which is the true heading after the wander angle is subtracted: x is the wander angle west of north, y west
+of x, z up. `test_a_real_flight_has_the_wander_frame` checks this against a flight.
 """
 
 import math
@@ -85,7 +86,7 @@ class _Kind(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Bytes of a record."""
+        """Size of a record. [bytes]"""
         return 8 * self.width
 
 
@@ -95,7 +96,7 @@ _SMRMSG = _Kind("an accuracy file of an SBET (smrmsg)", 10, _SMRMSG_FIELDS, 4)
 
 @dataclass(frozen=True)
 class Accuracy:
-    """One-sigma errors of position [m] and velocity [m/s], east, north and up: the largest in a number of records."""
+    """One-sigma errors of position [m] and velocity [m/s], east, north and up: the largest among several records."""
 
     position: Vector
     velocity: Vector
@@ -108,17 +109,17 @@ def of_gps(week: int, seconds: float) -> Instant:
 
 
 def is_sbet(data: bytes) -> bool:
-    """Whether bytes are records of 17 doubles, with records of a flight at both ends."""
+    """Whether bytes are records of 17 doubles; the records at both ends have to be possible for a flight."""
     return _looks_like(data, _SBET)
 
 
 def is_accuracy(data: bytes) -> bool:
-    """Whether bytes are records of 10 doubles, with stated errors and rising times at both ends."""
+    """Whether bytes are records of 10 doubles; the records at both ends need stated errors and rising times."""
     return _looks_like(data, _SMRMSG)
 
 
 def _looks_like(data: bytes, kind: _Kind) -> bool:
-    """Whether most of the first and last three records are of a kind, and rise from the first to the last."""
+    """Whether most of the first three and last three records are of a kind, and times rise from first to last."""
     count = len(data) // kind.size
     if not count or (b"\n" in data[: kind.size] and data[: kind.size].isascii()):
         return False
@@ -133,9 +134,9 @@ def _looks_like(data: bytes, kind: _Kind) -> bool:
 def read_sbet(data: bytes, name: str, keys: LogKeys) -> Log:
     """Read a trajectory of at most `MAX_SBET_BYTES` bytes, as every reader of `LOG_FORMATS` does.
 
-    Positions come from latitude, longitude and height. Velocities, turned out of the wander frame, have to agree with
-    the positions. Without the key `week` the log has seconds of the week and no start. Times rise over the end of a
-    week. A leap second within the file is ignored.
+    Positions come from latitude, longitude and height. Velocities are converted from the wander frame, and have to
+    agree with the positions. Without the key `week` the log has seconds of the week, and no start. Times continue to
+    rise over the end of a week. A leap second within the file is ignored.
     """
     hold_to_scale("gps", keys, name)
     hold_to_ellipsoid(keys, name)
@@ -160,12 +161,12 @@ def read_accuracy(
     center_seconds: float | None,
     aperture_time_s: float,
 ) -> Accuracy:
-    """Read the accuracy of a trajectory in the aperture, a file of at most `MAX_SBET_BYTES` bytes.
+    """Read the accuracy of a trajectory in the aperture from a file of at most `MAX_SBET_BYTES` bytes.
 
-    The largest value of each sigma counts, in the aperture and next to it: see `around_aperture`. `week` is the GPS
-    week of the trajectory. The arguments that follow it are as in `slow_times`. Raises `PathFileError`, with the
-    record or byte of the fault, for a damaged file, and for records that do not cover the aperture, have a gap in it,
-    or state an error of zero throughout.
+    For each sigma, the largest value in the aperture and next to it is used, see `around_aperture`. `week` is the GPS
+    week of the trajectory. The arguments after it are the same as in `slow_times`. Raises `PathFileError`, with the
+    record or byte of the fault, for a damaged file. It is also raised for records that do not cover the aperture,
+    have a gap in it, or state an error of zero throughout.
     """
     if is_sbet(data) and not is_accuracy(data):
         raise PathFileError(f"{name}: is an SBET, a trajectory", _ACCEPTED_ACCURACY_FILE, "trajectory.file reads it")
@@ -188,9 +189,9 @@ def read_accuracy(
 
 
 def _records(data: bytes, name: str, kind: _Kind) -> tuple[Floats, LogRecords]:
-    """Records (n, width), and whether they can be used: every field has to be in its range.
+    """Records (n, width), and whether each is usable: every field has to be within its range.
 
-    An incomplete record at the end, where writing broke off, counts as a record that cannot be used.
+    An incomplete record at the end, where writing stopped, counts as an unusable record.
     """
     hold_to_bytes(data, MAX_SBET_BYTES, name)
     if not data:
@@ -218,7 +219,10 @@ def _field_words(table: Floats, wrong: NDArray[np.bool_], kind: _Kind, index: in
 
 
 def _misread(data: bytes, name: str, kind: _Kind, table: Floats, wrong: NDArray[np.bool_]) -> PathFileError:
-    """The reason for a large number of wrong records: another kind of file, or other units."""
+    """Error for a file with many wrong records.
+
+    It names the likely cause, such as another kind of file or other units.
+    """
     index = int(wrong.any(axis=0).argmax())
     field, column, *_ = kind.fields[int(wrong[:, index].argmax())]
     value = float(table[index, column])
@@ -234,7 +238,7 @@ def _misread(data: bytes, name: str, kind: _Kind, table: Floats, wrong: NDArray[
 
 
 def _wrong(records: Floats, fields: _Fields) -> NDArray[np.bool_]:
-    """Whether fields of records are out of their ranges, (fields, n)."""
+    """Mask (fields, n) of the fields of records that are outside their ranges."""
     is_wrong = np.empty((len(fields), len(records)), dtype=bool)
     with np.errstate(invalid="ignore"):
         for index, (_, column, lowest, highest, _) in enumerate(fields):
@@ -245,7 +249,7 @@ def _wrong(records: Floats, fields: _Fields) -> NDArray[np.bool_]:
 
 
 def _over_weeks(times: Floats, records: LogRecords) -> Floats:
-    """Times that continue over the end of a week. Times of records that cannot be used are unchanged."""
+    """Make times continue over the end of a week. Times of unusable records are unchanged."""
     usable = np.flatnonzero(records.is_usable)
     usable_times = times[usable]
     steps = np.diff(usable_times)
@@ -309,5 +313,5 @@ def _hold_to_velocities(times: Floats, records: Floats, name: str) -> None:
 
 
 def _cumulative(steps: Floats) -> Floats:
-    """Sums (n + 1, 3) of steps (n, 3), from zero on."""
+    """Cumulative sums (n + 1, 3) of steps (n, 3), beginning with zero."""
     return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])

@@ -1,7 +1,7 @@
 """Orbits in the Extended Standard Product 3 (SP3-a to SP3-d), the format of the GNSS services and of low satellites.
 
 Sources: S. Hilla, The Extended Standard Product 3 Orbit Format (SP3-c), 2010, and SP3-d, 2016, NOAA. A position is
-the position of a satellite's centre of mass in the Earth-fixed axes that the header names.
+that of the satellite's centre of mass, in the Earth-fixed axes that the header names.
 """
 
 import math
@@ -100,13 +100,13 @@ def read_sp3(
 
 
 def _first_of(broken: Mapping[int, str]) -> str:
-    """The fault of the first line that cannot be used, and the number of such lines, for messages."""
+    """Message for unusable lines: the fault of the first line, and the number of such lines if there are several."""
     problem = broken[min(broken)]
     return problem if len(broken) == 1 else f"{problem}; {len(broken)} lines cannot be used"
 
 
 class _Heading:
-    """The header of a file.
+    """Header of a file, and counts of unusable lines.
 
     Attributes
     ----------
@@ -115,9 +115,9 @@ class _Heading:
     base : float
         Base of the exponents of standard deviations; 0 without them.
     nameless : int
-        Number of positions without a readable satellite.
+        Number of positions without a readable name of a satellite.
     broken : dict
-        Messages about further lines that cannot be used, by their numbers.
+        Messages about other unusable lines, by their numbers.
     first_epoch_line : int
         Line of the first epoch.
     accuracy : dict
@@ -168,13 +168,16 @@ class _Heading:
 
 
 def _accuracy(exponent: str) -> float:
-    """Accuracy of 2ⁿ mm; 0 if it is unknown, or more than 2³⁰ mm, which is no orbit. [m]"""
+    """Accuracy of 2ⁿ mm from its exponent n; 0 if it is unknown. [m]
+
+    An exponent above 30 is not possible for an orbit, and counts as unknown.
+    """
     text = exponent.strip()
     return 1e-3 * 2 ** int(text) if re.fullmatch(r"\d{1,2}", text, re.ASCII) and 0 < int(text) <= 30 else 0.0
 
 
 def _deviations(line: str, base: float) -> Vector | None:
-    """Standard deviations of the position of a line, baseⁿ mm; None for a line without any. [m]
+    """Standard deviations of the position in a line, baseⁿ mm for each axis; None if the line has none. [m]
 
     An axis without a standard deviation gets the largest of the line. Three zeros mean that the line states none.
     """
@@ -190,14 +193,14 @@ def _deviations(line: str, base: float) -> Vector | None:
 
 
 def _id(text: str) -> str:
-    """G05 for G05, G 5 or, in SP3-a, for 5 alone."""
+    """Standard name of a satellite, such as G05 from G05, from G 5, or in SP3-a from 5 alone."""
     return (text[:1].strip() or "G") + text[1:].strip().rjust(2, "0")
 
 
 def _satellites(
     lines: Sequence[str], header: _Heading, name: str, object_name: str | None = None
 ) -> dict[str, _Satellite]:
-    """Satellites of a file by their names, or only the satellite of a name."""
+    """All satellites of a file by their names, or only the satellite with a given name."""
     key = None if object_name is None else object_key(object_name)
     satellites: dict[str, _Satellite] = {}
     time: Instant | None = None
@@ -237,7 +240,7 @@ def _satellites(
 
 
 def _epoch_after(line: str, last_epoch: Instant | None, system: str, location: str) -> Instant:
-    """Time of an epoch, of TAI. An epoch that is not after the last epoch is refused."""
+    """Read the time of an epoch in TAI; refuse an epoch that is not later than the last epoch."""
     time = _epoch(line, system, location)
     if last_epoch is not None and time.since(last_epoch) < MIN_SAMPLE_STEP_S:
         raise PathFileError(f"{location}: the epoch is not after the one before it; epochs must rise")
@@ -245,7 +248,7 @@ def _epoch_after(line: str, last_epoch: Instant | None, system: str, location: s
 
 
 def _add_velocity(line: str, satellite: _Satellite, index: int, location: str) -> None:
-    """Add the velocity of the next line to a sample."""
+    """Add the velocity in a line to the sample of the position before it."""
     if _satellite_of(line, location) != satellite.id:
         raise PathFileError(f"{location}: the velocity is not of {satellite.id}, whose position is above it")
     velocity = [speed / 10 for speed in _numbers(line, location, "dm/s")]
@@ -256,7 +259,10 @@ def _add_velocity(line: str, satellite: _Satellite, index: int, location: str) -
 def _add_position(
     line: str, time: Instant, number: int, satellites: dict[str, _Satellite], header: _Heading, name: str
 ) -> tuple[_Satellite, int] | None:
-    """Add the position of a line as a sample; returns its satellite and index, or None without a position."""
+    """Add the position in a line as a sample; return its satellite and the index of the sample.
+
+    Returns None if the line has no position, or repeats the sample before it.
+    """
     location = f"{name}:{number}"
     satellite_id = _satellite_of(line, location)
     satellite = satellites.setdefault(satellite_id, _Satellite(satellite_id, header.accuracy.get(satellite_id, 0.0)))
@@ -300,7 +306,7 @@ def _satellite_of(line: str, location: str) -> str:
 
 
 def _numbers(line: str, location: str, unit: str) -> list[float]:
-    """The three coordinates of a line, each of 14 columns."""
+    """Three coordinates in a line, each from 14 columns."""
     requirement = f"must be a number of {unit} in columns"
     return [
         coordinate_in(line[first : first + 14], location, f"{requirement} {first + 1} to {first + 14}")
@@ -309,7 +315,7 @@ def _numbers(line: str, location: str, unit: str) -> list[float]:
 
 
 def _epoch(line: str, system: str, location: str) -> Instant:
-    """Time of an epoch, of TAI: `*  2010  6 20  0 15  0.00000000`."""
+    """Read the time of an epoch in TAI from a line like `*  2010  6 20  0 15  0.00000000`."""
     cells = line[1:].split()
     minute_start = None
     if len(cells) == 6 and all(re.fullmatch(r"\d{1,4}", cell, re.ASCII) for cell in cells[:5]):
@@ -331,7 +337,7 @@ def _epoch(line: str, system: str, location: str) -> Instant:
 
 
 def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instant) -> Iterator[Segment]:
-    """The stretches of a satellite without a gap or a manoeuvre. `center` is the middle of the aperture, of TAI."""
+    """Segments of a satellite between gaps and manoeuvres. `center` is the middle of the aperture in TAI."""
     samples = satellite.samples
     steps = sorted(after.time.since(before.time) for before, after in pairwise(samples))
     usual_step = steps[len(steps) // 2] if steps else 0.0
@@ -377,7 +383,10 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
 
 
 def _stated(satellite: _Satellite, stretch: range, time: Instant) -> StatedAccuracy | None:
-    """Accuracy at a time of TAI: the larger of the header's and the standard deviations of the samples around it."""
+    """Accuracy at a time of TAI; None if the file states none.
+
+    It is the accuracy in the header, or the standard deviations of the samples around the time if these are larger.
+    """
     after = bisect_left(satellite.samples, time, stretch.start, stretch.stop, key=lambda sample: sample.time)
     neighbours = {min(max(index, stretch.start), stretch.stop - 1) for index in (after - 1, after)}
     stated = [deviations for index in neighbours if (deviations := satellite.deviations[index]) is not None]

@@ -1,12 +1,14 @@
 """Splines through the fixes of a log: a long path as several polynomials, each over a piece of time.
 
-A spline of order 5 is continuous in position and in four derivatives; only the fifth jumps where pieces meet. Pieces
-are halved where the fit leaves motion: a turn gets short pieces, the straight legs before and after it long pieces.
+A spline of order 5 is continuous in position and in four derivatives; only the fifth derivative jumps between pieces.
+Pieces in which the residual still contains motion are halved. So a turn gets short pieces, and the straight legs
+before and after it get long pieces.
 
-Two rules tell motion from noise. The information criterion counts coefficients against independent fixes, so that
-white noise is not fitted. And the mean product of neighbouring residuals must fall at least by the square of the
-number of coefficients. For motion by finite forces it does: even acceleration that is white noise leaves a residual
-of variance h³ in pieces of length h. Noise of a receiver that wanders (Gauss-Markov) leaves h.
+Two rules separate motion from noise. First, an information criterion weighs the number of coefficients against the
+number of independent fixes, so that white noise is not fitted. Second, the mean product of neighbouring residuals
+must fall at least with the inverse square of the number of coefficients. Motion due to finite forces meets the second
+rule: even if the acceleration is white noise, the residual in pieces of length h has a variance proportional to h³.
+Slowly varying receiver noise (Gauss-Markov) does not meet it: its residual has a variance proportional to h.
 """
 
 from collections.abc import Iterable
@@ -27,9 +29,9 @@ _HALVED_MOTION_FRACTION = 0.5  # pieces with more than this fraction of the larg
 
 
 def basis(times: Floats, edges: Floats) -> Floats:
-    """B-splines of pieces between rising edges (m + 1,) at times (n,), (n, m + `SPLINE_ORDER`).
+    """Values of the B-splines at times (n,), (n, m + `SPLINE_ORDER`), for m pieces between rising edges (m + 1,).
 
-    The first and the last piece go on beyond the edges. Source: the recursion of de Boor (1972) and Cox (1972).
+    The first and the last piece continue beyond the edges. Source: the recursion of de Boor (1972) and Cox (1972).
     """
     pieces = len(edges) - 1
     knots = np.concatenate([np.full(SPLINE_ORDER, edges[0]), edges, np.full(SPLINE_ORDER, edges[-1])])
@@ -50,7 +52,7 @@ def basis(times: Floats, edges: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class SplineFit:
-    """A spline that fits fixes by least squares.
+    """Least-squares fit of a spline to fixes.
 
     Attributes
     ----------
@@ -61,9 +63,9 @@ class SplineFit:
     series : (coefficients, 3)
         Coefficients of the spline. [m]
     residuals : (n, 3)
-        Fixes less the spline. [m]
+        Positions of the fixes minus the spline. [m]
     root : (coefficients, coefficients)
-        Its product with its transpose is the covariance of the coefficients over the variance of white fixes.
+        Matrix whose product with its transpose is the covariance of the coefficients for white fixes of variance 1.
     """
 
     edges: Floats
@@ -74,7 +76,7 @@ class SplineFit:
 
     @classmethod
     def of(cls, times: Floats, positions: Floats, edges: Floats) -> "SplineFit":
-        """Fit fixes (n, 3) [m] at times (n,) [s]."""
+        """Fit a spline with the given edges to fixes (n, 3) [m] at times (n,) [s]."""
         design = basis(times, edges)
         root = np.linalg.inv(np.linalg.cholesky(design.T @ design)).T
         center = positions.mean(axis=0)
@@ -86,11 +88,14 @@ class SplineFit:
 
     @cached_property
     def motion(self) -> Floats:
-        """Product of the residuals of each fix and the next fix, (n - 1,); its mean is 0 for white noise. [m²]"""
+        """Scalar product of each residual and the next residual, (n - 1,). [m²]
+
+        The mean is 0 for white noise, and positive if the residuals contain motion.
+        """
         return np.asarray((self.residuals[1:] * self.residuals[:-1]).sum(axis=1))
 
     def halved(self, times: Floats) -> Floats | None:
-        """Edges after the pieces with the most motion are halved; None if no piece with motion can be halved."""
+        """Edges with the pieces of most residual motion halved; None if no piece with motion can be halved."""
         lengths, middles = np.diff(self.edges), (self.edges[1:] + self.edges[:-1]) / 2
         piece = np.clip(np.searchsorted(self.edges, times, "right") - 1, 0, len(middles) - 1)
         early = np.bincount(piece, times < middles[piece], len(middles))
@@ -102,7 +107,7 @@ class SplineFit:
         return np.sort(np.concatenate([self.edges, middles[motion >= _HALVED_MOTION_FRACTION * motion.max()]]))
 
     def state(self) -> PlatformState:
-        """The path of the spline."""
+        """The spline as a path with a polynomial for each piece."""
         # Powers of the time from the middle of a piece, from SPLINE_ORDER + 1 nodes: exact but for rounding.
         middles, halves = (self.edges[1:] + self.edges[:-1]) / 2, np.diff(self.edges) / 2
         nodes = np.cos(np.pi * (np.arange(SPLINE_ORDER + 1) + 0.5) / (SPLINE_ORDER + 1))
@@ -130,7 +135,10 @@ def _vector(values: Iterable[float]) -> Vector:
 
 
 def _shifted(powers: Floats, by_s: float) -> list[Vector]:
-    """Coefficients about another time: Taylor's series by repeated synthetic division."""
+    """Move the origin of a polynomial from 0 to the time `by_s` [s]; return its coefficients there.
+
+    The Taylor series is computed by repeated synthetic division.
+    """
     shifted = powers.copy()
     for first in range(len(shifted) - 1):
         for power in range(len(shifted) - 2, first - 1, -1):

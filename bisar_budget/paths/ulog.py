@@ -1,13 +1,14 @@
 """Logs of PX4 (ULog, `.ulg`): fixes of the GPS topic, or the global position that the autopilot estimates.
 
-A ULog is messages of a size, a type and a payload: formats of topics (F), names of topics by a number (A), and
-records of them (D). The topics `vehicle_gps_position` and `sensor_gps` have their own UTC, and heights above the
-ellipsoid; `vehicle_global_position` counts from the start of the autopilot, and gets UTC from the GPS topic. Both
-state standard deviations of each fix: `eph` is horizontal, `epv` vertical. Attitude is not read.
+A ULog consists of messages, each with a size, a type and a payload. The types are formats of topics (F), numbers for
+the names of topics (A), and records of topics (D). The topics `vehicle_gps_position` and `sensor_gps` have their own
+UTC, and heights above the ellipsoid. `vehicle_global_position` has times since the start of the autopilot, and gets
+UTC from the GPS topic. Both state standard deviations of each fix: `eph` is horizontal, `epv` vertical. Attitude is
+not read.
 
 Source: PX4 user guide, "ULog File Format"; PX4-Autopilot msg/SensorGps.msg (latitude_deg and so on, before release
-1.14 lat in 1e-7 deg and alt in mm) and msg/versioned/VehicleGlobalPosition.msg. pyulog expands every topic of a file,
-to any size, before it selects topics, and prints damaged messages; so it serves as a reference in tests only.
+1.14 lat in 1e-7 deg and alt in mm) and msg/versioned/VehicleGlobalPosition.msg. The package pyulog is a reference in
+tests only: it expands every topic of a file, to any size, before it selects topics, and prints damaged messages.
 """
 
 import struct
@@ -61,7 +62,10 @@ _MAX_CLOCK_DRIFT_S = 1.0  # by jitter of messages of the receiver; with more, th
 
 
 class _Units(NamedTuple):
-    """Names of the coordinates of a topic, and their factors to degrees and metres. The GPS topics have two sets."""
+    """Names of the coordinates of a topic, and their factors to degrees and metres.
+
+    GPS topics have two versions of these names and factors.
+    """
 
     latitude: str
     longitude: str
@@ -81,7 +85,7 @@ Records = NDArray[np.void]
 
 
 class _Topic(NamedTuple):
-    """A topic: its name, a record for each message, its coordinates, and the instance of the receiver."""
+    """A topic: its name, its records, the names of its coordinates, and the instance of the receiver."""
 
     name: str
     records: Records
@@ -94,20 +98,20 @@ class _Topic(NamedTuple):
         return values
 
     def has(self, field: str) -> bool:
-        """Whether records have a field."""
+        """Whether the records of the topic have a field."""
         return field in (self.records.dtype.names or ())
 
 
 def is_ulog(data: bytes) -> bool:
-    """Whether a file begins like a ULog."""
+    """Whether a file begins with the signature of a ULog."""
     return data.startswith(_MAGIC)
 
 
 def read_ulog(data: bytes, name: str, keys: LogKeys) -> Log:
     """Read the fixes of a flight, as every reader of `LOG_FORMATS` does.
 
-    The topic with more records counts, the GPS topic or the global position. If there are several receivers, the
-    mission file chooses one, and the fixes of its GPS topic count.
+    The fixes come from the GPS topic or from the global position, whichever has more records. If there are several
+    receivers, the mission file chooses one, and the fixes of its GPS topic are used.
     """
     hold_to_scale("utc", keys, name)
     if not is_ulog(data):
@@ -137,7 +141,10 @@ def _count(topic: _Topic) -> int:
 
 
 def _with_fixes(topic: _Topic) -> _Topic:
-    """A topic with its records that have a fix. Records of a GPS topic also need UTC, which is 0 at first."""
+    """Keep only the records of a topic that have a fix.
+
+    Records of a GPS topic also need UTC, which is 0 at first.
+    """
     records = topic.records
     if topic.name in _GPS_TOPICS:
         utc_us = records["time_utc_usec"]
@@ -156,7 +163,10 @@ def _of_gps(gps: _Topic, keys: LogKeys, name: str) -> Log:
 
 
 def _of_global(position: _Topic, gps: _Topic | None, keys: LogKeys, name: str) -> Log:
-    """Log of the autopilot's estimate. Without a GPS topic it has no UTC, and counts seconds since its start."""
+    """Log of the position that the autopilot estimates.
+
+    Without a GPS topic, the log has no UTC, and its times count from the start of the autopilot. [s]
+    """
     time_us = position.records["timestamp"].astype(np.int64)
     if gps is None:
         return _log(
@@ -192,7 +202,7 @@ def _log(
     keys: LogKeys,
     name: str,
 ) -> Log:
-    """The log of a topic."""
+    """Make a log from the records of a topic."""
     units = topic.units
     latitude, longitude = (
         np.radians(topic.column(field) * units.degrees) for field in (units.latitude, units.longitude)
@@ -211,7 +221,7 @@ def _log(
 
 # ---------------------------------------------------------------------- messages
 def _topics(data: bytes, name: str) -> list[_Topic]:
-    """Topics with fixes and their records, a topic for each instance."""
+    """Topics that have positions, with their records; each instance is a separate topic."""
     formats: dict[str, str] = {}
     layouts: dict[str, tuple[np.dtype[np.void], _Units]] = {}
     subscriptions: dict[int, tuple[str, np.dtype[np.void], _Units, int]] = {}
@@ -243,7 +253,7 @@ def _topics(data: bytes, name: str) -> list[_Topic]:
 
 
 def _messages(data: bytes, name: str) -> Iterator[tuple[int, int, bytes]]:
-    """Type, byte and payload of every complete message. The last message may be cut off by a loss of power."""
+    """Type, byte offset and payload of every complete message. A power loss may truncate the last message."""
     offset, end = _HEADER_BYTES, len(data)
     unpack = struct.Struct("<HB").unpack_from
     while offset + 3 <= end:
@@ -260,14 +270,14 @@ def _messages(data: bytes, name: str) -> Iterator[tuple[int, int, bytes]]:
 
 
 def _hold_to_flags(payload: bytes, location: str) -> None:
-    """Refuse a file of a newer kind."""
+    """Refuse a file with flags of a newer version of ULog."""
     incompatible = payload[8:16]
     if incompatible[:1] > bytes([_APPENDED_DATA_FLAG_BITS]) or any(incompatible[1:]):
         raise PathFileError(f"{location}: has flags {incompatible.hex()} of a newer kind of ULog")
 
 
 def _layout(topic: str, fields: str, location: str) -> tuple[np.dtype[np.void], _Units]:
-    """NumPy's type of the fields of a topic that are read, and the coordinates of the topic."""
+    """NumPy type of those fields of a topic that are read, and the coordinates of the topic."""
     types: dict[str, tuple[str, int]] = {}
     offset = 0
     for field in filter(None, fields.split(";")):

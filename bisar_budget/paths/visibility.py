@@ -1,10 +1,11 @@
 """Times at which a satellite is above an elevation at a scene: rise, culmination and set, and times of a squint.
 
-An orbit is sampled each two minutes in the axes of the scene, and interpolated by Lagrange's polynomials through
-eight samples. Their error is centimetres in a low orbit, and less than a metre at the perigee of a transfer orbit.
-All searches then run on arrays. The rate of the elevation is evaluated each half minute, and an extremum of the
-elevation lies where the rate changes its sign. A low orbit makes about half a turn from one extremum to the next.
-Between two extrema the elevation only rises or only falls, so that even the shortest pass is found, and found once.
+An orbit is sampled every two minutes in the axes of the scene, and interpolated by Lagrange polynomials through eight
+samples. Their error is centimetres in a low orbit, and less than a metre at the perigee of a transfer orbit. All
+searches use arrays of these interpolated positions. The rate of the elevation is evaluated every half minute. An
+extremum of the elevation lies where this rate changes sign. A low orbit makes about half a revolution from one
+extremum to the next. Between two extrema the elevation only rises or only falls, so even the shortest pass is found,
+and it is found only once.
 """
 
 import math
@@ -36,7 +37,7 @@ _INTERPOLATION_POWERS = np.arange(_INTERPOLATION_NODES)
 
 
 class OrbitGap(NamedTuple):
-    """A part of a span in which the position of a satellite is unknown, and the reason. [s]"""
+    """Part of a time span in which the position of a satellite is unknown, and the reason. [s]"""
 
     start: float
     stop: float
@@ -44,10 +45,10 @@ class OrbitGap(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """Part of a span in which a satellite is above an elevation, from `start` to `stop`. [s]
+    """Part of a time span in which a satellite is above an elevation, from `start` to `stop`. [s]
 
     `rises` is false if the satellite is already above the elevation when the known orbits begin. `sets` is false if
-    the satellite is still above the elevation when they end.
+    it is still above the elevation when they end.
     """
 
     start: float
@@ -57,7 +58,7 @@ class Stretch(NamedTuple):
 
 
 class _Sampled:
-    """Samples of an orbit in the axes of a scene, every two minutes or slightly less from `start` to `stop`. [s]"""
+    """Samples of an orbit in the axes of a scene, from `start` to `stop`, at most two minutes apart. [s]"""
 
     def __init__(self, orbit: Orbit, axes: SceneAxes, origin: Instant, start: float, stop: float) -> None:
         self.orbit, self.start, self.reason = orbit, start, ""
@@ -74,7 +75,7 @@ class _Sampled:
         self.positions: Floats = axes.places(np.array(positions)) if positions else np.empty((0, 3))
 
     def at(self, times: Floats) -> tuple[Floats, Floats]:
-        """Positions and velocities (n, 3) at times (n,) within the span. [m], [m/s]"""
+        """Positions [m] and velocities [m/s], each (n, 3), at times (n,) within the span."""
         sample_number = (times - self.start) / self.step
         last = len(self.positions) - _INTERPOLATION_NODES
         first = np.clip(sample_number.astype(int) - (_INTERPOLATION_NODES // 2 - 1), 0, last)
@@ -88,10 +89,10 @@ class _Sampled:
 
 @dataclass(frozen=True, eq=False)
 class Watched:
-    """A satellite as seen from the origin of a scene over a span of time, and the parts without an orbit.
+    """A satellite seen from the origin of a scene during a time span, and the parts of the span without an orbit.
 
-    Times are seconds after `origin`. If a file has several element sets, or segments, the nearest counts at each
-    time, as in `orbits_of` a mission.
+    Times are seconds after `origin`. If a file has several element sets or segments, the nearest one is used at each
+    time, as `orbits_of` does for a mission.
     """
 
     origin: Instant
@@ -102,7 +103,10 @@ class Watched:
     def over(
         cls, orbit_at: Callable[[Instant], Orbit], axes: SceneAxes, origin: Instant, duration_s: float
     ) -> "Watched":
-        """Sample the orbits of a span from `origin` on; `orbit_at` raises `PathFileError` if there is no orbit."""
+        """Sample the orbits of a time span that begins at `origin`.
+
+        `orbit_at` returns the orbit at an instant, and raises `PathFileError` if there is none.
+        """
         pieces: list[_Sampled] = []
         gaps: list[OrbitGap] = []
         for start, stop, orbit in _orbits(orbit_at, origin, duration_s):
@@ -122,11 +126,11 @@ class Watched:
         return np.array([piece.start for piece in self.pieces])
 
     def _of(self, times: Floats) -> NDArray[np.intp]:
-        """Number of the piece of each time."""
+        """Index of the piece in which each time lies."""
         return np.maximum(np.searchsorted(self._starts, times, "right") - 1, 0)
 
     def at(self, times: Floats) -> tuple[Floats, Floats]:
-        """Positions and velocities (n, 3) in the scene's axes at times (n,) with an orbit. [m], [m/s]"""
+        """Positions [m] and velocities [m/s], each (n, 3), in scene axes, at times (n,) that have an orbit."""
         position, velocity = np.empty((2, times.size, 3))
         piece_numbers = self._of(times)
         for number in np.unique(piece_numbers).tolist():
@@ -135,22 +139,22 @@ class Watched:
         return position, velocity
 
     def state(self, time: float) -> PlatformState:
-        """Position and velocity at a time."""
+        """Position and velocity at a time as a platform state."""
         (position,), (velocity,) = self.at(np.array([time]))
         return PlatformState(position=tuple(position.tolist()), velocity=tuple(velocity.tolist()))
 
     def orbit(self, time: float) -> Orbit:
-        """The orbit that is flown at a time."""
+        """Orbit that is used at a time."""
         return self.pieces[int(self._of(np.array([time]))[0])].orbit
 
     def sine_of_elevation(self, times: Floats) -> Floats:
-        """Sine of the elevation (n,)."""
+        """Sine of the elevation (n,) at times (n,)."""
         position, _ = self.at(times)
         sine: Floats = position[:, 2] / np.linalg.norm(position, axis=1)
         return sine
 
     def _rate(self, times: Floats) -> Floats:
-        """Rate of the sine of the elevation (n,), times the slant range. [m/s]"""
+        """Rate of the sine of the elevation (n,) at times (n,), multiplied by the slant range. [m/s]"""
         position, velocity = self.at(times)
         square = np.sum(position**2, axis=1)
         rate: Floats = velocity[:, 2] - position[:, 2] * np.sum(position * velocity, axis=1) / square
@@ -196,13 +200,16 @@ class Watched:
         return float(times[self.sine_of_elevation(times).argmax()])
 
     def with_squint(self, stretch: Stretch, squint: float) -> float | None:
-        """Time within a stretch with a squint [rad], the time with the highest elevation if there are several. [s]"""
+        """Time within a stretch at which the squint has a given value [rad]; None if there is no such time. [s]
+
+        If there are several such times, the time with the highest elevation is returned.
+        """
         squint_times = _roots(lambda at: self.squint(at) - squint, _times(stretch.start, stretch.stop))
         return float(squint_times[self.sine_of_elevation(squint_times).argmax()]) if squint_times.size else None
 
 
 def shared(of_transmitter: Sequence[Stretch], of_receiver: Sequence[Stretch]) -> list[Stretch]:
-    """Overlaps of two lists of stretches."""
+    """Time spans in which both satellites are above the elevation: the overlaps of two lists of stretches."""
     overlaps = []
     for transmitter, receiver in product(of_transmitter, of_receiver):
         first = transmitter if transmitter.start >= receiver.start else receiver
@@ -213,14 +220,17 @@ def shared(of_transmitter: Sequence[Stretch], of_receiver: Sequence[Stretch]) ->
 
 
 def _times(start: float, stop: float) -> Floats:
-    """Times from a beginning to an end, half a minute apart or closer."""
+    """Equally spaced times from `start` to `stop`, at most half a minute apart. [s]"""
     steps = max(math.ceil(_FINE_RATIO * (stop - start) / SAMPLE_STEP_S), _INTERPOLATION_NODES)
     times: Floats = np.linspace(start, stop, steps + 1)
     return times
 
 
 def _roots(function: Callable[[Floats], Floats], times: Floats) -> Floats:
-    """Times at which a function changes its sign, which it does at most once between two neighbours of `times`."""
+    """Times at which a function changes sign.
+
+    The function is assumed to change sign at most once between two neighbours in `times`.
+    """
     values = function(times)
     is_above = values > 0
     brackets = np.flatnonzero(is_above[1:] != is_above[:-1])
@@ -236,10 +246,10 @@ def _roots(function: Callable[[Floats], Floats], times: Floats) -> Floats:
 def _orbits(
     orbit_at: Callable[[Instant], Orbit], origin: Instant, duration_s: float
 ) -> Iterator[tuple[float, float, Orbit | PathFileError]]:
-    """Beginning and end of each part of a span, with its orbit or with the reason for its absence. [s]
+    """Parts of a time span: start and end of each part [s], and its orbit or the reason why there is none.
 
-    The nearest element set counts, or the segment that reaches farthest around a time. So each element set, and each
-    segment, has one part of the span.
+    At each time the nearest element set is used, or the segment that reaches farthest around the time. So each
+    element set, and each segment, has one part of the span.
     """
     orbits: dict[float, Orbit | PathFileError] = {}
 
@@ -252,7 +262,7 @@ def _orbits(
         return orbits[time]
 
     def search(start: float, stop: float) -> None:
-        """Find all changes of the orbit between two times."""
+        """Find all changes of the orbit between two times, and record them in `orbits`."""
         orbit, next_orbit = at(start), at(stop)
         if stop - start <= _CHANGE_ERROR_S or (_are_same_orbit(orbit, next_orbit) and not _is_gap(orbit)):
             return
@@ -280,14 +290,14 @@ def _is_gap(orbit: Orbit | PathFileError) -> bool:
 
 
 def _are_same_orbit(orbit: Orbit | PathFileError, next_orbit: Orbit | PathFileError) -> bool:
-    """Whether two orbits have the same epoch and span, or both are absent."""
+    """Whether two orbits have the same epoch and span, or both are missing."""
     if isinstance(orbit, PathFileError) or isinstance(next_orbit, PathFileError):
         return _is_gap(orbit) and _is_gap(next_orbit)
     return (orbit.epoch, orbit.span) == (next_orbit.epoch, next_orbit.span)
 
 
 def _changes(orbit: Orbit | PathFileError, next_orbit: Orbit | PathFileError, origin: Instant) -> list[float]:
-    """Times at which an orbit is likely to follow another: ends of spans, and the middle of two epochs. [s]"""
+    """Times at which one orbit is likely to replace another: ends of spans, and the middle between two epochs. [s]"""
     ends: list[Instant] = []
     for candidate in (orbit, next_orbit):
         if isinstance(candidate, PathFileError):

@@ -1,4 +1,4 @@
-"""Every sentence of a row, a mission or a verdict: a table of templates, and functions for sentences with cases.
+"""All sentences for rows, missions and verdicts: a table of templates, and functions for sentences with variants.
 
 `note(code, **quantities)` fills the template of a code. Quantities are in SI and radians, or ids and names.
 """
@@ -132,7 +132,7 @@ CODES: dict[str, str] = TEMPLATES | COMPOSED  # template, or docstring of the fu
 
 
 def note(code: str, /, **quantities: object) -> Note:
-    """Fill the template of a code with its quantities.
+    """Fill the template of a code with the given quantities, and return the sentence as a note.
 
     Raises
     ------

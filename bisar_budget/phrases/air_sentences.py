@@ -42,7 +42,7 @@ def _add_correlation_time(keys: Sequence[str]) -> str:
 def air_stays(
     aperture_time: float, correlation_time: float, key: str, size: float, use: float, keys: Sequence[str]
 ) -> str:
-    """Said of a requirement that rests on delays of the air that stay in a long aperture. [s, s, rad or m or dB]"""
+    """Sentence for a requirement that depends on constant delays in a long aperture. [s, s, rad or m or dB]"""
     does, unit = _AIR_MAKES[key]
     shown = level_words(size) if unit == "dB" else size_words(size, unit)
     return (
@@ -55,7 +55,7 @@ def air_stays(
 def air_stays_untaken(
     aperture_time: float, correlation_time: float, kind: str, size: float, keys: Sequence[str], lines: Sequence[str]
 ) -> str:
-    """Said of a delay that stays in a long aperture, where no requirement takes what it would do. [s, s, rad]"""
+    """Sentence for a constant delay in a long aperture, whose change no requirement would limit. [s, s, rad]"""
     added = " or ".join(f"`{line}`" for line in lines)
     return (
         f"{_air_that_stays(aperture_time, correlation_time)} have {effect_words(kind, size)}, which no requirement "
@@ -65,7 +65,7 @@ def air_stays_untaken(
 
 @composed
 def below_the_ionosphere(platform: str) -> str:
-    """Said of the electron content on a leg that lies within the air."""
+    """Sentence for the electron content on a leg whose platform flies below the ionosphere."""
     if platform == "mission":
         return "both platforms fly below the ionosphere: no electrons on their legs"
     return f"the {platform} flies below the ionosphere: no electrons on its leg"
@@ -73,7 +73,7 @@ def below_the_ionosphere(platform: str) -> str:
 
 @composed
 def runs_along_the_ground(platform: str) -> str:
-    """Said of the delay on a leg that is seen too low, and of which nothing may be stated."""
+    """Sentence for a leg at too low an elevation, where the zenith delay does not give the delay on the leg."""
     if platform == "mission":
         return "both legs run along the ground: the delay at the zenith does not give theirs"
     return f"the leg of the {platform} runs along the ground: the delay at the zenith does not give its delay"

@@ -21,9 +21,10 @@ _SCENE_AXES = {"x": "east", "y": "north", "z": "up"}
 
 @dataclass(frozen=True)
 class StatedError:
-    """An error that the source of a path states, beside the declared one: sizes along `axes`, in a unit.
+    """An error that the source of a path states, together with the error that the file declares.
 
-    `words` name the source, `key` is where the file would declare it. Without `axes` both are root-sum-squares.
+    Both are given as sizes along `axes`, in `unit`. Without `axes` both are root-sum-squares. `words` name the
+    source, and `key` is the key under which the file would declare the error.
     """
 
     words: str
@@ -37,14 +38,14 @@ class StatedError:
 
     @property
     def declared_words(self) -> str:
-        """The declared error in a sentence."""
+        """Text for the declared error."""
         if not self.is_declared:
             return f"no {self.kind} error is declared"
         return f"{_sizes(self.declared, self.unit)} is declared"
 
 
 def _sizes(sizes: Sequence[float], unit: str) -> str:
-    """One size where all are alike, else each."""
+    """Text for several sizes: a single size if all are alike, otherwise each size."""
     words = [size_words(size, unit) for size in sizes]
     return words[0] if len(set(words)) == 1 else ", ".join(words)
 
@@ -55,14 +56,14 @@ def _axes(names: Sequence[str]) -> str:
 
 @composed
 def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -> str:
-    """Said of a position error that is less than the doubt of the platform's path. [m]"""
+    """Sentence for a declared position error that is smaller than the possible error of the platform's path. [m]"""
     stated = "no position error is declared" if declared is None else f"{size_words(declared, 'm')} is declared"
     return f"the path may be {size_words(doubt, 'm')} off ({words}), but {stated}: declare the error in {key}"
 
 
 @composed
 def input_states_more(error: StatedError) -> str:
-    """Said of a declared error that is less than the one which the source of the path states. [m], [m/s]"""
+    """Sentence for a declared error that is smaller than the error that the path's source states. [m], [m/s]"""
     within = f" ({_axes(error.axes)})" if error.axes else ""
     stated = f"a {error.kind} error of {_sizes(error.stated, error.unit)}{within} is stated"
     return f"{error.words}: {stated}, but {error.declared_words}: declare at least that in {error.key}"
@@ -70,7 +71,7 @@ def input_states_more(error: StatedError) -> str:
 
 @composed
 def log_is_flown_as_it_is(figure: str) -> str:
-    """Said of the rows of a log whose processor flies the fixes."""
+    """Sentence for the rows of a log whose fixes the processor uses without smoothing."""
     if figure == "grid":
         return "the log quantises its fixes: a uniform error, constant over the aperture at worst"
     return "the processor uses the fixes of the log: their residual from the smoothed path adds to the ISLR"
@@ -78,7 +79,7 @@ def log_is_flown_as_it_is(figure: str) -> str:
 
 @composed
 def log_is_coarse(step: float, declared: float | None, axis: str, key: str) -> str:
-    """Said of a log whose fixes are written to a step that is large beside the declared position error. [m]"""
+    """Sentence for a log whose rounding step is large compared with the declared position error. [m]"""
     beside = "no position error is declared"
     if declared is not None:
         beside = f"more than a tenth of the declared {size_words(declared, 'm')}"
@@ -90,7 +91,7 @@ def log_is_coarse(step: float, declared: float | None, axis: str, key: str) -> s
 
 @composed
 def input_usually_has_more(error: StatedError) -> str:
-    """Said of a declared error that is less than a third of the usual one of a log's quality. [m]"""
+    """Sentence for a declared error that is less than a third of the usual error of logs of this quality. [m]"""
     return (
         f"{error.words} usually have an error of {size_words(max(error.stated), error.unit)} on each axis,"
         f" but {error.declared_words}: declare at least a third of the usual error in {error.key}"
@@ -99,7 +100,7 @@ def input_usually_has_more(error: StatedError) -> str:
 
 @composed
 def orbit_errors_are_independent(platform: str, position_m: float, rate: float, velocity: float) -> str:
-    """Said of the position and velocity errors of a platform in free fall. [m, rad/s, m/s]"""
+    """Sentence for independent position and velocity errors of a platform in free fall. [m, rad/s, m/s]"""
     sigma, rest = format_quantity(position_m, "m"), format_quantity(velocity, "m/s")
     return (
         f"the {platform} is in free fall: a position error of {sigma} goes with a velocity error of about "

@@ -1,4 +1,4 @@
-"""Sentences about limits that are exceeded, by either model, and about the rules of a limit."""
+"""Sentences about exceeded limits, by either model, and about the rules behind a limit."""
 
 from bisar_budget.phrases.notes import composed
 from bisar_budget.phrases.templates import in_brackets, over_words, size_words
@@ -45,7 +45,7 @@ _SHOWN_PART_FRACTION = 0.99  # of a phase of equal loss, below which its quadrat
 
 @composed
 def quadratic_phase_over(phase: float, limit: float, equation: str = "", quadratic: float | None = None) -> str:
-    """Said of one error, whose phase of equal loss may be more than its quadratic part. [rad]"""
+    """Sentence for one error over its limit; the equal-loss phase may exceed its quadratic part. [rad]"""
     text = in_brackets(f"QPE {over_words(phase, limit, 'rad')}", equation)
     if quadratic is None or quadratic >= _SHOWN_PART_FRACTION * phase:  # both are infinite where there is no image
         return text
@@ -54,14 +54,14 @@ def quadratic_phase_over(phase: float, limit: float, equation: str = "", quadrat
 
 @composed
 def cubic_phase_over(phase: float, limit: float, equation: str = "") -> str:
-    """Said of one error. [rad]"""
+    """Sentence for one error whose cubic phase exceeds its limit. [rad]"""
     text = in_brackets(f"cubic phase {over_words(phase, limit, 'rad')}", equation)
     return f"{text}; autofocus gain does not apply"
 
 
 @composed
 def location_over(moved: float | None, limit: float, equation: str) -> str:
-    """Said of one error; None: there is no image of it. [m]"""
+    """Sentence for one error that moves the image too far; `moved` is None if the error has no image. [m]"""
     where = "beyond every ground point" if moved is None else f"by {format_quantity(moved, 'm')}"
     return f"moves the image {where}, {format_limit(limit, 'm')} allowed ({equation})"
 
@@ -70,14 +70,14 @@ def location_over(moved: float | None, limit: float, equation: str) -> str:
 def aggregate_over(
     what: str, size: float, limit: float, unit: str, row_id: str, largest: float, extrapolated: str = ""
 ) -> str:
-    """Said of errors together: how large, what is allowed, and which is the largest, with what that rests on."""
+    """Sentence for a sum of errors: size, limit, largest error, and a note on the data behind that error."""
     text = f"{what} {over_words(size, limit, unit)}; largest: {row_id}, {size_words(abs(largest), unit)}"
     return in_brackets(text, extrapolated)
 
 
 @composed
 def other_model_fails(model: str, size: float, limit: float, unit: str, what: str = "", equation: str = "") -> str:
-    """Said of a row, or an aggregate, that the gating model passes."""
+    """Sentence for a row or a sum that the gating model passes but the other model fails."""
     text = f"fails by the {model} model: {what}".rstrip()
     return in_brackets(f"{text} {over_words(size, limit, unit)}", equation)
 
@@ -86,7 +86,7 @@ def other_model_fails(model: str, size: float, limit: float, unit: str, what: st
 def published_model_does_not_hold(
     row_id: str, published: float | None, full: float | None, unit: str, others: int
 ) -> str:
-    """Said of a mission that the published model judges. None: no limit; with how many other errors it fails for."""
+    """Sentence for a mission where the published model does not hold: a row's allowables, None without limit."""
     by_published, by_full = (
         "without limit" if size is None else format_limit(size, unit) for size in (published, full)
     )

@@ -1,4 +1,4 @@
-"""A note: a sentence with its code and the values that it is made of."""
+"""A note: a sentence together with its code and the values in it."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -8,26 +8,26 @@ P = ParamSpec("P")
 
 
 class Note(str):
-    """A sentence as data: `code` names it, `values` are its numbers in SI, ids and names."""
+    """A sentence as data: `code` names the sentence, and `values` are its numbers in SI units, ids and names."""
 
     __slots__ = ("code", "values")
     code: str
     values: tuple[object, ...]
 
     def __new__(cls, text: str, code: str = "", values: tuple[object, ...] = ()) -> "Note":
-        """Attach code and values to a text."""
+        """Create a note from a text, a code and values."""
         note = super().__new__(cls, text)
         note.code, note.values = code, values
         return note
 
     def then(self, *more: str) -> "Note":
-        """Append texts after semicolons. Empty texts are left out; an empty note stays empty."""
+        """Append texts, separated by semicolons. Empty texts are left out, and an empty note stays empty."""
         if not self:
             return self
         return Note("; ".join(filter(None, (self, *more))), self.code, (*self.values, *filter(None, more)))
 
     def includes(self, other: "Note") -> bool:
-        """Whether this note, or one that it appends, has the code and the values of another note."""
+        """Whether this note, or a note appended to it, has the code and the values of another note."""
         is_same = self.code == other.code and self.values[: len(other.values)] == other.values
         return is_same or any(isinstance(value, Note) and value.includes(other) for value in self.values)
 
@@ -37,7 +37,7 @@ COMPOSED: dict[str, str] = {}  # docstring of each function that composes a sent
 
 
 def composed(sentence: Callable[P, str]) -> Callable[P, Note]:
-    """Decorate a function that composes a sentence: it returns a note, whose code is the function's name."""
+    """Decorate a function that composes a sentence, so that it returns a note whose code is the function's name."""
     code = sentence.__name__.replace("_", "-")
     COMPOSED[code] = sentence.__doc__ or ""
 

@@ -35,13 +35,13 @@ _NEEDED_DECLARATIONS = {
 
 
 def effect_words(kind: str, size: float) -> str:
-    """Size of an effect that no requirement judges."""
+    """Text for the size of an effect that no requirement judges."""
     return _SHOWN_EFFECTS[kind].format(f"{size:.3g}")
 
 
 @composed
 def confidence(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> str:
-    """Said of a mission whose requirements are met, behind `met`."""
+    """Text after `met` for a mission whose requirements are met: sigma, stated bounds, coverage factor."""
     covered = f"with coverage factor {coverage_factor:g}"
     if not has_sigma:
         if not has_bounds:
@@ -53,7 +53,7 @@ def confidence(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> 
 
 @composed
 def effect_is_not_judged(kind: str, size: float, total: float, lines: Sequence[str]) -> str:
-    """Said of a row with an effect that no requirement takes."""
+    """Sentence for a row with an effect that no requirement limits."""
     alone = f", {total:.3g} rad with the others" if total > 1.005 * size else ""
     added = " or ".join(f"`{line}`" for line in lines)
     return f"{effect_words(kind, size)}{alone}, which no requirement judges: add {added} to requirements"
@@ -61,7 +61,7 @@ def effect_is_not_judged(kind: str, size: float, total: float, lines: Sequence[s
 
 @composed
 def effect_is_negligible(kind: str, total: float, keys: Sequence[str]) -> str:
-    """Said of a mission with a small effect that no requirement takes."""
+    """Sentence for a mission with a negligible effect that no requirement limits."""
     return (
         f"negligible: {effect_words(kind, total)} in all, which no requirement judges ({' or '.join(keys)} would): "
         "below a tenth of the quadratic requirement and below 0.08 rad"
@@ -76,7 +76,7 @@ def nothing_judges(key: str) -> str:
 
 @composed
 def not_declared_as_required(key: str, lacks: str = "") -> str:
-    """Said of an error that the file should declare; `lacks` is what half of it needs to have an effect."""
+    """Sentence for a required error that is not declared; `lacks` names the missing key if half is declared."""
     if lacks:
         return f"requirements.declare asks for {key}, which is declared in part: the file has no {lacks}"
     return f"the file has no {key}, which requirements.declare asks for"
@@ -84,7 +84,7 @@ def not_declared_as_required(key: str, lacks: str = "") -> str:
 
 @composed
 def declarations_are_missing(keys: Sequence[str]) -> str:
-    """Said of all errors that the file should declare."""
+    """Sentence for all required errors that the file does not declare."""
     *others, last = keys
     said = f"{', no '.join(others)} and no {last}" if others else last
     return f"the file has no {said}, which requirements.declare asks for"
@@ -92,6 +92,6 @@ def declarations_are_missing(keys: Sequence[str]) -> str:
 
 @composed
 def waived(line: int | None, until: date, reason: str, is_expired: bool, waiver_id: str) -> str:
-    """Said of a row, or a requirement, that fails."""
+    """Sentence for a failed row or requirement that a waiver names: its line, last day and reason."""
     place = "--set" if line is None else f"line {line}"
     return f"{'expired ' if is_expired else ''}waiver of {place} ({waiver_id}), until {until}: {reason}"

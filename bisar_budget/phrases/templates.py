@@ -38,29 +38,29 @@ def _items(value: object) -> list[str]:
 
 
 def size_words(size: float, unit: str) -> str:
-    """A magnitude: metres with a prefix, phases in radians without, to be compared with π/4."""
+    """Text for a magnitude: metres with a prefix, phases in radians without a prefix, to be compared with π/4."""
     if not math.isfinite(size):
         return "without a value (no ground point has this range history)"
     return format_quantity(size, unit) if unit == "m" else f"{abs(size):.3g} {unit}"
 
 
 def over_words(size: float, limit: float, unit: str) -> str:
-    """A magnitude with its limit: `1.2 rad, 0.785 rad allowed`."""
+    """Text for a magnitude and its limit, for example `1.2 rad, 0.785 rad allowed`."""
     return f"{size_words(size, unit)}, {format_limit(limit, unit)} allowed"
 
 
 def level_words(level_db: float, rounding: str = "nearest") -> str:
-    """A level with three digits. [dB]"""
+    """Text for a level with three digits. [dB]"""
     return format_quantity(level_db, "dB", 3, rounding)
 
 
 def cycles_words(cycles: float) -> str:
-    """A number of cycles that is below a limit: three digits, rounded down, so that they do not reach it."""
+    """Text for a number of cycles below a limit: three digits, rounded down so that it stays below the limit."""
     return format_quantity(cycles, "", 3, "down")
 
 
 def in_brackets(text: str, remark: str) -> str:
-    """A text with a remark in brackets; without brackets if the remark is empty."""
+    """Append a remark in brackets to a text; without brackets if the remark is empty."""
     return f"{text} ({remark})" if remark else text
 
 
@@ -104,10 +104,10 @@ _QUANTITY_FORMATS: Mapping[str, Callable[[object, str], str]] = {
 
 
 class _Filler(string.Formatter):
-    """Fill the fields of a template; a missing field raises `KeyError`."""
+    """Fills the fields of a template. A field without a value raises `KeyError`."""
 
     def format_field(self, value: object, format_spec: str) -> str:
-        """One quantity in its format."""
+        """Text for one quantity in its format."""
         kind, _, options = format_spec.partition(" ")
         if kind in _QUANTITY_FORMATS:
             return _QUANTITY_FORMATS[kind](value, options)

@@ -46,7 +46,7 @@ def _in_the_worst_phase(quadratic: float, limit: float, cubic: float, cubic_limi
 
 @composed
 def share_of_power_over(metric: str, rule: str) -> str:
-    """Said of a vibration."""
+    """Sentence for a vibration whose echoes or spread power exceed the platform's share of PSLR or ISLR."""
     what = "paired echoes" if metric == "pslr" else "power spread"
     return f"{what} above the platform's share of {metric.upper()} ({rule})"
 
@@ -64,7 +64,7 @@ def slower_than_three_cycles(
 
 @composed
 def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: bool, required_db: float) -> str:
-    """Said of lines of both platforms whose echoes add."""
+    """Sentence for lines of both platforms with close frequencies, whose echoes add."""
     return (
         f"the {other} vibrates at most {apart:g} cycles per aperture from this frequency too: in the worst phases "
         f"echoes of both together are {'above ' if is_more else ''}{level_db:.1f} dB, {required_db:g} dB required"
@@ -73,34 +73,34 @@ def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: b
 
 @composed
 def published_rule_is_off(margin_db: float) -> str:
-    """Said of a limit of a vibration."""
+    """Sentence for the difference between the published limit of a vibration and first principles. [dB]"""
     comparison = "stricter" if margin_db >= 0 else "more lenient"
     return f"the published rule is {abs(margin_db):.2f} dB {comparison} than first principles"
 
 
 @composed
 def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
-    """Said of a vibration that the line of sight sees a part of. [m]"""
+    """Sentence for a vibration of which only a part acts along the line of sight. [m]"""
     where = "in the range less the direct path" if has_direct_path else "along the line of sight"
     return f"{stated}: {format_quantity(along, 'm')} of it {where}"
 
 
 @composed
 def does_as_much_as_along_the_sight(stated: str, along: float, has_direct_path: bool) -> str:
-    """Said of a slow vibration of which the line of sight sees a part, that turns. [m]"""
+    """Sentence for a slow vibration along several axes: the equivalent amplitude along the line of sight. [m]"""
     where = "in the range less the direct path" if has_direct_path else "along the line of sight"
     return f"{stated}: in the worst phase equivalent to {format_quantity(along, 'm')} {where}"
 
 
 @composed
 def spectrum_shakes(rms: float, level_db: float) -> str:
-    """Said of the spectrum of a vibration. [m]"""
+    """Sentence for the vibration spectrum of a platform: its rms along the line of sight [m], and its shift [dB]."""
     shift = f", shifted by {level_db:g} dB" if level_db else ""
     return f"{format_quantity(rms, 'm')} rms along the line of sight{shift}, slow parts included"
 
 
 @composed
 def oscillator_does_not_vibrate(turns: bool) -> str:
-    """Said of an oscillator whose platform has no vibration that can be converted."""
+    """Sentence for an oscillator on a platform for which the file states no sinusoidal vibration and no spectrum."""
     used = "counts for the turn only" if turns else "has nothing to act on"
     return f"no sinusoidal vibration and no spectrum is stated: the acceleration sensitivity {used}"

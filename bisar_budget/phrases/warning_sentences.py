@@ -50,7 +50,7 @@ WARNING_SENTENCES: dict[str, str] = {
 
 @composed
 def fit_changes_allowables(platform: str, acceleration: float, change: float, row_id: str) -> str:
-    """Said of a log whose noise is an error of the path's acceleration. [m/s²]"""
+    """Sentence for a log whose noise makes the acceleration of the path uncertain. [m/s²]"""
     size = format_quantity(acceleration, "m/s^2")
     by = f"by up to {100 * change:.2g} %" if change < 1 else "by a factor of two and more"
     return (
@@ -62,7 +62,7 @@ def fit_changes_allowables(platform: str, acceleration: float, change: float, ro
 
 @composed
 def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence[float], has_axes: bool) -> str:
-    """Said of a satellite's path without the acceleration of its orbit. [m/s, m/s²]"""
+    """Sentence for a path with the speed of a satellite but without the acceleration of an orbit. [m/s, m/s²]"""
     components = ", ".join(f"{component + 0.0:.3f} m/s^2" for component in acceleration)
     if has_axes:
         how = "(gravity of a flattened Earth, less what its rotation adds)"

@@ -1,30 +1,35 @@
-"""Effects of errors of any size by exact ranges, in many cases at once: no expansion.
+"""Effects of motion and clock errors of any size, computed from exact ranges without a series expansion.
+
+A case is one collection. All functions take many cases at once.
 
 The data hold the ranges of the true path; the processor subtracts the ranges of the measured path. For a ground point
 x the range error ρ(τ; x) is the recorded range less the expected range. The phase over band and aperture is 2πfρ/c.
-To second order in that phase the image peaks where the phase has the least variance, a constant phase being free:
+To second order in that phase the image peaks where the variance of the phase is smallest. A constant phase does not
+count. So the image point minimises
 
     V(x) = Var_τ(ρ) + b²⟨ρ²⟩,    b² = B²/(12 f₀²),
 
-for a band of width B, evenly filled, about f₀; ⟨ ⟩ is the mean over the aperture. With the product that belongs to V,
-⟨a, c⟩ = (1 + b²)⟨ac⟩ − ⟨a⟩⟨c⟩, the point obeys ⟨∂ρ/∂x, ρ⟩ = 0. Where b is much larger than the square of the turn of
-the line of sight, ρ then has no part along the Legendre polynomials P₀ and P₁ of the aperture. A narrow band or a
-wide turn leaves a part of both.
+for an evenly filled band of width B about f₀. ⟨ ⟩ is the mean over the aperture. The scalar product of V is
+⟨a, c⟩ = (1 + b²)⟨ac⟩ − ⟨a⟩⟨c⟩, so that V = ⟨ρ, ρ⟩. The image point satisfies ⟨∂ρ/∂x, ρ⟩ = 0. H is the matrix
+⟨g, gᵀ⟩ of the gradient g = ∂ρ/∂x (see `image_plane`). If b is much larger than the square of the angle by which the
+line of sight turns, ρ at the image point has no part along the Legendre polynomials P₀ and P₁ of the aperture. With a
+narrow band or a wide turn, parts along both polynomials remain.
 
-Fitted over the aperture at the nodes of Gauss-Legendre quadrature, the P₂ and P₃ parts of ρ at that point are the
-quadratic and the cubic phase, and the rest beyond P₃ spreads. The hidden phase holds the part of V that is neither
-quadratic, nor cubic, nor rest, which band and turn do not resolve: it is the quadratic phase with the same loss of
-the peak.
+Legendre polynomials are fitted to ρ at the image point, at the nodes of Gauss-Legendre quadrature over the aperture.
+The P₂ and P₃ parts are the quadratic and the cubic phase. The rest beyond P₃ spreads energy over the image. V also
+has a part that is not quadratic, cubic or rest, because the band and the turn of the line of sight do not resolve it.
+The hidden phase is the quadratic phase that lowers the peak as much as this part of V.
 
-For errors so small that their effects are proportional to them, `effect` gives the same. Derived here. Images by
-direct sums check it in `tests/theory/test_image_point.py`.
+For errors so small that their effects are proportional to them, `ExactRanges.effect` gives the same results. The
+method is derived here. `tests/theory/test_image_point.py` checks it against images formed by direct sums.
 
-A receiver that hears the transmitter takes the direct path as its clock. The data then hold R_t + R_r less the actual
-distance of the platforms, and the processor subtracts ranges less the measured distance. No ground point changes that
-distance, so it counts like a clock error, c·t̃ = |r̂_t − r̂_r| − |r_t − r_r|, and no other clock error counts.
+A receiver that hears the transmitter takes the direct path as its clock. The data then hold R_t + R_r minus the
+actual distance between the platforms. The processor subtracts the measured ranges minus the measured distance. The
+distance is the same for all ground points, so its error has the effect of a clock error, c·t̃ = |r̂_t − r̂_r| − |r_t
+− r_r|. No other clock error has an effect in that case.
 
-Samples over the aperture are (nodes, cases). Effects of errors are (nodes, lanes): a lane is one error of one case. A
-single case serves any number of lanes.
+Arrays of samples over the aperture have the shape (nodes, cases). Arrays for errors have the shape (nodes, lanes). A
+lane is one error of one case. If there is a single case, it is the case of all lanes.
 """
 
 import math
@@ -58,29 +63,30 @@ NO_SHIFTS = [np.zeros((1, 1))] * 3  # shifts of a platform that no error moves
 
 @dataclass(frozen=True)
 class PointSettings:
-    """Tunings of the search for the image point.
+    """Numerical settings of the search for the image point.
 
     Attributes
     ----------
     end_rad : float
-        Hidden phase from which a folded path has ended: no ground point has the range history. [rad]
+        Hidden phase above which a folded path ends: no ground point has the recorded range history. [rad]
     folded_fraction : float
-        Area that the gradients of V span, as a fraction of their area at the centre. A path with a smaller area is
-        near a fold or beyond it.
+        Root of the determinant of H at a point (the area that the gradient g spans), as a fraction of its value at
+        the scene centre. A path on which the fraction is smaller is near a fold or beyond it.
     near_fold_fraction : float
-        The same for a path on which the area changes much in a small step, and a peak may fade into another.
+        The same fraction, below which the area changes much in a small step and one peak may fade into another.
     last_step_rad : float
-        Largest change of a phase by the last step, beyond the part that is counted linearly. [rad]
+        Largest change of a phase by the last step, not counting the part that is linear in the step. [rad]
     last_step_near_fold_fraction : float
         Square of the last step near a fold, as a fraction of its square elsewhere.
     nearest_fraction : float
-        Distance between a platform and a point, as a fraction of the nearest range. At a smaller distance rounding
-        decides the line of sight.
+        Smallest accepted distance between a platform and a point, as a fraction of the nearest range. At a smaller
+        distance the line of sight is only rounding.
     shrinking_ratio : float
-        Square of a step of Newton's method over the square of the step before. A larger ratio does not converge.
+        Largest accepted ratio of the square of a Newton step to the square of the step before. If the ratio is
+        larger, the iteration does not converge.
     bowl_fraction : float
-        Determinant of the second derivative of V, as a fraction of the determinant of H. Where V bends less, a step
-        uses H alone.
+        Determinant of half the second derivative of V, as a fraction of the determinant of H. If the fraction is
+        smaller, a step uses H instead of the second derivative.
     damping_fraction : float
         Damping of the first step of a descent, as a fraction of the trace of H at the centre.
     damping_ratio : float
@@ -88,9 +94,10 @@ class PointSettings:
     max_newton_iterations, max_descent_steps : int
         Largest number of steps of both searches.
     course_steps : tuple of int
-        Numbers of steps in which `followed` increases an error. The second number is for points that the first loses.
+        Numbers of steps in which `followed` increases an error to its full size. The second number is used for points
+        that are lost with the first.
     samples_at_once : int
-        Number of samples of lanes whose arrays stay in a cache.
+        Number of samples (nodes times lanes) that one block processes, so that its arrays fit into a cache.
     """
 
     end_rad: float = math.pi
@@ -116,15 +123,16 @@ _MEASURED_ARRAY_COUNT, _ARRAY_COUNT = 5, 11
 
 
 def aperture_nodes(aperture_time_s: float) -> Floats:
-    """Slow times of the nodes of an aperture for courses that are not smooth, (FINE_NODE_COUNT,). [s]"""
+    """Slow times of the nodes for error histories that are not smooth over the aperture, (FINE_NODE_COUNT,). [s]"""
     return nodes(FINE_NODE_COUNT).places * (aperture_time_s / 2)
 
 
 class Effect(NamedTuple):
-    """Effect of one unit of an error by the published model, signed like the range error; numbers, or arrays.
+    """Effect of one unit of an error by the published model, signed like the range error.
 
-    Constant [m/unit] and linear [(m/s)/unit] term of the range error at the aperture midpoint; quadratic and cubic
-    phase at the aperture edge. [rad/unit]
+    Fields are numbers for one case or arrays for many. `constant` [m/unit] and `linear` [(m/s)/unit] are terms of the
+    range error at the aperture midpoint. `qpe` and `cubic` are the quadratic and the cubic phase at the aperture
+    edge. [rad/unit]
     """
 
     constant: PerCase
@@ -134,10 +142,11 @@ class Effect(NamedTuple):
 
 
 class FullEffect(NamedTuple):
-    """Effect of one unit of a small error by the full model; numbers, or arrays of cases.
+    """Effect of one unit of a small error by the full model.
 
-    Displacement east and north [m/unit]; quadratic and cubic phase at the aperture edge, signed like the range error
-    that is left at the displaced point. [rad/unit]
+    Fields are numbers for one case or arrays of cases. `east` and `north` are the displacement. [m/unit] `qpe` and
+    `cubic` are the quadratic and the cubic phase at the aperture edge [rad/unit], signed like the range error that
+    remains at the displaced point.
     """
 
     east: PerCase
@@ -148,10 +157,10 @@ class FullEffect(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeTags:
-    """Lanes that are time tags: each takes a platform's path at a later time, p(τ + δt) − p(τ).
+    """Errors of time tags among the lanes: a tag error δt shifts a platform by p(τ + δt) − p(τ) along its path.
 
-    `paths` are the paths of both platforms, `times` the nodes of the cases (nodes, cases) [s]. `case` (lanes,) is the
-    case whose path each lane takes, -1 for a lane that is no time tag.
+    `paths` are the paths of transmitter and receiver. `times` are the slow times of the nodes, (nodes, cases). [s]
+    `case` (lanes,) is the case of each lane, or -1 for a lane that is not a time tag.
     """
 
     paths: tuple[PlatformState, PlatformState]
@@ -159,12 +168,16 @@ class TimeTags:
     case: Indices
 
     def of(self, lanes: Indices) -> "TimeTags | None":
-        """Some of the lanes; None if no lane of them is a time tag."""
+        """Select lanes by index; None if none of the selected lanes is a time tag."""
         case = self.case.take(lanes)
         return replace(self, case=case) if (case >= 0).any() else None
 
     def put(self, platform: int, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> list[Any]:
-        """Insert a platform's shift by time tags (nodes, lanes) [m], or its rate per second, into other motions."""
+        """Return the shifts `along` of one platform, with those of the time-tag lanes replaced.
+
+        Returns three arrays (nodes, lanes), one per axis. A time-tag lane gets the shift by its tag error `tag_s`
+        [m], or, if `is_rate`, the change of the shift per second of tag error. [m/s]
+        """
         tagged = np.flatnonzero(self.case >= 0)
         (times,), tag_s = _take_cases([self.times], self.case[tagged]), tag_s[:, tagged]
         path = self.paths[platform].of(self.case[tagged])
@@ -177,19 +190,21 @@ class TimeTags:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lanes:
-    """Units of errors, one per lane: a position error of platforms along a direction, or a range error by a clock.
+    """Unit errors, one per lane: a position error of one or both platforms, a clock error, or a time-tag error.
 
     Attributes
     ----------
     case : (lanes,)
         The case of each error.
     at_nodes : (nodes, lanes)
-        Position error, or for a clock the range error [m/unit], or for a time tag its sign.
+        Size of a unit error at the nodes: position error [m/unit]; range error for a clock [m/unit]; the sign of the
+        error for a time tag.
     moves : (2, lanes)
-        1 where the transmitter, or the receiver, moves, else 0.
+        1 if the error moves the transmitter (first row) or the receiver (second row), else 0.
     directions : (2, 3, nodes, lanes)
-        Directions in which a unit of each error moves transmitter and receiver; zero for a platform that does not
-        move. For a small time tag the velocity. [m/s] One node if no direction turns, one lane if all lanes share it.
+        Directions in which a unit of each error moves transmitter and receiver; zero for a platform that the error
+        does not move. For a small time-tag error, the velocity. [m/s] The node axis has length 1 if no direction
+        turns; the lane axis has length 1 if all lanes share the directions.
     order : (lanes,)
         Power of slow time with which a position error grows; -1 for a clock. An error of velocity turns Doppler.
     tags : TimeTags, optional
@@ -205,38 +220,41 @@ class Lanes:
 
     @property
     def turns(self) -> bool:
-        """Whether any direction turns within the aperture."""
+        """Whether the direction of any error changes within the aperture."""
         return bool(self.directions.shape[2] > 1)
 
     @property
     def platforms(self) -> list[int]:
-        """Platforms that any of the lanes moves."""
+        """Indices of the platforms that at least one lane moves: 0 for the transmitter, 1 for the receiver."""
         return [platform for platform in (0, 1) if self.moves[platform].any()]
 
     def of(self, lanes: Indices) -> "Lanes":
-        """Some of the lanes."""
+        """Select lanes by index."""
         moves, directions, order = _take([self.moves, self.directions, self.order], lanes)
         tags, at_nodes = self.tags and self.tags.of(lanes), self.at_nodes.take(lanes, axis=1)
         return Lanes(self.case.take(lanes), at_nodes, moves, directions, order, tags)
 
     def there(self, case: Indices) -> "Lanes":
-        """The lanes, one per case, for a new choice of cases: errors of `ExactRanges.at`."""
+        """Return the errors for the cases that `ExactRanges.at` selects by `case`; the lanes are one per case."""
         return replace(self.of(case), case=np.arange(case.size))
 
     def shifts(self, size: Any) -> Floats:
-        """Shift of each platform at the nodes by errors of given sizes, (2, 3, nodes, lanes). [m]"""
+        """Shifts of both platforms at the nodes by errors of the given sizes, (2, 3, nodes, lanes). [m]"""
         course = self.at_nodes * size
         shifts: Floats = self.directions * course
         return shifts if self.tags is None else self._tagged(self.tags, course, shifts)
 
     def ways(self, size: Any) -> Floats:
-        """Directions in which larger errors move transmitter and receiver; for time tags they turn with the paths."""
+        """Directions in which both platforms move as errors of the given sizes grow, shaped like `directions`.
+
+        The directions of time tags are the velocities at the shifted times, (2, 3, nodes, lanes).
+        """
         if self.tags is None:
             return self.directions
         return self._tagged(self.tags, self.at_nodes * size, self.directions, is_rate=True)
 
     def _tagged(self, tags: TimeTags, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> Floats:
-        """Shifts or directions of both platforms, with those of the time tags in their place."""
+        """Replace the shifts or directions of both platforms in the time-tag lanes."""
         both = np.array([tags.put(platform, tag_s, along[platform], is_rate=is_rate) for platform in (0, 1)])
         return np.asarray(both * self.moves[:, None, None])
 
@@ -247,12 +265,13 @@ class Lanes:
 
 
 class SmallErrors(NamedTuple):
-    """Small errors that all cases have.
+    """Unit errors, the same list for all cases, small enough for their effects to be proportional to them.
 
-    `courses` of errors over the aperture are (courses, nodes, cases) [m/unit], and `course` is the index of the
-    course of each error, (errors,). `ways` are the shifts by each error, (errors, 7, cases): transmitter east, north
-    and up, receiver east, north and up, and the range by the clock. A row that all cases share has one case. For
-    errors that turn, `turning` has these shifts at the nodes, (7, nodes, cases), by the index of the error.
+    `courses` are the distinct histories of errors over the aperture, (courses, nodes, cases). [m/unit] `course`
+    (errors,) is the index of each error's history. `ways` (errors, 7, cases) are the directions of each error:
+    transmitter east, north and up, receiver east, north and up, and the range error by the clock. The axis of cases
+    has length 1 if all cases share the directions. If the direction of an error turns, `turning` maps the index of
+    the error to its shifts at the nodes, (7, nodes, cases).
     """
 
     courses: Floats
@@ -262,7 +281,7 @@ class SmallErrors(NamedTuple):
 
     @classmethod
     def of(cls, errors: Sequence[Lanes]) -> "SmallErrors":
-        """Small errors from lanes, one `Lanes` per error, whose lanes are the cases."""
+        """Combine one `Lanes` per error, each with one lane per case."""
         keys = [int(lanes.order[0]) if lanes.platforms else -index for index, lanes in enumerate(errors, 1)]
         courses = dict(zip(keys, (lanes.at_nodes for lanes in errors), strict=True))
         cases = max((lanes.directions.shape[-1] for lanes in errors), default=1)
@@ -277,17 +296,18 @@ class SmallErrors(NamedTuple):
         return cls(np.array(list(courses.values())), course, ways, turning)
 
     def there(self, case: Indices) -> "SmallErrors":
-        """The same errors for a new choice of cases, like `Lanes.there`."""
+        """Return the same errors for the cases selected by `case`, like `Lanes.there`."""
         courses, ways, *turning = _take_cases([self.courses, self.ways, *self.turning.values()], case)
         return SmallErrors(courses, self.course, ways, dict(zip(self.turning, turning, strict=True)))
 
 
 class ImagePoints(NamedTuple):
-    """Effects of errors by exact ranges; `is_settled` where the search was certain at once.
+    """Image points of lanes and the phases that remain there, by exact ranges, each (lanes,).
 
-    Displacement east, north [m]; quadratic and cubic phase at the aperture edge, signed like β̃; the `hidden` phase,
-    and the rms beyond the cubic. [rad] `turn` is the area that the gradients of V span at the point, over their area
-    at the centre.
+    `is_settled` is True where the search converged. `east` and `north` are the displacement. [m] `quadratic` and
+    `cubic` are the phases at the aperture edge, signed like β̃; `hidden` is the hidden phase, and `rest` the rms
+    phase beyond the cubic. [rad] `turn` is the root of the determinant of H at the point (the area that the gradient
+    g spans), as a fraction of its value at the scene centre.
     """
 
     is_settled: Booleans
@@ -304,8 +324,9 @@ class ImagePoints(NamedTuple):
 class ExactEffect:
     """Effect of one error by exact ranges, in plain numbers.
 
-    Displacement (east, north) [m]; quadratic and cubic phase at the aperture edge, signed like the range error; the
-    phase that band and turn hide, and the rms beyond the cubic. [rad]
+    `displacement` is east and north. [m] `quadratic` and `cubic` are the phases at the aperture edge, signed like the
+    range error. `hidden` is the phase that band and turn of the line of sight do not resolve, and `rest` the rms
+    phase beyond the cubic. [rad]
     """
 
     displacement: GroundVector
@@ -316,37 +337,38 @@ class ExactEffect:
 
     @property
     def equal_loss(self) -> float:
-        """Quadratic phase with the same loss of the peak as quadratic and hidden phase together. [rad]"""
+        """Quadratic phase that lowers the peak as much as quadratic and hidden phase together. [rad]"""
         return math.hypot(self.quadratic, self.hidden)
 
     def moved(self, by: GroundVector) -> GroundVector:
-        """Sum of this displacement and a second displacement."""
+        """Sum of this displacement and the displacement `by`, east and north. [m]"""
         return self.displacement[0] + by[0], self.displacement[1] + by[1]
 
 
 class ExactRanges:
-    """The exact paths of cases (n,) that need the same number of nodes.
+    """Exact ranges from both platforms over the aperture, for n cases that need the same number of nodes.
 
     Parameters
     ----------
     half, k : (n,)
         Half the aperture time [s], and 2π over the wavelength of the band's centre. [rad/m]
     band : (n,)
-        b², the variance of the frequency over the band, over the square of its centre.
+        b²: variance of the frequency over the band, divided by the square of the centre frequency.
     sampling : Sampling
         Slow times at which the paths are sampled, at nodes or anywhere.
     tracks : sequence of Vectors
-        Positions of both platforms at the nodes, relative to the scene centre or the point in its place, (nodes, n).
-        [m]
+        Positions of both platforms at the nodes, relative to the scene centre or to the ground point that replaces
+        it, (nodes, n). [m]
     positions : sequence of Vectors
         The same at the middle of the aperture, (n,). [m]
     has_direct_path : bool
-        Whether the direct path is the clock.
+        Whether the receiver takes the direct path as its clock.
 
     Attributes
     ----------
     gradient : (2, 4, n)
-        Mean, P₁ part at the edge, quadratic and cubic part of the range error that a metre east, and north, adds.
+        Change of the range error per metre east (first) and per metre north (second): mean, P₁ part at the aperture
+        edge, quadratic and cubic part.
     """
 
     def __init__(
@@ -380,7 +402,10 @@ class ExactRanges:
         *,
         has_direct_path: bool = False,
     ) -> "ExactRanges":
-        """Exact ranges of collections, with paths of transmitter and receiver, at their scene centres."""
+        """Exact ranges of collections to their scene centres.
+
+        `paths` are those of transmitter and receiver, and `count` is the number of nodes.
+        """
 
         def of_each(value: PerCase) -> Floats:
             return np.array(np.broadcast_to(np.asarray(value, dtype=float), (cases,)))
@@ -400,7 +425,10 @@ class ExactRanges:
         return cls(half, k, band, sampling, tracks, middles, has_direct_path=has_direct_path)
 
     def at(self, east: Floats, north: Floats, case: Indices) -> "ExactRanges":
-        """Exact ranges of cases at points of the ground, (case,), instead of the centre. [m]"""
+        """Exact ranges to ground points instead of the scene centre, one point for each entry of `case`.
+
+        `east` and `north` are the points, (case,) [m], and `case` the indices of their cases.
+        """
         tracks = [(x - east, y - north, z) for x, y, z in (_take_cases([*track], case) for track in self.tracks)]
         positions = [(x[case] - east, y[case] - north, z[case]) for x, y, z in self.positions]
         half, k, band = self.half[case], self.k[case], self.band[case]
@@ -414,7 +442,10 @@ class ExactRanges:
 
     @cached_property
     def slopes(self) -> Floats:
-        """Decrease of the range at the nodes per metre east, and north, u_t + u_r on the ground, (2, nodes, n)."""
+        """Sum of the lines of sight on the ground, u_t + u_r, (2, nodes, n).
+
+        It is the decrease of the range sum if the point moves a metre east (first row) or north (second row).
+        """
         (p, q), (R, S) = self.tracks, self.ranges
         return np.array([p[axis] / R + q[axis] / S for axis in (0, 1)])
 
@@ -426,12 +457,15 @@ class ExactRanges:
 
     @cached_property
     def sine(self) -> Floats:
-        """Sine of the angle between the directions that band and turn resolve at the centre."""
+        """Sine of the angle between the directions that band and turn resolve, at the scene centre, (n,).
+
+        See `GroundMatrix.sine`.
+        """
         return self.matrix.sine
 
     @cached_property
     def product_weights(self) -> Floats:
-        """Weights of the parts that `Sampling.centred` gives, in a product of V, (nodes + 1, n)."""
+        """Weights of the parts that `Sampling.centred` gives, in the scalar product ⟨a, c⟩ of V, (nodes + 1, n)."""
         return np.concatenate(((1 + self.band) * self.mean, self.band[None]))
 
     @cached_property
@@ -441,7 +475,7 @@ class ExactRanges:
 
     @cached_property
     def is_turned(self) -> Booleans:
-        """Whether a line of sight turns by more than `MAX_TURN_RAD` between two times of the aperture, (n,)."""
+        """Whether a line of sight turns by more than `MAX_TURN_RAD` within the aperture, (n,)."""
         least = np.full(self.half.shape, math.inf)
         if self.fit.shape[1] > FEWEST_PATH_NODES:  # with fewer nodes no line of sight turns that far
             for track, ranges in zip(self.tracks, self.ranges, strict=True):
@@ -453,17 +487,20 @@ class ExactRanges:
 
     @cached_property
     def nearest_node(self) -> Floats:
-        """Least range at the nodes. [m]"""
+        """Smallest range of either platform at the nodes, (n,). [m]"""
         return np.asarray(np.minimum(*(ranges.min(axis=0) for ranges in self.ranges)))
 
     @cached_property
     def nearest(self) -> Floats:
-        """Least range at the nodes, and at the middle of the aperture, which the nodes may leave out. [m]"""
+        """Smallest range of either platform at the nodes and at mid-aperture, (n,). [m]
+
+        Mid-aperture is not always a node.
+        """
         return np.asarray(np.minimum(np.minimum(*map(norm, self.positions)), self.nearest_node))
 
     @cached_property
     def rounding(self) -> Floats:
-        """Smallest phase that a phase history in double precision can hold. [rad]"""
+        """Smallest phase that is distinct from rounding in a phase history in double precision, (n,). [rad]"""
         recorded = (self.ranges[0] + self.ranges[1]).max(axis=0)
         if self.has_direct_path:
             recorded = recorded + self.baselines.max(axis=0)
@@ -477,35 +514,42 @@ class ExactRanges:
 
     @cached_property
     def baselines(self) -> Floats:
-        """Distances of the platforms at the nodes. [m]"""
+        """Distance between the platforms at the nodes. [m]"""
         return np.asarray(norm(self._between))
 
     @cached_property
     def heard_along(self) -> tuple[VectorArrays, VectorArrays]:
-        """Unit vectors along the direct path at the nodes: receiver to transmitter, transmitter to receiver."""
+        """Unit vectors at the nodes: from receiver to transmitter, and from transmitter to receiver."""
         x, y, z = (component / self.baselines for component in self._between)
         return ((x, y, z), (-x, -y, -z))
 
     # ------------------------------------------------------------------ small errors
     @cached_property
     def powers(self) -> dict[str, Floats]:
-        """Position error at the nodes by a unit of an error: 1, τ or τ²/2 of (22)."""
+        """Position error at the nodes for one unit of an error, by unit: 1, τ or τ²/2 of (22)."""
         return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
 
     def clock_course(self, terms: Sequence[PerCase]) -> Floats:
-        """Range error at the nodes of a clock error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³, by its terms. [m]"""
+        """Range error at the nodes for a clock error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³ with the coefficients `terms`. [m]"""
         seconds = np.zeros_like(self.times)
         for term in reversed(terms):
             seconds = seconds * self.times + term
         return SPEED_OF_LIGHT_MPS * seconds
 
     def along(self, platform: int, direction: Vectors) -> Floats:
-        """Change of a platform's range at the nodes per metre along a direction: −u·d, or −(u − b)·d if heard."""
+        """Change of the range at the nodes per metre that a platform moves along a direction.
+
+        It is −u·d, or −(u − b)·d if the direct path is the clock; u is the line of sight to the platform, d the
+        direction, and b the unit vector from the other platform to this one.
+        """
         change: Floats = -dot(self.tracks[platform], direction) / self.ranges[platform]
         return change + dot(self.heard_along[platform], direction) if self.has_direct_path else change
 
     def range_error(self, lanes: Lanes) -> Floats:
-        """Range error at the nodes by a small unit of errors, one per case, or all of a single case. [m/unit]"""
+        """Range error at the nodes per unit of small errors. [m/unit]
+
+        The lanes are one error for each case, or any number of errors of a single case.
+        """
         moved = lanes.clock(1.0)
         for platform in lanes.platforms:
             x, y, z = lanes.directions[platform]
@@ -513,7 +557,10 @@ class ExactRanges:
         return np.asarray(moved)
 
     def quadratics_of(self, errors: SmallErrors) -> Floats:
-        """Quadratic phase by a unit of small errors, as in `effect`, (errors, cases). [rad/unit]"""
+        """Quadratic phase per unit of small errors, with the effect of the displacement, (errors, cases). [rad/unit]
+
+        The values are those that `effect` gives.
+        """
         weights = self.phase_weights[0]
         along = np.empty((7, *weights.shape))  # range change at the nodes by a metre along each way
         for platform in (0, 1):
@@ -533,27 +580,33 @@ class ExactRanges:
 
     @cached_property
     def place_weights(self) -> tuple[Floats, Floats]:
-        """Displacement east and north per metre of range error at each node. [m/m]"""
+        """Displacement east and north per metre of range error at each node, (nodes, n) each. [m/m]"""
         return self.matrix.place_weights
 
     @cached_property
     def order_weights(self) -> Floats:
-        """Orders 0 to 3 left at the displaced point per metre of range error at each node, (4, nodes, n). [m/m]"""
+        """Legendre orders 0 to 3 of the range error left at the displaced point, per metre at each node. [m/m]
+
+        The array is (4, nodes, n).
+        """
         (by_east, by_north), (east, north) = self.gradient, self.place_weights
         return np.asarray(self.fit[..., None] + by_east[:, None] * east + by_north[:, None] * north)
 
     @cached_property
     def phase_weights(self) -> Floats:
-        """Quadratic and cubic phase per metre at each node, displacement included, (2, nodes, n). [rad/m]"""
+        """Quadratic and cubic phase per metre of range error at each node, (2, nodes, n). [rad/m]
+
+        The phases include the effect of the displacement.
+        """
         return np.asarray(self.k * self.order_weights[2:])
 
     @cached_property
     def hidden_weights(self) -> Floats:
-        """Four parts of the hidden phase, one for each order 0 to 3, per metre of range error at each node. [rad/m]
+        """Parts of the hidden phase from Legendre orders 0 to 3, per metre of range error at each node. [rad/m]
 
-        The array is (4, nodes, n). The square of the hidden phase is the sum of the squares of the parts. The rest of
-        the range error beyond order 3 has no part here. Its weight in the hidden phase is only the small b², except
-        in cases in which a line of sight turns far.
+        The array is (4, nodes, n). The square of the hidden phase is the sum of the squares of the four parts. The
+        rest of the range error beyond order 3 is not included. Its weight in the hidden phase is only b², which is
+        small, unless a line of sight turns by more than `MAX_TURN_RAD`.
         """
         of_orders = np.array([self.band, (1 + self.band) / 3, self.band / 5 / 1.5**2, self.band / 7 / 2.5**2])
         of_orders[3] += self.is_turned / (7 * 2.5**2)
@@ -561,9 +614,9 @@ class ExactRanges:
 
     @cached_property
     def most_per_metre(self) -> Floats:
-        """Bounds of the effects of a range error of at most a metre, for any course, (4, n).
+        """Upper bounds of the effects of any range error whose magnitude is at most one metre, (4, n).
 
-        Quadratic, cubic and hidden phase [rad], and displacement. [m]
+        The rows are quadratic, cubic and hidden phase [rad], and displacement. [m]
         """
         mean, slope, quadratic, cubic = np.abs(self.order_weights).sum(axis=1)
         # The displacement never increases V, which is 1 + b² at most, its variance included.
@@ -573,7 +626,10 @@ class ExactRanges:
         return np.array((self.k * quadratic, self.k * cubic, self.k * hidden, np.hypot(east, north)))
 
     def effect(self, range_error: Floats) -> FullEffect:
-        """Effect of small range errors at the nodes, (..., nodes, cases), with the effect of the displacement."""
+        """Displacement and remaining phases for small range errors at the nodes, (..., nodes, cases).
+
+        The phases include the effect of the displacement. Results that are only rounding are set to 0.
+        """
         size = np.abs(range_error)
         (east, seen_east), (north, seen_north) = (
             ((weights * range_error).sum(axis=-2), (np.abs(weights) * size).sum(axis=-2))
@@ -591,40 +647,47 @@ class ExactRanges:
         return FullEffect(_unless_rounding(east, seen_east), _unless_rounding(north, seen_north), *phases)
 
     def left_of_small(self, range_error: Floats, moved: tuple[PerCase, PerCase]) -> Floats:
-        """Range error that small errors (..., nodes, cases) leave at the point they move to, (..., cases). [m]"""
+        """Range error that remains at the displaced point after small errors. [m]
+
+        `range_error` is the range error at the nodes, (..., nodes, cases). [m] `moved` is the displacement east and
+        north, (..., cases). [m]
+        """
         (by_east, by_north), (east, north) = self.slopes, (np.asarray(component)[..., None, :] for component in moved)
         return np.asarray(range_error + by_east * east + by_north * north)
 
     def unresolved(self, remaining: Floats) -> tuple[Floats, Floats]:
-        """Hidden phase, and rms beyond the cubic, of range errors left at the nodes, (..., nodes, cases). [rad]"""
+        """Hidden phase and rms phase beyond the cubic, from the range errors left at the nodes. [rad]
+
+        `remaining` is (..., nodes, cases). [m]
+        """
         orders = self.fit @ remaining
         squares = self.mean_squares(remaining, orders)
         return _unresolved(np.moveaxis(orders, -2, 0), squares, self.k, self.band, self.is_turned)
 
     def mean_squares(self, remaining: Floats, orders: Floats) -> tuple[Floats, Floats]:
-        """Mean squares of range errors left at the nodes, and of their rest beyond orders 0 to 3. [m²]"""
+        """Mean square of the range errors left at the nodes, and mean square of their part beyond order 3. [m²]"""
         beyond = remaining - self._legendre @ orders
         return self.fit[0] @ (remaining * remaining), self.fit[0] @ (beyond * beyond)
 
     @cached_property
     def _legendre(self) -> Floats:
-        """Orders 0 to 3 at the nodes, each with its leading term equal to 1 at the edge, (nodes, 4)."""
+        """Legendre polynomials P₀ to P₃ at the nodes, each divided by its leading coefficient, (nodes, 4)."""
         return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEGENDRE_LEADING)
 
     # ------------------------------------------------------------------ errors of any size
     def phases(
         self, lanes: Lanes, size: Floats, near: tuple[Floats, Floats], *, is_at_fold: bool = False
     ) -> ImagePoints:
-        """Find the point to which errors of given sizes move a point at the centre, and the defocus there.
+        """Find the points to which errors of given sizes displace the scene centre, and the phases that remain there.
 
-        The search starts `near` [m]. It finds a point where it settles at once, or, `is_at_fold`, where V leads down
-        to the point from the start. `point_paths` follows a point. The search does not find a point beyond a line on
-        which range and Doppler gradients are parallel: no growing error leads there.
+        The search starts at `near` [m] and finds points at which Newton's method converges. With `is_at_fold` it
+        descends V from the start instead. Use `point_paths` to follow a point as an error grows. Points beyond a line
+        on which the gradients of range and Doppler are parallel are not found, because no growing error leads there.
         """
         return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
     def left_over(self, lanes: Lanes, size: Floats, point: tuple[PerCase, PerCase]) -> Floats:
-        """Range error at the nodes that errors leave at ground points, (nodes, lanes). [m]"""
+        """Range error that errors of given sizes leave at ground points, at the nodes, (nodes, lanes). [m]"""
         lane_count = lanes.case.size
         room = self._room(lane_count)
         clock, measured = self._measured(lanes.clock(size), lanes.shifts(size), lanes.case, room)
@@ -633,17 +696,17 @@ class ExactRanges:
         return np.asarray(clock - growth[0] - growth[1])
 
     def _heard(self, shifts: Iterable[Any], case: Indices) -> Floats:
-        """The c·t̃ at the nodes by shifts of the platforms if the direct path is the clock. [m]"""
+        """Clock error c·t̃ at the nodes that shifts of the platforms cause if the direct path is the clock. [m]"""
         a, b, c = (of_transmitter - of_receiver for of_transmitter, of_receiver in zip(*shifts, strict=True))
         x, y, z, baseline = _take_cases([*self._between, self.baselines], case)
         grown = a * (2 * x + a) + b * (2 * y + b) + c * (2 * z + c)
         return np.asarray(grown / (baseline + np.sqrt(np.abs(baseline * baseline + grown))))
 
     def way(self, lanes: Lanes, size: Floats, point: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-        """Motion of points with growing errors, at the points to which errors of given sizes move them. [m/unit]
+        """Rate at which image points move as errors grow, east and north. [m/unit]
 
-        It is the motion of the least of V: by the second derivative of V, and by the change of its slope with the
-        error.
+        `point` are the image points for errors of the sizes `size`. The image point is the minimum of V. Its rate
+        follows from the second derivative of V and from the change of the slope of V with the error.
         """
         course, ways, shifts = lanes.at_nodes, lanes.ways(size), lanes.shifts(size)
         tracks, true_ranges = _take_cases(self._both, lanes.case)
@@ -671,10 +734,11 @@ class ExactRanges:
     def settled(
         self, clock: Floats, shifts: Iterable[Any], near: Any, case: Indices, *, is_at_fold: bool = False
     ) -> ImagePoints:
-        """Newton's method for the least of V, or `is_at_fold` a descent.
+        """Find the minimum of V for each lane by Newton's method, or by a descent if `is_at_fold`.
 
-        `clock` are range errors by clocks (nodes, lanes) [m], `shifts` three shifts of each platform at the nodes
-        [m], `near` the start of the search [m], and `case` the cases of the lanes.
+        `clock` are the range errors by clocks, (nodes, lanes). [m] `shifts` are the three components of the shift of
+        each platform at the nodes. [m] `near` is the start of the search, east and north. [m] `case` are the cases of
+        the lanes.
         """
         lanes = clock.shape[1]
         size = max(1, min(lanes, POINT_SETTINGS.samples_at_once // self.fit.shape[1]))
@@ -695,14 +759,15 @@ class ExactRanges:
         return points
 
     def _room(self, lanes: int) -> Floats:
-        """Work arrays for a number of lanes, allocated once because allocation takes longer than filling them."""
+        """Allocate the work arrays of a search once, because allocation takes longer than filling them."""
         return np.empty((_ARRAY_COUNT, 2, self.fit.shape[1], lanes))
 
     def _measured(self, clock: Floats, shifts: Iterable[Any], case: Indices, room: Floats) -> tuple[Floats, Floats]:
-        """Parts of errors that `_grown` takes: the clock error, and five arrays (2, nodes, lanes), in `room`.
+        """Prepare errors for `_grown`: return the clock error and five arrays (2, nodes, lanes) in `room`.
 
-        If d is added to a platform's vector r, its range R grows by p/(R + √(R² + p)), with p = d·(2r + d). This form
-        has no rounding of the range itself. From a point at g = (east, north) the growth has p - g·(2r̂ - g) instead.
+        If a platform's position vector r changes by d, its range R grows by p/(R + √(R² + p)), with p = d·(2r + d).
+        This form has no rounding error of the size of the range. For a ground point at g = (east, north) instead of
+        the origin, p is replaced by p − g·(2r̂ − g), with the measured position r̂ = r + d.
         """
         if self.has_direct_path:  # no other clock error counts
             clock = clock + self._heard(shifts, case)
@@ -728,11 +793,11 @@ class ExactRanges:
 
 
 class _PointSearch:
-    """Newton's method for the points of lanes, by the range errors that measured paths leave.
+    """Search for the image points of lanes by Newton's method, from the range errors that measured paths leave.
 
-    `lane` are the indices of the lanes that have not settled, `of` their cases, and `point` their points so far,
-    east and north. [m] `settled` holds the lanes that settled in each step: indices, what was seen before the step,
-    the determinant of H there, the step, and the points after it.
+    `lane` are the indices of the lanes that have not settled, `of` their cases, and `point` their current points,
+    east and north. [m] `settled` has one entry for each step in which lanes settled: their indices,
+    `_GroundView.seen` before the step, the determinant of H there, the step, and the points after it.
     """
 
     def __init__(
@@ -745,7 +810,7 @@ class _PointSearch:
         self._set_cases()
 
     def run(self) -> None:
-        """Search with the slopes of each point."""
+        """Search by Newton's method until each lane has settled or does not converge."""
         before = np.full(self.lane.size, math.inf)
         for _ in range(POINT_SETTINGS.max_newton_iterations):
             view = self._view()
@@ -764,7 +829,10 @@ class _PointSearch:
                 self._go_on(going)
 
     def descend(self) -> None:
-        """Search by damped steps that only go down V. It is slower, and safe where V hardly bends, as near a fold."""
+        """Search by damped steps that only decrease V.
+
+        It is slower than `run`, and reliable where the second derivative of V is small, such as near a fold.
+        """
         exact, count = self.exact, self.lane.size
         (trace,) = _take_cases([exact.matrix.xx + exact.matrix.yy], self.of)
         damping, is_going = POINT_SETTINGS.damping_fraction * trace, np.ones(count, dtype=bool)
@@ -792,10 +860,10 @@ class _PointSearch:
             self.point = best_point + step
 
     def store(self, points: ImagePoints) -> None:
-        """Store the points of the lanes that have settled, and the defocus there, unless they are beyond a fold.
+        """Write the settled points and the phases that remain there into `points`, except points beyond a fold.
 
-        The range error is what was left before the last step, plus the change by the step. A phase below the rounding
-        counts as 0.
+        The range error at a point is the range error before the last step plus its linear change by the step. A phase
+        below the rounding counts as 0.
         """
         if not self.settled:
             return
@@ -819,7 +887,7 @@ class _PointSearch:
             kept[lanes] = values[is_ahead]
 
     def _view(self) -> "_GroundView":
-        """View of the ground at the points so far."""
+        """Range errors, gradients and distances at the current points."""
         growth, looks, distances = _grown(self.measured, self.point, self.room)
         seen = np.empty((3, *growth.shape[1:]))
         np.subtract(self.clock, growth[0], out=seen[0])
@@ -829,7 +897,7 @@ class _PointSearch:
         return _GroundView(seen, looks, distances, self.exact.sampling.centred, self.weights)
 
     def _last_step(self, view: "_GroundView") -> Floats:
-        """Square of a step after which a lane has settled, over the distance to the nearer platform. [m]"""
+        """Square of the step below which a lane has settled, divided by the distance to the nearer platform. [m]"""
         is_near_fold = view.determinant < self.near_fold
         smaller, usual = (
             POINT_SETTINGS.last_step_near_fold_fraction * POINT_SETTINGS.last_step_rad,
@@ -838,13 +906,13 @@ class _PointSearch:
         return np.asarray(np.where(is_near_fold, smaller, usual) / self.k)
 
     def _set_cases(self) -> None:
-        """Numbers of the cases of the lanes."""
+        """Take the numbers of each lane's case."""
         exact = self.exact
         of_cases = [exact.k, POINT_SETTINGS.nearest_fraction * exact.nearest, exact.near_fold, exact.product_weights]
         self.k, self.least_range, self.near_fold, self.weights = _take_cases(of_cases, self.of)
 
     def _go_on(self, going: Indices) -> None:
-        """Go on with some of the lanes."""
+        """Continue with the lanes of the indices `going` only."""
         self.lane, self.of = self.lane[going], self.of[going]
         self.point, self.clock, self.measured = _take([self.point, self.clock, self.measured], going)
         self.room = self.room[..., : going.size]
@@ -859,18 +927,18 @@ class _PointSearch:
 
 
 class _GroundView:
-    """View of the ground from points.
+    """Range errors, lines of sight and derivatives of V at one ground point per lane.
 
     Attributes
     ----------
     seen : (3, nodes, lanes)
-        Range errors left at the nodes [m], and what a metre east, and north, adds to them. [m/m]
+        Range errors left at the nodes [m], and their change per metre east and per metre north. [m/m]
     looks : (2, 2, nodes, lanes)
-        Lines of sight over the ground, by axis and platform.
+        Horizontal components of the unit vectors to the platforms, by axis and platform.
     distances : (2, nodes, lanes)
         Ranges of both platforms. [m]
     nearest : (lanes,)
-        The smallest range. [m]
+        Smallest range of either platform at the nodes. [m]
     slope : (2, lanes)
         Half the slope of V, east and north. [m]
     matrix : (2, 2, lanes)
@@ -891,28 +959,37 @@ class _GroundView:
 
     @property
     def variance(self) -> Floats:
-        """V at the points, (lanes,). [m²]"""
+        """Value of V at the points, (lanes,). [m²]"""
         return np.asarray(np.einsum("nc,nc->c", self._weighted[0], self._parts[0]))
 
     @cached_property
     def node_weights(self) -> Floats:
-        """Weights at the nodes whose sum with a history is its product of V with the range error, (nodes, lanes)."""
+        """Weights at the nodes that give the scalar product ⟨a, ρ⟩ of V for a history a, (nodes, lanes).
+
+        The sum of the weights times a over the nodes is the scalar product with the range error ρ at the point.
+        """
         return np.asarray(self._centred.T @ self._weighted[0])
 
     @cached_property
     def bends(self) -> tuple[Floats, Floats, Floats]:
-        """Half the second derivative of V: east and east, east and north, north and north."""
+        """Half the second derivatives of V at the points: east-east, east-north, north-north, (lanes,) each."""
         bends = self.node_weights / self.distances
         turned, total = np.einsum("apnc,bpnc->abc", self.looks * bends, self.looks), bends.sum(axis=(0, 1))
         (xx, xy), (_, yy) = self.matrix + turned
         return xx - total, xy, yy - total
 
     def products(self, values: Floats) -> Floats:
-        """Products of V of a history at the nodes with the range that a metre east, and north, adds, (2, lanes)."""
+        """Scalar products ⟨g, a⟩ of V, (2, lanes), for histories a at the nodes.
+
+        g is the change of the range error per metre east (first row) and per metre north (second row).
+        """
         return np.asarray(np.einsum("anc,nc->ac", self._weighted[1:], self._centred @ values))
 
     def step(self, slope: Floats) -> Floats:
-        """Step that removes half a slope of V, by its second derivative; where V is no bowl, by H alone. [m]"""
+        """Newton step that removes the half slope `slope` of V, (2, lanes). [m]
+
+        It uses half the second derivative of V, or H where V has no minimum nearby.
+        """
         xx, xy, yy = self.bends
         is_bowl = (xx * yy - xy * xy > POINT_SETTINGS.bowl_fraction * self.determinant) & (xx > 0)
         if not is_bowl.all():
@@ -922,7 +999,7 @@ class _GroundView:
 
 
 def _solved(bends: Sequence[Floats], slope: Floats) -> Floats:
-    """Step that removes half a slope of V, by half the second derivative of V, (2, lanes). [m]"""
+    """Solve for the step that removes half a slope of V, from half the second derivatives of V, (2, lanes). [m]"""
     (xx, xy, yy), (x, y) = bends, slope
     return np.asarray((xy * y - yy * x, xy * x - xx * y) / (xx * yy - xy * xy))
 
@@ -930,7 +1007,11 @@ def _solved(bends: Sequence[Floats], slope: Floats) -> Floats:
 def _unresolved(
     orders: Floats, squares: tuple[Floats, Floats], k: Floats, band: Floats, is_turned: Booleans
 ) -> tuple[Floats, Floats]:
-    """Hidden phase, and rms beyond the cubic, by orders 0 to 3 at the edge [m] and mean squares. [m²], [rad]"""
+    """Hidden phase and rms phase beyond the cubic. [rad]
+
+    `orders` are the Legendre orders 0 to 3 of the range error at the aperture edge. [m] `squares` are the mean square
+    of the range error and the mean square of its part beyond order 3. [m²]
+    """
     _, slope, _, cubic = orders
     square, beyond_cubic = squares
     of_cubic = (cubic / 2.5) ** 2 / 7
@@ -943,10 +1024,11 @@ def _unless_rounding(value: Floats, seen: Floats) -> Floats:
 
 
 def _grown(measured: Floats, point: Floats, room: Floats) -> tuple[Floats, Floats, Floats]:
-    """Growth of the ranges of both platforms to points (2, lanes), in `room`, (2, nodes, lanes). [m]
+    """Measured ranges of both platforms to points (2, lanes) minus their true ranges to the centre. [m]
 
-    Further the vectors over the ground from the points to the platforms, (2, 2, nodes, lanes), by axis and platform,
-    and the ranges, (2, nodes, lanes). [m]
+    Returns three views of the work arrays `room`. The first is the difference of the ranges, (2, nodes, lanes). The
+    second are the horizontal vectors from the points to the platforms, (2, 2, nodes, lanes), by axis and platform.
+    The third are the measured ranges, (2, nodes, lanes). All are in metres.
     """
     (p, true_range, squared_range), over_ground, point = measured[2:], measured[:2], point[:, None, None]
     looks, both, grown, distances = room[:2], room[2:4], room[4], room[5]
@@ -962,7 +1044,7 @@ def _grown(measured: Floats, point: Floats, room: Floats) -> tuple[Floats, Float
 
 
 def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -> ImagePoints:
-    """Find where errors of any course move a point at the centre, if necessary in steps from no error on.
+    """Find where errors of any form over time displace the scene centre, if necessary by increasing them in steps.
 
     Parameters
     ----------
@@ -978,8 +1060,9 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -
     Returns
     -------
     ImagePoints
-        NaN if no ground point has the recorded history, or only a point to which no growing error leads. As on a path
-        of `point_paths`, no point has it if half a cycle is hidden and the gradients of V span little.
+        NaN if no ground point has the recorded range history, or if a growing error does not lead to the point that
+        has it. As in `point_paths`, no point has the history if the hidden phase exceeds half a cycle and the
+        determinant of H is small.
     """
     points = _within_ends(exact.settled(clock, shifts, (0.0, 0.0), case))
     for steps in POINT_SETTINGS.course_steps:
@@ -1003,13 +1086,13 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -
 
 
 def _within_ends(points: ImagePoints) -> ImagePoints:
-    """The points, without points beyond the end of the image."""
+    """Replace points beyond the end of the image by NaN, and mark them as not settled."""
     is_gone = (np.abs(points.turn) < POINT_SETTINGS.folded_fraction) & (points.hidden > POINT_SETTINGS.end_rad)
     return ImagePoints(points.is_settled & ~is_gone, *(np.where(is_gone, math.nan, column) for column in points[1:]))
 
 
 def _take(arrays: Sequence[Floats] | Floats, indices: Indices) -> list[Floats]:
-    """Some lanes of arrays (nodes, lanes). An array that all lanes share stays as it is."""
+    """Select lanes of arrays (…, lanes). An array that all lanes share stays as it is."""
     return [array if array.shape[-1] == 1 else array.take(indices, axis=-1) for array in arrays]
 
 

@@ -1,8 +1,9 @@
-"""The first size at which an error reaches a limit, searched along the path of the image point.
+"""Search for the smallest size at which an error reaches a limit, along the path of the image point.
 
-A search holds the square of a phase or of a displacement over its limit: the square is smooth in the size, the value
-is not. After each step the search looks at all known points. It ends where an interpolation is close to the limit and
-no crest between smaller sizes may be above it. All searches take each step together.
+A search works with the square of a phase or displacement divided by the square of its limit, because the square is a
+smooth function of the size and the magnitude is not. After each step the search uses all known points of the path. It
+ends where an interpolation is close to the limit and no crest at a smaller size may exceed the limit. All searches
+take each step together.
 """
 
 import math
@@ -31,30 +32,33 @@ LIMIT_FRACTION = 1e-5  # of a limit, to which a search finds it
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """Tunings of the search for a limit.
+    """Numerical settings of the search for a limit.
 
     Attributes
     ----------
     trusted_fraction, trusted_bent_fraction : float
-        Distance to a limit from which an interpolation leads to it, as a fraction of the limit: where the value is
-        almost straight, and where its slope changes by more than `bent_fraction` within the interval.
+        Largest distance to the limit at which an interpolated size is accepted, as a fraction of the limit. The first
+        applies where the value is almost linear in the size, the second where its slope changes by more than
+        `bent_fraction` within the interval.
     bent_fraction : float
         Change of a slope within an interval, as a fraction of the slope.
     crest_fraction : float
-        Distance below a limit at which the crest of an interpolation may hide a value above it, as a fraction.
+        Distance below the limit, as a fraction of the limit, from which the crest of an interpolation counts as a
+        possible value above the limit.
     departure_fraction : float
-        Difference between a rise and the rise that the slope before predicts, as a fraction of the limit. With a
-        larger difference the value within the interval is unknown.
+        Largest difference between the rise over an interval and the rise that the slope at its lower end predicts, as
+        a fraction of the limit. If the difference is larger, the search also tries a size within the interval.
     trusted_interval_fraction : float
-        Width of an interval within which an interpolation is trusted, as a fraction of the size.
+        Largest width of an interval within which an interpolation is trusted, as a fraction of the size.
     steep_ratio : float
-        Square of a value over its limit, from which a power of the size leads to the limit better than a cubic.
+        Square of a value divided by its limit, above which a power of the size predicts the limit better than a
+        cubic.
     growth_factor : float
         Growth of the size in a step.
     newton_steps : int
         Steps of Newton's method on an interpolating cubic.
     max_rounds : int
-        Largest number of steps of a search. No search is known that takes more than 25.
+        Largest number of steps of a search. No known search takes more than 25.
     """
 
     trusted_fraction: float = 0.002
@@ -80,7 +84,7 @@ GROWTH_FACTORS = SEARCH_SETTINGS.growth_factor ** np.arange(1, 5)
 
 @dataclass(frozen=True, eq=False)
 class LimitSearches:
-    """Searches for the first size at which a value reaches a limit, (searches,).
+    """Searches for the smallest size at which a phase or displacement reaches its limit.
 
     Attributes
     ----------
@@ -89,18 +93,20 @@ class LimitSearches:
     requirement : (searches,)
         QUADRATIC_LIMIT, CUBIC_LIMIT or DISPLACEMENT_LIMIT.
     limit : (searches,)
-        The limit of the quadratic phase, with the gain of autofocus in it, of the cubic phase [rad], or of the
-        displacement. [m]
+        Limit of the quadratic phase including the gain of autofocus [rad], of the cubic phase [rad], or of the
+        displacement [m].
     gain : (searches,)
-        Factor by which autofocus lets the quadratic phase be larger. The hidden phase gets no such factor.
+        Factor by which autofocus raises the limit of the quadratic phase. It does not raise the limit of the hidden
+        phase.
     first : (searches,)
-        Size that is tried first: where a small error would reach the limit. [unit]
+        Size that is tried first: the size at which the limit is reached if the effect is proportional to the size.
+        [unit]
     largest : (searches,)
         Size at which the search ends. [unit]
     group : (searches,)
-        Searches of a group share the smallest size: a search ends where another search of its group found a limit.
+        Group of each search. A search ends at the smallest size that a search of its group has found.
     is_alone : (searches,)
-        Whether only searches for the same requirement end the search.
+        Whether only searches of the group for the same requirement end the search.
     """
 
     lane: Indices
@@ -114,15 +120,18 @@ class LimitSearches:
 
     @classmethod
     def joined(cls, searches: "list[LimitSearches]") -> "LimitSearches":
-        """All searches of a list."""
+        """Concatenate the searches of a list."""
         return cls(*(np.concatenate([getattr(each, field.name) for each in searches]) for field in fields(cls)))
 
     def of(self, index: Indices) -> "LimitSearches":
-        """Some of the searches."""
+        """Select searches by index."""
         return LimitSearches(*(getattr(self, field.name)[index] for field in fields(self)))
 
     def square(self, points: Floats) -> Floats:
-        """Square of the value over its limit at known points, (rows, searches, points)."""
+        """Square of the value divided by the square of its limit, (searches, points).
+
+        `points` are known points of the paths, (rows, searches, points).
+        """
         requirement, gain = self.requirement[:, None], self.gain[:, None]
         judged = points[QUADRATIC_ROW] ** 2 + (gain * points[HIDDEN]) ** 2
         square = np.where(requirement == QUADRATIC_LIMIT, judged, points[CUBIC] ** 2)
@@ -133,7 +142,7 @@ class LimitSearches:
 
 @np.errstate(all="ignore")
 def find_first_sizes(paths: PointPaths, searches: LimitSearches, smallest: Floats) -> None:
-    """Find the first sizes at which values reach their limits.
+    """Find the smallest sizes at which phases and displacements reach their limits, and write them to `smallest`.
 
     Parameters
     ----------
@@ -142,7 +151,7 @@ def find_first_sizes(paths: PointPaths, searches: LimitSearches, smallest: Float
     searches : LimitSearches
         The searches.
     smallest : (requirements, groups)
-        The smallest sizes known so far; the sizes that are found replace larger ones. [unit]
+        Smallest sizes known so far. A size that a search finds replaces a larger one. [unit]
     """
     tries = np.zeros(searches.lane.shape, dtype=int)
     for _ in range(SEARCH_SETTINGS.max_rounds):
@@ -161,7 +170,7 @@ def find_first_sizes(paths: PointPaths, searches: LimitSearches, smallest: Float
 
 
 class _SearchState:
-    """State of searches by the points that are known.
+    """Results and next steps of searches, computed from the known points of the paths.
 
     Attributes
     ----------
@@ -201,7 +210,7 @@ class _SearchState:
         self.result = np.where((result <= bound) & ~is_past, result, math.inf)
 
     def _set_slopes(self, every: Indices) -> None:
-        """Slopes at known points, of the parabola through each point and its neighbours."""
+        """Set the slopes at the known points, each from the parabola through the point and its neighbours."""
         self.width = self.size[:, 1:] - self.size[:, :-1]
         chord = (self.square[:, 1:] - self.square[:, :-1]) / self.width
         self.slope = np.empty(self.size.shape)
@@ -212,7 +221,7 @@ class _SearchState:
         self.slope[every, last] = 2 * chord[every, last - 1] - self.slope[every, last - 1]
 
     def _doubtful_sizes(self, first_above: Indices) -> Floats:
-        """Size to try within each interval below the limit; not a number where the interval holds no doubt."""
+        """Size to try within each interval below the limit; NaN if no value within it may exceed the limit."""
         low, width = self.size[:, :-1], self.width
         start, stop = self.square[:, :-1], self.square[:, 1:]
         rise, slope_low, slope_high = stop - start, self.slope[:, :-1] * width, self.slope[:, 1:] * width
@@ -230,7 +239,7 @@ class _SearchState:
         return np.where(is_below & (low < self.bound[:, None]), size, math.nan)
 
     def _between(self, every: Indices, first_above: Indices) -> tuple[Floats, Booleans]:
-        """Size at which a cubic between known points reaches the limit, and whether it is close enough."""
+        """Size at which a cubic between known points reaches the limit, and whether it is accurate enough."""
         high = np.minimum(first_above, self.size.shape[1] - 1)
         low = high - 1
         width, self.high = self.width[every, low], self.size[every, high]
@@ -262,9 +271,10 @@ class _SearchState:
         return np.where(is_narrow, self.high - width, size), is_close | is_narrow
 
     def _by_power(self, every: Indices, low: Indices, high: Indices) -> Floats:
-        """Size at which a power of the size reaches the limit.
+        """Size at which a power of the size, fitted to two known points, reaches the limit.
 
-        The power of two points around the limit, or of two points beyond it where the lower point is the start.
+        The points are those on both sides of the limit. If the lower of these is the start of the path, the two
+        points above the limit are used.
         """
         after = np.minimum(high + 1, self.count - 1)
         is_start = low == 0
@@ -274,7 +284,7 @@ class _SearchState:
         return np.asarray(self.size[every, high] * self.square[every, high] ** (-1 / power))
 
     def _ahead(self, every: Indices, last: Indices) -> tuple[Floats, Booleans]:
-        """Size at which a parabola through the last points reaches the limit, and whether it is close enough."""
+        """Size at which a parabola through the last points reaches the limit, and whether it is accurate enough."""
         before = np.maximum(last - 1, 0)
         slope = self.slope[every, last]
         bend = np.where(last > 0, (slope - self.slope[every, before]) / self.width[every, before], 0.0)
@@ -291,7 +301,7 @@ class _SearchState:
         return ahead, is_close
 
     def next_sizes(self, going: Indices, *, is_several: bool) -> tuple[Indices, Floats]:
-        """Searches that go on and the sizes that they try next: one per lane, or several."""
+        """Indices of the searches that try a size next, and the sizes: one per lane, or several if `is_several`."""
         growth = SEARCH_SETTINGS.growth_factor
         low, bound, is_between = self.low[going], self.bound[going], self.is_between[going]
         grown = np.minimum(np.maximum(self.ahead[going], 1.01 * low), growth * low)
@@ -324,14 +334,14 @@ class _SearchState:
 
 
 def _on_cubic(position: Floats, start: Floats, rise: Floats, slope_low: Floats, slope_high: Floats) -> Floats:
-    """Height of the cubic with these slopes at both ends of an interval, at a position from 0 to 1."""
+    """Value of a cubic at `position`, 0 to 1 within an interval, from its start, rise, and slopes at both ends."""
     square, cube = position**2, position * position * position
     height = start + slope_low * (position - 2 * square + cube) + slope_high * (cube - square)
     return np.asarray(height + rise * (3 * square - 2 * cube))
 
 
 def _crests(slope_low: Floats, rise: Floats, slope_high: Floats) -> tuple[Floats, Floats]:
-    """Positions at which the cubic has no slope; not finite without such a position."""
+    """Positions within an interval at which a cubic has zero slope; not finite if there is no such position."""
     b, c = 3 * rise - 2 * slope_low - slope_high, slope_low + slope_high - 2 * rise
     far = -(b + np.copysign(np.sqrt(b * b - 3 * c * slope_low), b))
     return far / (3 * c), slope_low / far

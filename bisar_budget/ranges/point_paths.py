@@ -1,13 +1,15 @@
-"""Paths of the image point as errors grow.
+"""Paths of the image point as a function of the size of an error.
 
 A path is the position of the image point as a function of the size of an error. It starts at the scene centre, at
-size 0. It ends where the hidden phase exceeds π and the gradients of V (see `exact_ranges`) span less than a fifth of
-the area that they span at the centre: no ground point has the range history of a larger error. The gradients are
-almost parallel near a fold. If the hidden phase does not exceed π at a fold, the path continues. If the peak on the
-path fades into a wider peak, the path continues from the wider peak.
+size 0. It ends where the hidden phase exceeds π and the root of the determinant of H is less than a fifth of its
+value at the centre (see `exact_ranges` for both). For a larger error, no ground point has the recorded range history.
+Near a fold the gradients of range and Doppler are almost parallel, and the determinant of H is small. If the hidden
+phase does not exceed π at a fold, the path continues. If the peak on the path fades into a wider peak there, the path
+continues from the wider peak.
 
-All lanes take each step together. A few lanes try several sizes in one step, because arrays of a few lanes cost
-little. `ranges.limit_search` finds the first size at which a path reaches a limit.
+A lane is one error of one case. All lanes take each step together. If there are only a few lanes, each tries several
+sizes in one step, because arrays of a few lanes cost little. `ranges.limit_search` finds the first size at which a
+path reaches a limit.
 """
 
 import math
@@ -29,7 +31,7 @@ STEP_FRACTIONS = np.array((0.25, 0.5, 1.2, 2.0, 4.0))
 
 @dataclass(frozen=True)
 class PathSettings:
-    """Tunings of the steps along a path.
+    """Numerical settings of the steps along a path.
 
     Attributes
     ----------
@@ -37,25 +39,25 @@ class PathSettings:
         Largest distance of a point from its prediction, as a fraction of the step. A point farther away belongs to
         another path.
     stray_m : float
-        The same for steps of almost no length. [m]
+        Distance that is allowed in addition, for steps of almost no length. [m]
     fade_fraction : float
         Largest distance between a peak that is lost at a fold and the peak into which it fades, as a fraction of the
         displacement.
     straight_fraction : float
         Largest deviation of an almost straight path, as a fraction of the displacement.
     finest_step_fraction : float
-        Smallest step, as a fraction of the size. A path that needs smaller steps has ended.
+        Smallest step, as a fraction of the size. A path that needs smaller steps ends.
     fold_fraction : float
         Fraction of the predicted distance to a fold that one step covers.
     least_fold_fraction : float
-        Fraction of the last step. A prediction that puts a fold nearer than that is not trusted.
+        Smallest trusted distance to a predicted fold, as a fraction of the last step.
     end_fraction : float
-        Half width of an interval that holds the end of a path, as a fraction of the size. A straight line through the
-        interval is then right to 1e-9.
+        Half width of an interval that contains the end of a path, as a fraction of the size. Linear interpolation
+        within the interval is then accurate to 1e-9.
     early_fraction : float
         Fraction of the first size at which the curvature of the path at its start is measured.
     same_size_fraction : float
-        Difference between two sizes below which they count as one, as a fraction of the size.
+        Difference between two sizes below which they count as equal, as a fraction of the size.
     few_lanes_count : int
         Number of lanes from which a step tries one size per lane.
     """
@@ -77,12 +79,12 @@ PATH_SETTINGS = PathSettings()
 
 
 def tries_several_sizes(lane_count: int, is_alike: bool) -> bool:
-    """Whether a step tries several sizes per lane."""
+    """Whether a step tries several sizes per lane: if there are few lanes, or if `is_alike`."""
     return is_alike or lane_count < PATH_SETTINGS.few_lanes_count
 
 
 def up_to(sizes: Floats, largest: Floats) -> Floats:
-    """Limit sizes to a largest size, and round sizes just below the largest one up to it."""
+    """Limit sizes to the size `largest`, and round sizes just below it up to it."""
     return np.where(sizes > (1 - PATH_SETTINGS.same_size_fraction) * largest, largest, sizes)
 
 
@@ -98,13 +100,13 @@ class PointPaths:
     per_unit : (2, lanes)
         Displacement east and north by a small unit of each error. [m/unit]
     is_alike : bool
-        Try several sizes per lane whatever the number of lanes. The results of a case then do not depend on the
+        Whether to try several sizes per lane for any number of lanes. The results of a case then do not depend on the
         number of cases.
 
     Attributes
     ----------
     end : (lanes,)
-        Size at which the path ends; infinite where no end is known.
+        Size at which the path ends; infinite if no end is known.
     """
 
     def __init__(self, exact: ExactRanges, lanes: Lanes, per_unit: Floats, *, is_alike: bool = False) -> None:
@@ -120,7 +122,7 @@ class PointPaths:
         self._missed_ever = np.zeros(lane_count, dtype=bool)  # after a miss the start of the path predicts no point
 
     def known(self, lane: Indices, size: Floats) -> Floats:
-        """Known points at sizes to which `follow_to` went, (rows, lanes); not a number beyond the end of a path."""
+        """Known points of paths at sizes to which `follow_to` went, (rows, lanes); NaN beyond the end of a path."""
         points = self._point(lane, (self.known_points[SIZE, lane] <= size[:, None]).sum(axis=1) - 1)
         points[:, (points[SIZE] != size) | (size >= self.end[lane])] = math.nan
         return points
@@ -132,7 +134,7 @@ class PointPaths:
     # ---------------------------------------------------------------- steps
     @np.errstate(all="ignore")
     def follow_to(self, lane: Indices, size: Floats) -> None:
-        """Follow the paths of lanes to sizes."""
+        """Follow the path of each lane to the given size, or to its end."""
         while True:
             is_short = (size < self.end[lane]) & (self.known_points[SIZE, lane] != size[:, None]).all(axis=1)
             if not is_short.any():
@@ -141,7 +143,10 @@ class PointPaths:
             self.step_toward(lane, size)
 
     def step_toward(self, lane: Indices, size: Floats) -> None:
-        """Make one step toward each size, from the known point before it. A lane may be there several times."""
+        """Make one step along the paths toward each size, from the last known point below it.
+
+        The same lane may occur several times.
+        """
         lane, index, size, to_fold = self._sizes_of_step(lane, size)
         last = self._point(lane, index)
         expected = self._predicted(index, lane, last, size)
@@ -224,7 +229,10 @@ class PointPaths:
     def _shorten_step(
         self, lane: Indices, point: Floats, before: Floats, reached: Floats, to_fold: Floats, is_end: Booleans
     ) -> None:
-        """Note the ends of paths where a step missed, or make the next step shorter."""
+        """Shorten the next step of lanes whose step missed, or record the end of their paths.
+
+        A step misses if it finds no point on the path or a point beyond the end of the path.
+        """
         end = _end_between(before, point)
         halved = np.maximum((point[SIZE] - before[SIZE]) / 2, reached)
         step = np.where(is_end, 0.9 * (end - before[SIZE]), halved)
@@ -237,7 +245,7 @@ class PointPaths:
         self._missed_last[lane] = self._missed_ever[lane] = True
 
     def _insert(self, lane: Indices, point: Floats) -> None:
-        """Insert known points, ordered by lane and size."""
+        """Insert known points; the points of each lane stay sorted by size."""
         if not lane.size:
             return
         first = np.flatnonzero(np.diff(lane, prepend=-1))
@@ -255,9 +263,10 @@ class PointPaths:
 
     # ---------------------------------------------------------------- predictions
     def _distance_to_fold(self, index: Indices, lane: Indices, last: Floats) -> Floats:
-        """Size left until the gradients are parallel, infinite where no fold is ahead. [unit]
+        """Increase in size up to the next fold, where gradients are parallel; infinite if no fold is ahead. [unit]
 
-        Extrapolated by the parabola through the squares of the last three areas.
+        It is extrapolated by the parabola through the squares of the last three areas (roots of the determinant of
+        H).
         """
         before, earlier = (self._point(lane, np.maximum(index - back, 0)) for back in (1, 2))
         step, step_before = last[SIZE] - before[SIZE], before[SIZE] - earlier[SIZE]
@@ -271,9 +280,9 @@ class PointPaths:
         return np.where(is_ahead, distance, math.inf)
 
     def _predicted(self, index: Indices, lane: Indices, last: Floats, size: Floats) -> tuple[Floats, Floats]:
-        """Points east and north where the known points lead. [m]
+        """Predict the image points at given sizes from the known points, east and north. [m]
 
-        An almost straight path is predicted by a parabola from its start, a bent one from its last point.
+        An almost straight path is predicted by a parabola from its start, and a bent path from its last known point.
         """
         u, v = self._slope_at_start[:, lane]
         bend = (last[EAST] - u * last[SIZE], last[NORTH] - v * last[SIZE])
@@ -295,9 +304,10 @@ class PointPaths:
     def _predicted_from_last(
         self, index: Indices, lane: Indices, last: Floats, size: Floats
     ) -> tuple[Floats, Floats]:
-        """Points where the slopes at the last two known points lead. [m]
+        """Predict the image points from the slopes of the path at the last two known points, east and north. [m]
 
-        The slope changes linearly with the size or, near a fold, with the root of the distance to the fold.
+        The slope is assumed to change linearly with the size or, near a fold, with the root of the distance to the
+        fold.
         """
         before = self._point(lane, np.maximum(index - 1, 0))
         slopes = self._slopes_at(np.tile(lane, 2), np.concatenate((last, before), axis=1))
@@ -313,7 +323,7 @@ class PointPaths:
         return last[EAST] + (u + bend * (u - u_back)) * step, last[NORTH] + (v + bend * (v - v_back)) * step
 
     def _slopes_at(self, lane: Indices, points: Floats) -> tuple[Floats, Floats]:
-        """Slopes of the path at points, east and north. [m/unit]"""
+        """Slopes of the path at known points, east and north. [m/unit]"""
         east, north = self.exact.way(self.lanes.of(lane), points[SIZE], (points[EAST], points[NORTH]))
         (u, v), is_start = self._slope_at_start[:, lane], points[SIZE] == 0
         return np.where(is_start, u, east), np.where(is_start, v, north)
@@ -340,9 +350,10 @@ def _extrapolated(far: Floats, middle: Floats, near: Floats, size: Floats) -> tu
 
 
 def _end_between(before: Floats, beyond: Floats) -> Floats:
-    """Size between two points at which the path ends: it is folded, and half a cycle is hidden.
+    """Size between two points at which the path ends: the path is folded, and the hidden phase exceeds π.
 
-    Near a fold the square of the area is linear in the size. Beyond it the hidden phase is.
+    The area is the root of the determinant of H. Near a fold its square is linear in the size; beyond a fold the
+    hidden phase is.
     """
     low, high, square, square_beyond = before[HIDDEN], beyond[HIDDEN], before[AREA] ** 2, beyond[AREA] ** 2
     to_hidden = np.where(low < POINT_SETTINGS.end_rad, (POINT_SETTINGS.end_rad - low) / (high - low), 0.0)

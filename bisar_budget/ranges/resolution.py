@@ -1,12 +1,13 @@
-"""Resolution on the ground: widths of the response of band and aperture to a point, without errors.
+"""Resolution on the ground: widths of the response to a point without errors, from band and aperture.
 
-A step x over the ground changes the phase at a frequency f and a slow time τ by 2πf·g(τ)·x/c, with g the sum of both
-lines of sight over the ground. The vectors 2πf·g/c are the wave-number support. The response to a step is the mean of
-e^(i·phase) over the support. The cross-range width is the width along the line of equal range at mid-aperture. The
-range width is the width along the conjugate direction, in which the phase of a step is not correlated with the phase
-of a step along the line. It is given as the distance across the line. For a short aperture the conjugate direction is
-the line of equal Doppler: the support is a parallelogram, first nulls lie at c/(B|s|) and λ/(T|ṡ⊥|), and half power
-is 0.886 as wide.
+A step x over the ground changes the phase at a frequency f and a slow time τ by 2πf·g(τ)·x/c. Here g is the sum of
+the horizontal components of both lines of sight. The vectors 2πf·g/c are the wave-number support. The response to a
+step is the mean of e^(i·phase) over the support. The cross-range width is the width along the line of equal range at
+mid-aperture. The range width is the width along the conjugate direction, in which the phase of a step is not
+correlated with the phase of a step along the line. It is given as the distance across the line. For a short aperture
+the conjugate direction is the line of equal Doppler, and the support is a parallelogram. First nulls then lie at
+c/(B|s|) and λ/(T|ṡ⊥|), with s the value of g at mid-aperture and ṡ⊥ the part of its rate across s. The width at half
+power is 0.886 of that.
 """
 
 import math
@@ -33,9 +34,9 @@ _MAX_CASE_COUNT = 64  # cases in one block of samples
 
 
 class Resolution(NamedTuple):
-    """Widths of the response on the ground, along range and across: to the first null, and in full at half power. [m]
+    """Widths of the response on the ground in range and cross-range: peak to first null, and full at half power. [m]
 
-    A support that is no parallelogram may have no null. Then the first minimum counts.
+    If the support is not a parallelogram, the response may have no null. The first minimum then takes its place.
     """
 
     range: PerCase
@@ -45,7 +46,7 @@ class Resolution(NamedTuple):
 
 
 def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aperture_time_s: PerCase) -> Resolution:
-    """Resolution at the scene centre, (cases,)."""
+    """Widths of the response at the scene centre, (cases,)."""
     cases, matrix = exact.half.size, exact.matrix
     with np.errstate(all="ignore"):
         azimuth = geometry.look_azimuth * np.ones(cases)
@@ -70,9 +71,10 @@ def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aper
 
 
 def cells_of_support(sight: Floats, axes: Floats, radar: Band) -> Floats:
-    """Cells that sample a response along axes (2, axes), for sums of lines of sight over the ground (times, 2). [m]
+    """Size of the resolution cell along each of two axes (2, axes), fine enough to sample the response. [m]
 
-    A cell is one over the extent of the wave-number support along its axis, corners included.
+    `sight` is the sum of the lines of sight over the ground, (times, 2). The cell is the inverse of the extent of the
+    wave-number support along the axis, including the corners of the support.
     """
     band = radar.center_frequency + np.array((-0.5, 0.5)) * radar.bandwidth
     extent: Floats = np.ptp(np.multiply.outer(band, sight @ axes), axis=(0, 1))
@@ -80,7 +82,7 @@ def cells_of_support(sight: Floats, axes: Floats, radar: Band) -> Floats:
 
 
 def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, across: Floats) -> Booleans:
-    """Whether the support is close enough to a parallelogram for the closed widths."""
+    """Whether the support is close enough to a parallelogram for the closed formulas of the widths."""
     band = np.hypot(*exact.gradient[:, 0]) * relative_band / 2
     _, _, *bends = np.abs(np.einsum("aon,an->on", exact.gradient, conjugate))
     _, turn, *bends_across = np.abs(np.einsum("aon,an->on", exact.gradient, across))
@@ -88,7 +90,7 @@ def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, acro
 
 
 def _slopes(geometry: BistaticGeometry, half: Floats, indices: Indices, count: int) -> Floats:
-    """Sum of both lines of sight over the ground in some cases, at `count` nodes, (2, nodes, cases)."""
+    """Sum of both lines of sight over the ground, for the cases `indices` at `count` nodes, (2, nodes, cases)."""
     slopes = np.zeros((2, count, indices.size))
     for path in geometry.both:
         x, y, z = path.of(indices).place(nodes(count).places[:, None] * half[indices])
@@ -97,7 +99,10 @@ def _slopes(geometry: BistaticGeometry, half: Floats, indices: Indices, count: i
 
 
 def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, Floats]:
-    """Peak to first null, and full width at half power, by slopes (nodes, cases) of the range per metre. [m]"""
+    """Distance from peak to first null, and full width at half power. [m]
+
+    `slopes` (nodes, cases) are the changes of range per metre along the direction of the widths.
+    """
     band = nodes(_BAND_NODE_COUNT)
     wavenumbers = k * (1 + np.multiply.outer(band.places, relative_band / 2))
     mean = np.multiply.outer(band.fit[0], nodes(len(slopes)).fit[0]).ravel()
@@ -108,7 +113,7 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
     moments = mean[:, None] * rates ** np.arange(3)[:, None, None]
 
     def power(step: Floats) -> tuple[Floats, Floats, Floats]:
-        """Power of the response at a step, and its first two derivatives."""
+        """Power of the response at a step from the peak, and its first two derivatives."""
         value, slope, bend = np.einsum("knc,nc->kc", moments, np.exp(1j * rates * step))
         slope, bend = 1j * slope, -bend
         first = 2 * (value.conj() * slope).real
@@ -136,7 +141,10 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
 
 
 def _settled(step: Floats, reach: float, value: Callable[[Floats], tuple[Floats, Floats]]) -> Floats:
-    """Newton's method for the root of a value, given with its slope, within reach of a step."""
+    """Find the root of a function by Newton's method, within `reach` of `step`.
+
+    `value` returns the function and its slope.
+    """
     low, high = step - reach, step + reach
     for _ in range(_NEWTON_ROUNDS):
         left, slope = value(step)

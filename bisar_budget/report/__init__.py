@@ -1,9 +1,9 @@
-"""Findings as text: the table of formats gives the module of each format, whose functions are pure.
+"""Write findings as text. The table of formats names the module of each format; its functions are pure.
 
-The function of SARIF is `as_sarif(report, style) -> str`. A piecewise format, which writes one mission after another,
-has two functions instead, `piece(mission, style) -> str` and `joined(pieces, version, style) -> str`: a process that
-checks a mission writes its piece and need not keep its findings. A format with pictures also has a function
-`pictures(report, style)`.
+The module of a format NAME has a function `as_NAME(report, style) -> str`, such as `as_sarif`. A piecewise format
+writes one mission after another. It has two functions instead, `piece(mission, style) -> str` and
+`joined(pieces, version, style) -> str`, so that a process that checks a mission can write its piece and discard the
+findings. A format with pictures also has a function `pictures(report, style)`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 
 
 class Format(NamedTuple):
-    """A format: its module in this package, and the endings of its files, the usual ending first.
+    """A report format: its module in this package, and the endings of its files, the usual ending first.
 
-    `about` is its description in `--help`. `is_piecewise` and `has_pictures` are explained above. An illustrated
-    format shows the mission itself and images of verified limits; other formats do not keep them in memory.
+    `about` is its description in `--help`. The docstring of this module explains `is_piecewise` and `has_pictures`.
+    A format with `is_illustrated` needs the mission and the images of verified limits, which other formats do not
+    keep in memory.
     """
 
     name: str
@@ -52,7 +53,7 @@ FORMATS = {entry.name: entry for entry in _FORMAT_ENTRIES}
 
 
 def format_of(name: str) -> str | None:
-    """Format of a report by the name of its file, such as `budget.sarif`, `x.needs.json` or `needs.json` itself."""
+    """Find the report format of a file name such as `budget.sarif` or `needs.json`; None if there is none."""
     # With the dot before it, the name `needs.json` ends like `x.needs.json`.
     ending = "." + name.replace("\\", "/").rpartition("/")[2].lower()
     if ending.count(".") == 1:
@@ -64,10 +65,11 @@ def format_of(name: str) -> str | None:
 
 
 class Style(NamedTuple):
-    """Verbosity, colour, width of tables and folders of a report. Formats for machines ignore the first three.
+    """Settings of a report: verbosity, colour, table width and folders.
 
-    They name a file from the root of its repository (`report.words.identity`), else from `root`. Pictures are in the
-    folder `assets` beside the report; without a folder the report has no pictures.
+    Machine-readable formats ignore the first three. They write the path of a file relative to the root of its
+    repository (`report.words.identity`), else relative to `root`. Pictures are in the folder `assets` beside the
+    report. If `assets` is empty, the report has no pictures.
     """
 
     color: bool = False
@@ -80,12 +82,12 @@ class Style(NamedTuple):
     table_width: int = 80  # columns of a table for a terminal, which has a row on one line if it fits
 
     def coloured(self, text: str, sgr: str) -> str:
-        """Text for a terminal, with parameters of SGR (ECMA-48) if the style has colour."""
+        """Text for a terminal, with the SGR escape sequence (ECMA-48) `sgr` if the style has colour."""
         return f"\x1b[{sgr}m{text}\x1b[0m" if self.color else text
 
 
 def _module(format_name: str) -> "ModuleType":
-    """Module of a format, imported at its first use, so that other formats need not wait for it."""
+    """Return the module of a format. It is imported at its first use, so that other formats load faster."""
     return import_module(f"bisar_budget.report.{FORMATS[format_name].module}")
 
 
@@ -99,10 +101,10 @@ def render(format_name: str, report: "Report", style: Style) -> str:
 
 
 class Piece(NamedTuple):
-    """Text of a piecewise format for one mission.
+    """Text of one mission in a piecewise format.
 
-    `unusable` holds the faults of an unusable file, else None. `statuses` are those of all rows and requirements,
-    `status` is the worst of them.
+    `unusable` has the faults of an unusable file and is None for other files. `statuses` are the statuses of all rows
+    and requirements; `status` is the worst of them.
     """
 
     status: str
@@ -120,13 +122,13 @@ def piece(mission: "MissionFindings | UnusableMission", format_name: str, style:
 
 
 def joined(format_name: str, pieces: Sequence[Piece], version: str, style: Style) -> str:
-    """Write a report from its pieces, the same text as `render`."""
+    """Write a report from its pieces. The text is the same as from `render`."""
     text: str = _module(format_name).joined(pieces, version, style)
     return text
 
 
 def pictures(format_name: str, report: "Report", style: Style) -> Mapping[str, bytes]:
-    """Content of the files that belong beside a report, by their names within `style.assets`."""
+    """Contents of the picture files of a report, by their names within `style.assets`; empty without pictures."""
     if not FORMATS[format_name].has_pictures or not style.assets:
         return {}
     files: Mapping[str, bytes] = _module(format_name).pictures(report, style)

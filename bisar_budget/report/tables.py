@@ -1,4 +1,4 @@
-"""The cases of a sweep as files (CSV, Parquet, NetCDF) and as a dataset, with metadata."""
+"""Write the cases of a sweep with metadata to CSV, Parquet or NetCDF files, or convert them to a dataset."""
 
 import csv
 import io
@@ -34,7 +34,7 @@ SWEEP_FORMAT = "bisar-budget/sweep/1"
 
 
 class Described:
-    """A sweep as a table. Keys that vary have the unit of the question, other columns have SI units."""
+    """A sweep as a table. Keys that vary have the unit of the request; other columns have SI units."""
 
     def __init__(
         self, swept: Swept, cases: Cases, mission: Mission, version: str, overrides: Sequence[Override] = ()
@@ -54,39 +54,39 @@ class Described:
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """Columns in their order, with their units."""
+        """Columns of the table in order, with their units."""
         return tuple(
             column._replace(unit=self.numbers[column.name].unit) if column.name in self.numbers else column
             for column in self.swept.columns
         )
 
     def values(self, block: Part) -> Mapping[str, Values]:
-        """Values of a block by the name of their column."""
+        """Values of a block by column name, in the units of the columns."""
         return {name: self.converted(name, values) for name, values in block.values.items()}
 
     def converted(self, name: str, values: Values) -> Values:
-        """Values of a column in the unit of the column."""
+        """Convert SI values of a column to the unit of the column."""
         if name not in self.numbers:
             return values
         return in_unit(self.numbers[name], np.asarray(values, float))
 
 
 def _overrides_text(overrides: Sequence[Override]) -> str:
-    """Overrides from outside the file that affect statuses, in one line."""
+    """Write the overrides from outside the file that affect statuses as one line."""
     return "; ".join(printable(f"{override.name} {override.value} ({override.origin})") for override in overrides)
 
 
 def write_csv(described: Described, blocks: Iterable[Part], path: str) -> None:
     """Write metadata as lines `# name: value`, a header `KEY [unit]`, and one line for each case.
 
-    Numbers have all digits that reproduce them. A missing value is an empty cell.
+    Numbers are written with all digits that are needed to reproduce them. A missing value is an empty cell.
     """
     with open(path, "w", encoding="utf-8", errors="backslashreplace", newline="") as file:
         file.writelines(texts(described, blocks))
 
 
 def texts(described: Described, blocks: Iterable[Part]) -> Iterator[str]:
-    """Texts of a CSV file: metadata and header, then the lines of each block."""
+    """Yield the text of a CSV file piece by piece: metadata, header, then the lines of each block."""
     yield "".join(f"# {name}: {value}\n" for name, value in described.facts.items())
     yield ",".join(_quoted(spreadsheet_text(column.heading)) for column in described.columns) + "\n"
     for block in blocks:
@@ -102,7 +102,7 @@ def _quoted(text: str | None) -> str:
 
 
 def _cells(column: Column, values: Values) -> list[str]:
-    """Cells of a column. A value that many cases share is converted once."""
+    """Write the cells of a column. A value that many cases share is converted to text only once."""
     if column.is_text:
         texts: list[str] = values.tolist()
         quoted = {text: _quoted(spreadsheet_text(text)) for text in set(texts)}
@@ -116,7 +116,7 @@ def _cells(column: Column, values: Values) -> list[str]:
 
 
 def _number(number: float) -> str:
-    """All digits that reproduce a number; empty for NaN."""
+    """Write a number with all digits that are needed to reproduce it; empty for NaN."""
     return repr(number) if number == number else ""
 
 
@@ -124,9 +124,9 @@ _MIN_GROUP_ROWS = 1 << 17  # of a row group, which readers load at once
 
 
 def write_parquet(described: Described, blocks: Iterable[Part], path: str) -> None:
-    """Write one row for each case, with units and descriptions as metadata of the fields.
+    """Write a Parquet file with one row for each case, and with units and descriptions as metadata of the fields.
 
-    Texts are dictionaries, missing values are null. The metadata of the file is the same as in a CSV.
+    Texts are dictionary-encoded, and missing values are null. The metadata of the file is the same as in a CSV file.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -158,7 +158,7 @@ def _array(pa: ModuleType, column: Column, values: Values) -> "Array":
 
 
 def _groups(blocks: Iterable[Part]) -> Iterator[list[Part]]:
-    """Lists of blocks with at least the rows of a row group each."""
+    """Group blocks, so that each group except the last has enough rows for a row group."""
     group: list[Part] = []
     rows = 0
     for block in blocks:
@@ -178,10 +178,11 @@ _EMPTY_MEANING = "none"  # meaning of the flag of an empty text
 
 
 def write_netcdf(described: Described, blocks: Iterable[Part], path: str) -> None:
-    """Write by the CF conventions: a grid has one dimension for each key, a table has the dimension `case`.
+    """Write a NetCDF file that follows the CF conventions.
 
-    Texts are flags, numbers with a list of their meanings. Reasons, which may differ in every case, are strings.
-    Missing numbers are NaN.
+    A grid has one dimension for each key; a table has the dimension `case`. Texts are stored as flags, which are
+    numbers with a list of their meanings. Reasons are strings, because they may differ in every case. Missing numbers
+    are NaN.
     """
     from netCDF4 import Dataset
 
@@ -207,7 +208,7 @@ def write_netcdf(described: Described, blocks: Iterable[Part], path: str) -> Non
 
 
 def _hold_to_room(path: str) -> None:
-    """Append to a file that the library could not write, so that the system raises an `OSError` with the reason."""
+    """Append to a file that the library could not write, so that the system raises the `OSError` with the reason."""
     with open(path, "ab") as file:
         file.write(bytes(_PROBE_BYTES))
         file.flush()
@@ -215,7 +216,7 @@ def _hold_to_room(path: str) -> None:
 
 
 def _dimensions(file: "NetcdfFile", described: Described) -> list[Column]:
-    """Create the dimensions. Returns the columns with a value for each case."""
+    """Create the dimensions of a NetCDF file. Returns the columns that have a value for each case."""
     cases = described.cases
     if not cases.is_grid:
         file.createDimension("case", cases.count)
@@ -236,7 +237,7 @@ def _attributes(column: Column) -> Mapping[str, str]:
 
 
 class _Variable:
-    """One column of a file. Texts are stored as the numbers of their meanings."""
+    """A column of a NetCDF file. Texts are stored as flag numbers."""
 
     def __init__(self, file: "NetcdfFile", column: Column, names: tuple[str, ...]) -> None:
         self.column = column
@@ -262,14 +263,14 @@ class _Variable:
             begin = end
 
     def close(self) -> None:
-        """Write the meanings of the numbers of texts."""
+        """Write the list of flag numbers and their meanings for a column of texts."""
         if self.column.is_text and not self.is_free:
             self.variable.flag_values = np.arange(len(self.codes), dtype="i4")
             self.variable.flag_meanings = " ".join("_".join(text.split()) or _EMPTY_MEANING for text in self.codes)
 
 
 def slabs(start: int, stop: int, shape: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
-    """Slices of an array that together contain its elements `start` to `stop` in C order."""
+    """Yield slices of an array of shape `shape` that together cover its elements `start` to `stop` in C order."""
     if start == stop:
         return
     if len(shape) == 1:
@@ -293,7 +294,7 @@ class MissingTablesError(Exception):
 
 
 class TableFormat(NamedTuple):
-    """One format: a function that writes it part by part, and its library of the extra `tables`, if any.
+    """A table format: a function that writes it part by part, and the library that it needs from the extra `tables`.
 
     `write` raises `OSError` if it cannot write the file. It keeps only a few parts in memory.
     """
@@ -311,7 +312,7 @@ TABLES = {
 
 
 def writer_of(suffix: str) -> TableFormat:
-    """Format of the files with a suffix, one of `TABLES`.
+    """Return the table format for a file suffix, a key of `TABLES`.
 
     Raises
     ------
@@ -333,7 +334,7 @@ def _missing(name: str, library: str) -> str:
 
 
 def dataset(described: Described, values_by_column: "Mapping[str, Values | DaskArray]") -> "Dataset":
-    """Columns of a sweep as a dataset.
+    """Make a dataset from the columns of a sweep.
 
     Parameters
     ----------
@@ -346,7 +347,7 @@ def dataset(described: Described, values_by_column: "Mapping[str, Values | DaskA
     -------
     xarray.Dataset
         A variable for each column, with `units` and `long_name`. Missing numbers are NaN, missing texts are empty.
-        Keys that vary are coordinates in the unit of the question. Attributes are the metadata of a table.
+        Keys that vary are coordinates in the unit of the request. The attributes are the metadata of the table.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Errors drawn from their distributions, and how often the requirements hold. Needs NumPy."""
+"""Monte Carlo: errors are drawn from their distributions, to count how often requirements are met. Needs NumPy."""
 
 # What other rooms may use.
 __all__ = ["draws", "probability"]

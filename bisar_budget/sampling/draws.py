@@ -1,12 +1,12 @@
-"""Draws of independent errors: what they do together, held to requirements, in pieces that join exactly.
+"""Random draws of independent errors, and counts of the draws that meet each requirement.
 
-The full model is linear in small errors: a draw then is a sum of standard variables times effects. Where a sample of
-draws shows that exact ranges differ, every draw goes through exact ranges.
+For small errors the full model is linear: the effect of a draw is the sum of standard variables times their effects.
+If a sample of draws shows that exact ranges give another result, every draw is computed by exact ranges.
 
-Draws come in chunks of a fixed size. What is random in a chunk depends on the seed, the name of the variable and the
-number of the chunk alone, so that any process can make it. What a piece gives are counts, and sums of squares that
-join without rounding: whoever made the pieces, and in which order, the result is the same. Memory does not grow with
-the draws.
+Draws are divided into chunks of a fixed size. The random numbers of a chunk depend only on the seed, on the name of
+the variable and on the number of the chunk, so that any process can make them. A piece of the draws returns counts
+and sums of squares, and sums of squares are joined without rounding. The result therefore does not depend on who made
+the pieces, or in which order. Memory does not grow with the number of draws.
 """
 
 import math
@@ -41,11 +41,12 @@ _MIN_COMPILED_DRAWS = 1 << 30  # normal numbers; then Numba saves more seconds t
 
 
 class Variable(NamedTuple):
-    """One standard variable, mean 0 and variance 1, and what it does.
+    """One standard random variable, with mean 0 and variance 1, and its effects.
 
-    `of` is the error, or the covariance, that it belongs to. `parts` are the errors it makes, and how much of each
-    [unit]; none where it is noise, which is phases alone. Effects: quadratic and cubic phase at the aperture edge
-    [rad], displacement east and north [m].
+    `of` is the id of the error, or of the covariance, to which the variable belongs. `parts` are the errors that the
+    variable causes, each with its size for a value of 1, in the unit of the error. `parts` is empty for random
+    errors, which are known by their effects only. `effects` are the quadratic and cubic phase at the aperture edge
+    [rad], and the displacement east and north [m], for a value of 1.
     """
 
     id: str
@@ -57,9 +58,11 @@ class Variable(NamedTuple):
 
 
 class HeldSum(NamedTuple):
-    """A requirement before the draws: the sum of whose errors, in which effects, is held to which limit.
+    """A requirement that draws are compared with: its limit, and the errors and effects that it sums.
 
-    The limit of a quadratic phase has the gain of autofocus in it, which corrects nothing of the hidden phase.
+    `owners` are the owners of the summed errors, and `columns` are the indices of the summed effects. `limit` is in
+    `unit`. The limit of a quadratic phase error includes the `gain` of autofocus. Autofocus does not correct hidden
+    phases, so hidden phases are multiplied by `gain` before the comparison.
     """
 
     id: str
@@ -71,16 +74,17 @@ class HeldSum(NamedTuple):
 
 
 class DrawsPiece(NamedTuple):
-    """Draws from `start` to before `stop`, all of one chunk."""
+    """Draws `start` to `stop` - 1, all in one chunk."""
 
     start: int
     stop: int
 
 
 class Drawing(NamedTuple):
-    """All that draws need, so that another process can make pieces of them; `name` is the mission's.
+    """All data for the draws of a mission, so that other processes can compute pieces of them.
 
-    `is_exact` says that every draw goes through exact ranges, `chunk` how many of them have one stream.
+    `name` is the name of the mission. `is_exact` tells whether every draw is computed by exact ranges. `chunk` is
+    the number of draws of a chunk, which has one random stream for each variable.
     """
 
     name: str
@@ -101,7 +105,7 @@ class Drawing(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """Counts of draws, and sums of squared errors, over one piece of the draws.
+    """Counts of draws, and sums of squared errors, in one piece of the draws.
 
     `holds` counts the draws that meet each requirement, and `all_hold` counts the draws that meet all requirements.
     `imaged` counts the draws that have an image, and `squares` is the sum of the squared errors over these draws, for
@@ -117,13 +121,16 @@ class Tally(NamedTuple):
 def drawing_of(
     analysis: Analysis, variables: Sequence[Variable], judged: Sequence[HeldSum], draws: int, seed: int
 ) -> Drawing:
-    """Prepare draws of all variables; a sample decides whether they need exact ranges."""
+    """Prepare the draws of a mission; a sample of draws decides whether all draws need exact ranges.
+
+    Variables without an effect on any requirement are left out.
+    """
     setting = (analysis.mission.name, tuple(variables), tuple(judged), analysis.exact, analysis.geometry.both)
     drawing = Drawing(*setting, draws, seed, False, CHUNK_DRAWS)
     is_exact = bool(variables and judged) and _needs_exact_ranges(drawing)
 
     def counts(variable: Variable) -> bool:
-        """Whether it does anything that is judged; each has a stream of its own, so that none misses it."""
+        """Whether a variable has an effect on any requirement; leaving it out does not change other streams."""
         if is_exact and variable.parts:
             return any(size for _, size in variable.parts)
         return any(variable.effects[column] for requirement in judged for column in requirement.columns)
@@ -132,10 +139,11 @@ def drawing_of(
 
 
 def joined(tallies: Iterable[Tally], count: int) -> tuple[list[int], list[float], int]:
-    """Join what pieces give about so many requirements, in any order: integers, and fractions that do not round.
+    """Join the tallies of all pieces, in any order; `count` is the number of requirements.
 
-    For each requirement the draws in which it held and the mean square, over draws that have an image; the draws in
-    which all held.
+    Returns, for each requirement, the number of draws that meet it and the mean squared error of the draws with an
+    image (NaN without such a draw), and the number of draws that meet all requirements. Squares are added as
+    fractions, without rounding.
     """
     holds, imaged, all_hold = [0] * count, [0] * count, 0
     squares = [Fraction()] * count
@@ -153,30 +161,31 @@ Share = Callable[[Drawing], Iterable[tuple[DrawsPiece, Tally]]]  # gives every p
 
 
 def in_turn(drawing: Drawing) -> Iterator[tuple[DrawsPiece, Tally]]:
-    """Draw all pieces here, one after the other."""
+    """Draw all pieces in this process, one after the other."""
     drawer = Drawer(drawing)
     for piece in drawing.pieces():
         yield piece, drawer.tally(piece)
 
 
 def shared_out(drawing: Drawing, mapped: "MapBlocks") -> Iterator[tuple[DrawsPiece, Tally]]:
-    """Have others draw the pieces; gives each when it is done, in any order."""
+    """Draw the pieces on other workers, and yield each piece when it is done, in any order."""
     of = f"of {printable(drawing.name)}"
     return mapped(tally_of, drawing, drawing.pieces(), lambda piece: f"draws {piece.start} to {piece.stop - 1} {of}")
 
 
 def tally_of(drawing: Drawing, piece: DrawsPiece) -> Tally:
-    """Draw a piece in a process that knows nothing else."""
+    """Draw one piece; for processes that draw no other pieces of the drawing."""
     return Drawer(drawing).tally(piece)
 
 
 class Sums:
-    """Effects of one block of draws, added up: the quadratic phase by owner, all else for the mission.
+    """Summed errors of one block of draws.
 
-    By owner, if kept: `motion` is position, velocity and acceleration error of both platforms, (2, 3, 3, draws),
-    `tags` their time tags (2, draws), `clock` its coefficients (4, draws), `alone` what is known by its effects only:
-    quadratic and cubic phase, displacement east and north (4, draws). Where it `adds`, `square` can be asked for,
-    where it `keeps_motion`, `exact_square`.
+    If `adds` is set, the quadratic phase is summed by owner and the other effects for the whole mission, and `square`
+    can be called. If `keeps_motion` is set, the errors are summed by owner for exact ranges, and `exact_square` can
+    be called. `motion` are then position, velocity and acceleration errors of both platforms, (2, 3, 3, draws).
+    `tags` are time tags of both platforms (2, draws), and `clock` are clock coefficients (4, draws). `alone` are
+    effects of random errors: quadratic and cubic phase, displacement east and north (4, draws).
     """
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
@@ -193,7 +202,7 @@ class Sums:
         self._square = np.empty(size)
 
     def clear(self) -> None:
-        """Begin another block."""
+        """Set all sums to zero, for the next block of draws."""
         by_name = (self.motion, self.tags, self.clock, self.alone)
         for kept in (self.phases.values(), self.totals.values(), *(each.values() for each in by_name)):
             for sums in kept:
@@ -201,7 +210,7 @@ class Sums:
         self._exact.clear()
 
     def add(self, variable: Variable, drawn: Floats) -> None:
-        """Add one variable's draws, (draws,)."""
+        """Add the errors and effects of one variable; `drawn` are its values (draws,)."""
         if self.phases:
             for target, column in ((self.phases[variable.owner], 0), *((t, c) for c, t in self.totals.items())):
                 if variable.effects[column]:
@@ -239,7 +248,10 @@ class Sums:
         return where[owner]
 
     def square(self, judged: HeldSum) -> Floats:
-        """Square of what a requirement is about, (draws,); it stands until the next is asked for."""
+        """Squared error that a requirement limits, by the linear model, (draws,).
+
+        The next call overwrites the array.
+        """
         square = self._square
         if judged.columns == (0,):
             square.fill(0.0)
@@ -256,7 +268,7 @@ class Sums:
         return square
 
     def exact_square(self, judged: HeldSum) -> Floats:
-        """Square of it by exact ranges, (draws,); not a number for a draw without an image."""
+        """Squared error that a requirement limits, by exact ranges, (draws,); NaN for draws without an image."""
         owners = judged.owners
         if owners not in self._exact:
             self._exact[owners] = self._by_exact_ranges(owners)
@@ -289,13 +301,16 @@ class Sums:
 
 
 def _sum(by_owner: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
-    """Sum of the parts of several owners; `nothing` where none has any."""
+    """Sum of the arrays of several owners; `nothing` if none of these owners has an array."""
     of_owners = [by_owner[owner] for owner in owners if owner in by_owner]
     return sum(of_owners[1:], of_owners[0]) if of_owners else nothing
 
 
 class Drawer:
-    """Makes pieces of draws; one that follows the last one of its chunk goes on where that ended."""
+    """Computes pieces of draws.
+
+    A piece that comes after the last computed piece in the same chunk continues the random streams of that piece.
+    """
 
     def __init__(self, drawing: Drawing) -> None:
         self._drawing = drawing
@@ -306,7 +321,7 @@ class Drawer:
         self._buffer = np.empty(BLOCK_DRAWS)
 
     def tally(self, piece: DrawsPiece) -> Tally:
-        """Draw a piece and count."""
+        """Draw the errors of a piece, and count the draws that meet the requirements."""
         drawing = self._drawing
         self._go_to(piece.start)
         count = len(drawing.judged)
@@ -335,7 +350,7 @@ class Drawer:
     def _go_to(self, start: int) -> None:
         """Move the random streams to the draw `start`.
 
-        The streams begin again at the start of the draw's chunk if they are in another chunk, or past the draw.
+        If the streams are in another chunk, or past the draw, they start again at the beginning of its chunk.
         """
         chunk = start // self._drawing.chunk
         if chunk != self._chunk or start < self._at:
@@ -358,9 +373,10 @@ class Drawer:
 
 
 def _needs_exact_ranges(drawing: Drawing) -> bool:
-    """Whether exact ranges differ from the linear model in a sample of draws, by more than a part of a limit.
+    """Whether exact ranges differ from the linear model in any draw of a sample, by more than 1 % of a limit.
 
-    The linear model has no hidden phase: where band and turn hide more than that part, draws need exact ranges.
+    Exact ranges include the hidden phase, which the linear model does not have. A hidden phase that changes a total
+    by more than this fraction therefore also requires exact ranges.
     """
     sums = Sums(drawing, _LINEARITY_DRAWS, adds=True, keeps_motion=True)
     drawn = np.empty(_LINEARITY_DRAWS)
@@ -380,7 +396,10 @@ def _fill_normal(generator: np.random.Generator, out: Floats) -> None:
 
 @cache
 def _compiled() -> Callable[[np.random.Generator, Floats], None]:
-    """Filling by compiled code, where Numba is there, has room and can keep what it compiles."""
+    """Function that fills an array with normal draws, compiled by Numba if possible, otherwise by NumPy.
+
+    Numba is not used if it is not installed, if there is little memory, or if it cannot store compiled code.
+    """
     if not is_spacious():
         return _fill_normal
     try:
@@ -393,16 +412,21 @@ def _compiled() -> Callable[[np.random.Generator, Floats], None]:
 
 
 def _fill_each(generator: np.random.Generator, out: Floats) -> None:
-    """Fill with normal draws, compiled by Numba: those of NumPy to the last bit, in two thirds of the time."""
+    """Fill an array with normal draws; Numba compiles this function.
+
+    The draws are the same as those of NumPy, to the last bit, and take two thirds of the time.
+    """
     for index in range(out.size):
         out[index] = generator.standard_normal()
 
 
 class _Stream:
-    """Draws of a variable in a chunk. Each has a stream of its own, so that another error in the file changes none.
+    """Random stream of one variable in one chunk.
 
-    That of the first chunk is seeded by the seed and the name, those of the others are children of it. What tells a
-    child is no byte of a name: those of one variable are not the streams of another with a longer name.
+    Each variable has its own stream, so that a further error in the file does not change the draws of other errors.
+    The stream of the first chunk is seeded with the seed and the id of the variable. Streams of later chunks are
+    children of this stream. The key of a child is above all byte values, so that it never equals the stream of
+    another variable with a longer id.
     """
 
     def __init__(
@@ -418,7 +442,7 @@ class _Stream:
         self._distribution, self._fill_normal = variable.distribution, fill_normal
 
     def fill(self, out: Floats) -> None:
-        """Draw into an array (draws,)."""
+        """Fill an array (draws,) with the next draws of the variable."""
         if self._distribution == "normal":
             self._fill_normal(self._generator, out)
             return
@@ -430,7 +454,11 @@ class _Stream:
             np.copysign(1.0, out, out=out)
 
     def skip(self, count: int, buffer: Floats) -> None:
-        """Go past so many draws: normal ones take as many random numbers as it happens, the others one each."""
+        """Skip `count` draws of the stream.
+
+        A normal draw takes a varying number of random numbers, so normal draws are made and discarded. Other draws
+        take one random number each.
+        """
         if self._distribution != "normal":
             self._bits.advance(count)
             return
@@ -443,9 +471,10 @@ _JACOBI_ROUNDS = 30  # of a Jacobi method: convergence is quadratic, a 6 x 6 tak
 
 
 def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[list[float]]]:
-    """Eigenvalues of a symmetric matrix (n, n) and, as columns, its unit eigenvectors, in no order.
+    """Eigenvalues of a symmetric matrix (n, n), and its unit eigenvectors as columns, without a particular order.
 
-    By Jacobi's rotations. Of equal eigenvalues LAPACK takes other vectors than these, and a seed would draw others.
+    The method is Jacobi's rotations. LAPACK may return other eigenvectors for equal eigenvalues, and the same seed
+    would then give other draws.
     """
     n = len(matrix)
     a = [list(row) for row in matrix]
@@ -469,7 +498,10 @@ def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[li
 
 
 def _rotate(a: list[list[float]], v: list[list[float]], p: int, q: int, c: float, s: float) -> None:
-    """Turn the plane of p and q so that a[p][q] vanishes; `v` collects the turns."""
+    """Rotate the axes p and q of matrix `a` so that a[p][q] becomes 0, and apply the rotation to `v` too.
+
+    `c` and `s` are the cosine and sine of the angle.
+    """
     for row in (*a, *v):
         row[p], row[q] = c * row[p] - s * row[q], s * row[p] + c * row[q]
     upper, lower = a[p], a[q]

@@ -1,12 +1,12 @@
-"""Monte Carlo: errors drawn from their declared distributions, and how often each requirement then holds.
+"""Monte Carlo: errors are drawn from their declared distributions, to count how often each requirement is met.
 
-The referee of root-sum-square and worst case. All declared errors are drawn at once, their effects by the full model
-add, and the magnitude of the sum is held to the requirement. Of small errors a draw is a sum of standard variables
-times effects, of large ones it goes through exact ranges (`draws`); a covariance is six variables, along the axes of
-its correlation matrix.
+The result shows whether root-sum-square and worst case describe the sum of errors well. All declared errors are drawn
+at once, their effects by the full model are added, and the magnitude of the sum is compared with the requirement. For
+small errors a draw is a sum of standard variables times effects; for large errors exact ranges compute it (`draws`).
+A covariance gives six variables, one along each eigenvector of its correlation matrix.
 
-Draws come from the distributions themselves: the coverage factor, which makes bounds of sigmas, has no part in them.
-Vibration is not drawn: its amplitude is declared and its limits are those of echoes.
+Errors are drawn from the distributions themselves. The coverage factor, which turns sigmas into bounds, is not
+applied. Vibration is not drawn, because its amplitude is declared and its limits concern paired echoes.
 """
 
 import math
@@ -47,21 +47,22 @@ def monte_carlo(
     seed: int | None = None,
     share: Share | None = None,
 ) -> MonteCarlo:
-    """Draw the declared errors of a mission and count how often each requirement holds.
+    """Draw the declared errors of a mission, and count how often each requirement is met.
 
     Parameters
     ----------
     draws : int
-        From 1 to `MAX_DRAWS`; memory does not grow with it.
+        Number of draws, from 1 to `MAX_DRAWS`. Memory does not grow with it.
     seed : int, optional
-        None: `simulation.seed` of the file. The same seed gives the same result.
+        Seed of the random numbers; None: `simulation.seed` of the file. The same seed gives the same result.
     share : callable, optional
-        Makes the pieces of the draws; None: one after the other, here. The result does not depend on who makes them.
+        Function that computes the pieces of the draws; None: this process computes them one after the other. The
+        result does not depend on it.
 
     Raises
     ------
     ValueError
-        `draws` out of range.
+        `draws` is out of range.
     """
     if not 1 <= draws <= MAX_DRAWS:
         raise ValueError(f"the number of draws must be from 1 to {MAX_DRAWS}, not {draws}")
@@ -116,10 +117,12 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
 
 
 def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
-    """Variables of a sensor, a clock or the air: its quadratic phase and what goes with it, the cubic with the rest…
+    """Yield the independent variables of a random error of a sensor, a clock or the air.
 
-    They are columns of the Cholesky root of its covariance of phases and displacement. An effect from elsewhere is a
-    bound: a phase of either sign, a displacement of its length.
+    They are the columns of the Cholesky factor of its covariance of quadratic phase, cubic phase and displacement
+    east and north. The first variable has the quadratic phase with all correlated effects, and each further variable
+    has what the variables before it leave over. An error without the coverage factor is a bound: its effects are
+    drawn with their full size and a random sign.
     """
     if not error.declared or error.full.covariance is None or error.counted_in:
         return
@@ -156,7 +159,10 @@ def _variable(
 def _requirements(
     mission: Mission, allocation: Allocation, variables: Sequence[Variable], *, is_placed: bool
 ) -> Iterator[HeldSum]:
-    """Requirements of `check` that declared errors count against; the location where it is known (`is_placed`)."""
+    """Requirements of `check` to which declared errors contribute.
+
+    The location error is included only with `is_placed`: then all errors have known displacements.
+    """
     present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
     owners_by_name = {
@@ -179,16 +185,17 @@ def _requirements(
 
 
 class _Predictions:
-    """Figures without draws: combinations by the rules of `check`, standard uncertainties, a normal distribution."""
+    """Results that need no draws: combined errors as in `check`, variances, and normal probabilities."""
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
         self.together = Together(analysis.errors, "full", (), (), analysis.random, analysis.groups)
         self.variables = variables
 
     def combined(self, judged: HeldSum, rule: str) -> float | None:
-        """Combined size of the errors that a requirement counts, by a rule of `allocation.combine`, in its unit.
+        """Combined size of the errors that contribute to a requirement, in the unit of the requirement.
 
-        The size includes the coverage factor. None if the errors leave no image.
+        `rule` is a rule of `allocation.combine`. The size includes the coverage factor. None if the errors leave no
+        image.
         """
         members = [phase for phase in self.together.phases if phase.owner in judged.owners]
         if judged.columns == (0,):
@@ -200,7 +207,7 @@ class _Predictions:
         return float(size[0]) if math.isfinite(size[0]) else None
 
     def variances(self, judged: HeldSum) -> dict[str, float]:
-        """Variance that each error, or each covariance, brings."""
+        """Variance that each error or covariance adds to a requirement's sum, by its id; unit of the sum, squared."""
         by_error: dict[str, float] = {}
         for variable in self.variables:
             if variable.owner in judged.owners:
@@ -209,11 +216,11 @@ class _Predictions:
         return by_error
 
     def is_normal(self, name: str) -> bool:
-        """Whether an error has a normal distribution; a covariance, which is no single variable, always has."""
+        """Whether all variables of an error or a covariance are normal; those of a covariance always are."""
         return all(v.distribution == "normal" for v in self.variables if v.of == name)
 
     def probability_normal(self, judged: HeldSum) -> float:
-        """Probability that a normal distribution with these variances stays within the limit."""
+        """Probability that a normally distributed sum with the variances of the errors is within the limit."""
         members = [variable.effects for variable in self.variables if variable.owner in judged.owners]
         a, b = judged.columns[0], judged.columns[-1]
         xx, yy, xy = (math.fsum(effects[i] * effects[j] for effects in members) for i, j in ((a, a), (b, b), (a, b)))
@@ -223,11 +230,13 @@ class _Predictions:
 
 
 def _within(radius: float, xx: float, yy: float, xy: float) -> float:
-    """Probability that a normal vector about zero, (2,), is no longer than a radius.
+    """Probability that a normal random vector (2,) with mean 0 is no longer than a radius.
 
-    With its principal sigmas a and b and z in polar form, |(a z₁, b z₂)| ≤ r is ρ² ≤ r²/(a²cos²θ + b²sin²θ), and
-    ρ² is exponential: a mean over θ of a smooth periodic function, which equal steps sum to rounding. For b = 0 it
-    is Craig's form of erf.
+    `xx`, `yy` and `xy` are the elements of its covariance. Let a and b be its principal sigmas, and let z be a
+    standard normal vector with polar coordinates ρ and θ. The condition |(a z₁, b z₂)| ≤ r is
+    ρ² ≤ r²/(a²cos²θ + b²sin²θ), and ρ² has an exponential distribution. The probability is therefore the mean of a
+    smooth periodic function of θ, which a sum with equal steps gives to rounding. For b = 0 it is Craig's form of
+    erf.
     """
     middle, spread = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy)
     large, small = middle + spread, max(0.0, middle - spread)
@@ -242,7 +251,10 @@ def _within(radius: float, xx: float, yy: float, xy: float) -> float:
 
 
 def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
-    """Confidence interval of a probability by Wilson's score: closed, and right for 0 and for all of few draws."""
+    """Confidence interval of a probability by Wilson's score; `quantile` is the quantile of the standard normal.
+
+    The formula also holds for few draws of which none or all succeed.
+    """
     p, z = successes / draws, quantile
     middle = p + z**2 / (2 * draws)
     half = z * math.sqrt(p * (1 - p) / draws + (z / (2 * draws)) ** 2)
@@ -277,7 +289,7 @@ def _requirement(
 
 
 def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
-    """Say where root-sum-square and the normal distribution do not describe the sum."""
+    """Warnings about a requirement for which root-sum-square or a normal distribution does not describe the sum."""
     # A covariance, which is no single variable, is always normal.
     if requirement.dominant_share > DOMINANT_FRACTION and not predictions.is_normal(requirement.dominant):
         yield (
@@ -297,12 +309,12 @@ def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Pred
 
 
 def _hides_phase(error: RandomError) -> bool:
-    """Whether band and turn hide more of an error's phase than a tenth of its quadratic phase."""
+    """Whether the phase of an error that band and turn hide exceeds a tenth of its quadratic phase."""
     return bool(np.any(error.full.hidden > _HIDDEN_FRACTION * np.abs(error.full.quadratic)))
 
 
 def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: bool) -> Iterator[Note]:
-    """Say what is drawn by a rule of ours, and what is not drawn."""
+    """Notes on errors that are drawn by a convention of this program, and on errors that are not drawn."""
     if is_exact:
         yield phrases.note("drawn-through-exact-ranges")
     if mission.gating_model != "full":

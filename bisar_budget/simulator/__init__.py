@@ -1,4 +1,4 @@
-"""Images of point scatterers with motion errors, from exact ranges. Needs NumPy."""
+"""Images of point scatterers with motion errors, formed from exact ranges. The package needs NumPy."""
 
 # What other rooms may use.
 __all__ = [

@@ -1,8 +1,8 @@
 """Autofocus of a complex image: phase gradient, map drift, and the rotation they need in a bistatic image.
 
-Motion errors smear an image along y′, across the bistatic look direction. Both estimators therefore take the
-rotated frame (x′, y′), x′ along the first axis; an image in (x, y) is turned there and back, as Section VI of
-Rigling & Moses does.
+Motion errors smear an image along y′, across the bistatic look direction. Both estimators therefore take an image in
+the rotated frame (x′, y′), with x′ along the first axis. An image in (x, y) is rotated to that frame and back, as in
+Section VI of Rigling & Moses.
 
 Sources: Wahl, Eichel, Ghiglia & Jakowatz, "Phase Gradient Autofocus - A Robust Tool for High Resolution SAR
 Phase Correction", IEEE Trans. AES 30 (1994); Jakowatz & Wahl, "Eigenvector method for maximum-likelihood
@@ -33,32 +33,34 @@ _CORRELATION_SIGMA = 6.0  # least correlation of a drift; the highest of many of
 
 @dataclass(frozen=True)
 class PhaseGradientSettings:
-    """Tunings of phase gradient autofocus.
+    """Numerical settings of phase gradient autofocus.
 
     Attributes
     ----------
     max_lines : int
-        Range lines used. More lines cost time and gain little.
+        Largest number of range lines that are used. More lines take more time and improve the estimate little.
     target_count, targets_per_line : int
-        Largest number of targets, in all and of one range line.
+        Largest number of targets in the image, and in one range line.
     secondary_fraction : float
-        Least power of a further target, as a fraction of the strongest power of its line. Sidelobes are weaker.
+        Smallest power of a second or further target, as a fraction of the largest power of its line. Sidelobes are
+        weaker.
     false_alarm_probability : float
         Probability that clutter alone shows a target anywhere in the image.
     clutter_floor_ratio : float
-        Least clutter power of a line over the peak power of the image: rounding is no clutter.
+        Lower bound of the clutter power of a line, as a ratio to the peak power of the image. Weaker values are
+        rounding, not clutter.
     smear_fraction : float
-        Level at which the mean response ends, as a fraction of its peak.
+        Level that bounds the mean response, as a fraction of its peak.
     shrink_factor : float
-        Window of an iteration over the window of the iteration before.
+        Smallest ratio of the window of an iteration to the window of the iteration before.
     narrowest_cells : int
         Half width of the last window. [cells]
     bridge_cells : int
-        Reach over a gap in the mean response. Nulls within a smeared response are narrower. [cells]
+        Widest gap in the mean response that is bridged. Nulls within a smeared response are narrower. [cells]
     coherent_rad : float
-        RMS phase below which responses add up in phase over the whole aperture. [rad]
+        RMS phase below which responses can be added coherently over the full aperture. [rad]
     significant_sigma : float
-        Least size of a component of a step, in standard deviations from clutter alone.
+        Smallest component of a step that is kept, in standard deviations of the components that clutter alone gives.
     """
 
     max_lines: int = 96
@@ -80,10 +82,10 @@ _PGA = PhaseGradientSettings()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Focused:
-    """Image after autofocus, and the phase taken out of its spectrum along the second axis. [rad]
+    """Image after autofocus, and the phase that was removed from its spectrum along the second axis. [rad]
 
-    `phase` is (ny,), in the order of `numpy.fft.fftfreq(ny)`, 0 outside the aperture's band and without constant
-    and linear part over it: they do not defocus, a linear one displaces.
+    `phase` is (ny,), in the order of `numpy.fft.fftfreq(ny)`. It is 0 outside the band of the aperture. It has no
+    constant or linear part over the band, because these do not defocus: a linear phase only displaces.
     """
 
     image: Complexes
@@ -91,29 +93,29 @@ class Focused:
 
 
 def phase_gradient_autofocus(image: Complexes) -> Focused:
-    """Estimate one phase error common to all range lines, of any shape, and take it out.
+    """Estimate a phase error of any shape that is common to all range lines, and remove it.
 
-    Targets stronger than clutter are picked, centred to a fraction of a sample, windowed, and transformed to the
-    aperture. While they are smeared, the gradient kernel estimates their common phase. Once they add up coherently,
-    the principal eigenvector of their covariance estimates it, by power iteration. The phase has no component that
-    the window cannot hold. Components of a step that clutter alone would give are dropped; the iteration ends with a
-    step without components.
+    Targets stronger than clutter are selected, centred to a fraction of a sample, windowed, and transformed to the
+    aperture. While they are smeared, the gradient kernel estimates their common phase. Once they can be added
+    coherently, the phase is estimated from the principal eigenvector of their covariance, by power iteration. The
+    phase only has components that vary slowly enough for the window. Components of a step that are as small as those
+    from clutter alone are dropped. The iteration ends when no component is left.
 
     Parameters
     ----------
     image : (nx, ny) ndarray
-        Complex image in the rotated frame (x′, y′), at baseband: its aperture's spectrum must be the same for
-        targets anywhere in the image. It may be oversampled and its band may lie anywhere.
+        Complex image in the rotated frame (x′, y′), at baseband: the spectrum of the aperture must lie at the same
+        frequencies for targets anywhere in the image. The image may be oversampled, and its band may lie anywhere.
 
     Returns
     -------
     Focused
-        The image itself and no phase if no target exceeds the clutter, as in a homogeneous scene.
+        The image unchanged and a phase of zeros if no target exceeds the clutter, as in a homogeneous scene.
 
     Raises
     ------
     ValueError
-        Not a two-dimensional image of finite numbers with at least 16 samples across.
+        The image is not two-dimensional, has values that are not finite, or has fewer than 16 samples along y′.
 
     Notes
     -----
@@ -148,12 +150,12 @@ def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
     image : (nx, ny) ndarray
         As for `phase_gradient_autofocus`.
     sub_apertures : int
-        2: quadratic; 3: quadratic and cubic.
+        2 estimates a quadratic phase, 3 a quadratic and a cubic phase.
 
     Returns
     -------
     Focused
-        The image itself and no phase if sub-aperture images do not correlate.
+        The image unchanged and a phase of zeros if sub-aperture images do not correlate.
 
     Raises
     ------
@@ -162,10 +164,11 @@ def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
 
     Notes
     -----
-    Map drift sees features that sub-apertures share: points, edges, texture. Speckle of disjoint sub-apertures is
-    independent, so a homogeneous scene gives no estimate. Orders above the model stay in the image and bias the
-    estimate: with two sub-apertures a cubic is not seen at all, and a quartic is partly taken for a quadratic. The
-    smear must stay small against the image's width, since the correlation is circular.
+    Map drift needs features that all sub-aperture images show: points, edges, texture. Speckle of disjoint
+    sub-apertures is independent, so a homogeneous scene gives no estimate. Phase errors of higher orders than the
+    estimated ones remain in the image and bias the estimate: with two sub-apertures a cubic phase has no effect on
+    the estimate, and a quartic phase is partly counted as quadratic. The smear must be much narrower than the image,
+    because the correlation is circular.
     """
     if sub_apertures not in (2, 3):
         raise ValueError(f"map drift works with 2 or 3 sub-apertures (got {sub_apertures})")
@@ -212,10 +215,10 @@ def autofocus_in_scene_axes(
     Parameters
     ----------
     image : (n, n) ndarray
-        Complex image on a square ground grid of equal spacing along x (first axis) and y, as `ground_grid` with
-        azimuth 0 lays it, centred on its sample n // 2. At baseband: the phase of the range to each pixel must
-        have been taken out, or it is a carrier beyond the sampling band. Sampled at least 1.42 times finer than
-        the band needs, because the band turns with the image.
+        Complex image on a square ground grid of equal spacing along x (first axis) and y, as from `ground_grid` with
+        azimuth 0, centred on its sample n // 2. The image must be at baseband: with the phase of the range to each
+        pixel in it, it would have a carrier beyond the sampling band. It must be sampled at least 1.42 times finer
+        than the band requires, because the band rotates with the image.
     look_azimuth : float
         φ_b, (11): direction of x′. [rad]
     algorithm : callable
@@ -224,13 +227,13 @@ def autofocus_in_scene_axes(
     Returns
     -------
     Focused
-        `image` in (x, y), (n, n); `phase` along y′ over (m,) frequencies of the same sampling interval. The largest
-        turned square that lies in the image has the side m; the error is estimated in this square.
+        `image` is in (x, y), (n, n). `phase` is along y′ for m frequencies of the same sampling interval, (m,). The
+        phase is estimated in the largest rotated square within the image, which has m samples on a side.
 
     Raises
     ------
     ValueError
-        The image is not square, the azimuth not finite, or what `algorithm` raises.
+        The image is not square, the azimuth is not finite, or `algorithm` raises it.
     """
     image = _checked(image)
     turned = rotated(image, look_azimuth)
@@ -282,17 +285,21 @@ def _corrected(image: Complexes, phase: Floats) -> Complexes:
 
 
 def _aperture_places(count: int) -> Floats:
-    """Places of the aperture samples, from -1 to 1, at the centres of equal cells."""
+    """Positions of `count` aperture samples between -1 and 1, at the centres of equal cells."""
     return (2 * np.arange(count) - (count - 1)) / count
 
 
 def _threshold(pixels: int) -> float:
-    """Power over mean clutter power that exponential clutter exceeds anywhere with the false-alarm probability."""
+    """Ratio of a pixel's power to the mean clutter power above which a pixel counts as a target.
+
+    In an image of `pixels` pixels of exponentially distributed clutter, any pixel exceeds it with the false-alarm
+    probability.
+    """
     return math.log(pixels / _PGA.false_alarm_probability)
 
 
 def _range_lines(image: Complexes) -> tuple[Indices, Floats]:
-    """Indices of the range lines with a target, strongest first, and the clutter power of each."""
+    """Indices of the range lines that have a target, strongest first, and the clutter power of each line."""
     power = image.real**2 + image.imag**2
     peak = power.max(axis=1)
     if not peak.max():
@@ -307,7 +314,10 @@ def _range_lines(image: Complexes) -> tuple[Indices, Floats]:
 
 
 def _common_phase(aperture: Complexes, line_samples: int, threshold: float) -> Floats:
-    """Phase over the band that is common to range lines of unit clutter, by iterated phase gradient autofocus."""
+    """Phase over the band that is common to all range lines, by iterated phase gradient autofocus, (count,). [rad]
+
+    `aperture` is the spectrum of range lines whose clutter power is 1.
+    """
     count = aperture.shape[1]
     per_cell = line_samples / count
     narrowest = math.ceil(_PGA.narrowest_cells * per_cell)
@@ -339,7 +349,7 @@ def _common_phase(aperture: Complexes, line_samples: int, threshold: float) -> F
 
 
 def _smear(power: Floats, per_cell: float) -> int:
-    """Reach of the mean response around each line's peak, both sides folded. [samples]"""
+    """Half width of the mean response around the peak of each line, with both sides folded. [samples]"""
     samples = power.shape[1]
     column = power.argmax(axis=1)[:, None]
     distance = np.arange(samples // 2)
@@ -357,7 +367,7 @@ def _smear(power: Floats, per_cell: float) -> int:
 
 
 def _targets(power: Floats, half: int, threshold: float) -> tuple[Indices, Indices]:
-    """Rows and columns of the strongest pixel of each line, and of further strong pixels outside its window."""
+    """Rows and columns of targets: the strongest pixel of each line, and further strong pixels outside its window."""
     remaining = power.copy()
     row = np.arange(power.shape[0])
     least_power = _PGA.secondary_fraction * power.max(axis=1)
@@ -376,10 +386,11 @@ def _targets(power: Floats, half: int, threshold: float) -> tuple[Indices, Indic
 
 
 def _centred(aperture: Complexes, column: Indices, samples: int) -> Complexes:
-    """Take each response's peak to sample 0 by a phase ramp, exactly.
+    """Shift the interpolated peak of each response to sample 0, by a phase ramp over the aperture.
 
-    A window off the peak by a fraction of a sample bends the phase at the aperture's edges, in each iteration in the
-    same direction, and the iteration would follow. Newton's method on the power finds the interpolated peak.
+    If the window were off the peak by a fraction of a sample, it would bend the phase at the edges of the aperture.
+    This would happen in the same direction in each iteration, and the estimate would drift. Newton's method on the
+    power finds the interpolated peak.
     """
     count = aperture.shape[1]
     turn = 2 * math.pi / samples
@@ -397,7 +408,10 @@ def _centred(aperture: Complexes, column: Indices, samples: int) -> Complexes:
 
 
 def _phasors(angle: Floats, count: int) -> Complexes:
-    """exp(j · angle · n), n = 0 … count - 1, as products of coarse and fine steps, to form few exponentials."""
+    """Phasors exp(j · angle · n) for n = 0 … count - 1, (angles, count).
+
+    They are products of coarse and fine steps, so that few exponentials are computed.
+    """
     fine = np.exp(1j * np.outer(angle, np.arange(32)))
     coarse = np.exp(1j * np.outer(angle, np.arange(0, count, 32)))
     phasors: Complexes = (coarse[:, :, None] * fine[:, None, :]).reshape(angle.size, -1)[:, :count]
@@ -405,10 +419,11 @@ def _phasors(angle: Floats, count: int) -> Complexes:
 
 
 def _basis(strength: Floats, order: int) -> Floats:
-    """Smooth functions over the aperture by rising frequency, orthonormal under its power: a cubic, then cosines.
+    """Smooth functions over the aperture, (count, functions): a cubic polynomial, then cosines of rising frequency.
 
-    The cubic takes up the ends' slopes, so that cosines of a smooth phase converge fast; the n-th turns n/2 times.
-    Samples outside the band, which leak into it in an image of finite extent, have no weight.
+    They are orthonormal with the power over the aperture as weight. The polynomial takes up the slopes at both ends,
+    so that the series of cosines of a smooth phase converges fast. The n-th cosine makes n/2 cycles over the
+    aperture. Samples outside the band have no weight; in an image of finite extent the response leaks into them.
     """
     aperture_place = _aperture_places(strength.size)
     columns = [aperture_place**power for power in range(4)]
@@ -420,7 +435,7 @@ def _basis(strength: Floats, order: int) -> Floats:
 
 
 def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -> Floats:
-    """Estimate the common phase of windowed, centred responses over the aperture, (count,). [rad]"""
+    """Estimate the common phase over the aperture from windowed and centred responses, (count,). [rad]"""
     count = responses.shape[1]
     # Gradient kernel: the maximum-likelihood phase difference of neighbours, integrated.
     difference = np.sum(responses[:, 1:] * responses[:, :-1].conj(), axis=0)
@@ -450,7 +465,10 @@ def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -
 
 
 def _drifts(aperture: Complexes, segments: list[Indices], pairs: list[tuple[int, int]]) -> Floats | None:
-    """Differences of phase slope between pairs of sub-apertures, per aperture sample; None if uncorrelated."""
+    """Differences of the phase slope between pairs of sub-apertures, per aperture sample.
+
+    None if the images of the sub-apertures do not correlate.
+    """
     samples = 2 * aperture.shape[1]  # a power has twice the band
     powers = [
         np.fft.fft(np.abs(np.fft.ifft(aperture[:, segment], samples, axis=1)) ** 2, axis=1) for segment in segments
@@ -479,7 +497,9 @@ def _drifts(aperture: Complexes, segments: list[Indices], pairs: list[tuple[int,
 
 # ---------------------------------------------------------------------- rotation
 def rotated(image: Complexes, look_azimuth: float) -> Complexes:
-    """Turn an image in (x, y) into the frame (x′, y′) of (10), by three shears, each a phase ramp in one dimension.
+    """Rotate an image in (x, y) to the frame (x′, y′) of (10), by three shears.
+
+    A shear is a phase ramp in one dimension.
 
     Source: Unser, Thévenaz & Yaroslavsky, "Convolution-based interpolation for fast, high-quality rotation of
     images", IEEE Trans. Image Processing 4 (1995); the shears here are by FFT, so exact for a band-limited image.
@@ -513,13 +533,13 @@ def rotated(image: Complexes, look_azimuth: float) -> Complexes:
 
 
 def scene_axes(image: Complexes, look_azimuth: float, count: int) -> Complexes:
-    """Turn an image in (x′, y′), as `rotated` gives it, back to (x, y) and take its middle, (count, count)."""
+    """Rotate an image in (x′, y′), from `rotated`, back to (x, y), and return its middle (count, count)."""
     start = image.shape[0] // 2 - count // 2
     return _turned(image, -look_azimuth)[start : start + count, start : start + count]
 
 
 def _turned(image: Complexes, angle_rad: float) -> Complexes:
-    """Image whose axes are turned by an angle: by exact quarter turns, then by shears over at most 45°."""
+    """Image with its axes rotated by an angle: by exact quarter turns, then by shears for at most 45°."""
     if not math.isfinite(angle_rad):
         raise ValueError(f"the look azimuth must be a finite angle (got {angle_rad} rad)")
     quarters = round(angle_rad / (math.pi / 2))
@@ -534,7 +554,7 @@ def _turned(image: Complexes, angle_rad: float) -> Complexes:
 
 
 def _sheared(image: Complexes, shear: float, axis: int) -> Complexes:
-    """new(u, v) = old(u + shear · v, v), u along `axis`."""
+    """Shear an image: new(u, v) = old(u + shear · v, v), with u along `axis`."""
     side = image.shape[0]
     frequency = np.fft.fftfreq(side)
     across = np.arange(side) - side // 2

@@ -1,4 +1,4 @@
-"""The collection of a mission and images of one point in it, with any errors, where exact ranges put it."""
+"""Collection of a mission with any errors, and images of one point, around the place that exact ranges give."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -61,15 +61,16 @@ _PULSES_PER_CELL, _LARGE_PATCH_CELLS = 4, 128  # a response repeats after as man
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RangeLines:
-    """Ground pixels along lines of equal range and of equal Doppler; a response is the product of its two cuts.
+    """Grid of ground pixels along lines of equal range and of equal Doppler.
 
-    A straight grid does not follow a response where a platform is near: the ridge of the response follows an ellipse,
-    and the range sidelobes follow lines of equal Doppler. Here the pixels of a line have the same range sum at the
-    aperture midpoint, and the pixels of a column have the same change of the range sum over the aperture. Lines are
-    followed from the middle outwards, so a patch may bend around a platform.
+    On this grid a response is the product of its two cuts. On a straight grid it is not if a platform is near: the
+    ridge of the response follows an ellipse, and the range sidelobes follow lines of equal Doppler. Here the pixels
+    of a line have the same range sum at the aperture midpoint, and the pixels of a column have the same change of the
+    range sum over the aperture. Lines are followed from the middle outwards, so a patch may bend around a platform.
 
-    If the line of sight turns so far that Doppler turns back, as on a full circle, the range sums at three moments do
-    not determine a point. The pixels then lie along straight lines, and sample the full wave-number support.
+    If the line of sight turns so far that Doppler reverses within the aperture, as on a full circle, the range sums
+    at three times do not determine a point. The pixels then lie along straight lines, and sample the full wave-number
+    support.
 
     `transmitter` and `receiver` are the measured positions at an odd number of times, evenly over the aperture,
     (times, 3). [m]
@@ -79,17 +80,23 @@ class RangeLines:
     receiver: Floats
 
     def gradients(self, points: Floats) -> tuple[Floats, Floats]:
-        """Gradients of the midpoint's range sum and of its change over the aperture, at points (..., 2): (..., 2)."""
+        """Gradients over the ground of the range sum at mid-aperture, and of its change over the aperture.
+
+        Points (..., 2) give two arrays (..., 2).
+        """
         first, middle, last = self._sums(points)
         return middle, last - first
 
     def _sums(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Gradients of the range sum at the beginning, the middle and the end, at points (..., 2): (..., 2)."""
+        """Gradients over the ground of the range sum at the first, middle and last time.
+
+        Points (..., 2) give three arrays (..., 2).
+        """
         sums = self._gradients(points, np.array([0, len(self.transmitter) // 2, -1]))
         return sums[..., 0, :], sums[..., 1, :], sums[..., 2, :]
 
     def _gradients(self, points: Floats, times: slice | NDArray[np.intp]) -> Floats:
-        """Gradients of the range sum at a selection of the times, at points (..., 2): (..., times, 2)."""
+        """Gradients over the ground of the range sum at selected times; points (..., 2) give (..., times, 2)."""
         sums: Floats = np.zeros(1)
         for platform in (self.transmitter[times], self.receiver[times]):
             ground = points[..., None, :] - platform[:, :2]
@@ -99,14 +106,18 @@ class RangeLines:
 
     @property
     def turns_back(self) -> bool:
-        """Whether Doppler turns back along the line of equal range through the scene centre."""
+        """Whether Doppler reverses within the aperture along the line of equal range through the scene centre."""
         gradients = self._gradients(np.zeros(2), slice(None))
         along = gradients @ _left(gradients[len(gradients) // 2])
         return bool(abs(along[-1] - along[0]) < _ONE_WAY_FRACTION * np.ptp(along))
 
     @staticmethod
     def _column(by_range: Floats, by_doppler: Floats) -> Floats:
-        """Step along equal Doppler over which the range sum grows by 1, at points (..., 2)."""
+        """Step along the line of equal Doppler over which the range sum grows by 1, (..., 2).
+
+        `by_range` and `by_doppler` are the results of `gradients` at points (..., 2). If the step is too long, it is
+        across the lines of equal range instead.
+        """
         slant = _left(by_doppler)
         square, slope = _dot(by_range, by_range), _dot(by_range, slant)
         # Where that step is too long, a step across the lines of equal range instead.
@@ -119,33 +130,36 @@ class RangeLines:
         return self._range_sum(points, [len(self.transmitter) // 2])
 
     def carrier(self, points: Floats) -> Floats:
-        """Range sum whose phase images leave out: at the midpoint, or the mean where Doppler turns back. [m]"""
+        """Range sum whose phase is removed from images, for points (..., 2 or 3), (...). [m]
+
+        It is the range sum at the midpoint, or its mean over time if Doppler reverses within the aperture.
+        """
         return self._range_sum(
             points, range(len(self.transmitter)) if self.turns_back else [len(self.transmitter) // 2]
         )
 
     def _range_sum(self, points: Floats, times: Sequence[int]) -> Floats:
-        """Mean range sum of ground points (..., 2 or 3) over a selection of the times, (...). [m]"""
+        """Mean over selected times of the range sum of ground points (..., 2 or 3), (...). [m]"""
         total: Floats = np.zeros(points.shape[:-1])
         for x, y, z in (platform[time] for time in times for platform in (self.transmitter, self.receiver)):
             total += np.sqrt((points[..., 0] - x) ** 2 + (points[..., 1] - y) ** 2 + z**2)
         return total / len(times)
 
     def turns_left(self, centre: GroundVector) -> bool:
-        """Whether the range sum grows over the aperture for points counter-clockwise of a ground point."""
+        """Whether the range sum increases over the aperture for points counter-clockwise of a ground point."""
         by_range, by_doppler = self.gradients(np.asarray(centre, dtype=float))
         return float(by_doppler @ _left(by_range)) < 0
 
     def axes(self, centre: GroundVector) -> Floats:
-        """Directions of x′, towards the platforms, and y′, counter-clockwise of it, as columns (2, 2)."""
+        """Unit vectors along x′, towards the platforms, and along y′, counter-clockwise of x′, as columns (2, 2)."""
         by_range = self.gradients(np.asarray(centre, dtype=float))[0]
         towards = -by_range / float(np.hypot(*by_range))
         return np.stack((towards, _left(towards)), axis=1)
 
     def cells(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
-        """Resolution at a ground point: peak to first null across the lines of equal range, and along them. [m]
+        """Resolution at a ground point across and along the lines of equal range: from peak to first null. [m]
 
-        Where Doppler turns back, these cells sample the wave-number support.
+        If Doppler reverses within the aperture, the cells are those that sample the wave-number support.
         """
         ground_point = np.asarray(centre, dtype=float)
         if self.turns_back:
@@ -159,10 +173,10 @@ class RangeLines:
         return float(SPEED_OF_LIGHT_MPS / (radar.bandwidth * steepness)), float(wavelength / (area / steepness))
 
     def sampled(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
-        """Cells for pixels to sample: `cells`, or finer cells across the lines. [m]
+        """Cell sizes that pixels must sample: those of `cells`, or finer across the lines of equal range. [m]
 
-        Over a long aperture near a platform, wavefronts bend: along its column a point is out of focus within less
-        than a cell, and the spectrum there is wider than the bandwidth.
+        Wavefronts are curved over a long aperture near a platform. A point is then out of focus less than a cell away
+        along its column, and the spectrum along the column is wider than the bandwidth.
         """
         across, along = self.cells(centre, radar)
         if self.turns_back:
@@ -175,9 +189,9 @@ class RangeLines:
         return min(across, _MAX_SPECTRUM_CELLS / (1 / across + wider)), along
 
     def offsets(self, ground_points: Floats, centre: GroundVector, radar: Band) -> Floats:
-        """Resolution cells from a ground point along x′ and y′, by range sum and by its change over the aperture.
+        """Distances of ground points from a centre along x′ and y′, in resolution cells; points (n, 2) give (n, 2).
 
-        Ground points (n, 2) give (n, 2).
+        They are computed from the range sum at mid-aperture and from its change over the aperture.
         """
         if self.turns_back:
             return np.asarray(
@@ -190,26 +204,27 @@ class RangeLines:
         return np.stack(cells, axis=1)[1:] / SPEED_OF_LIGHT_MPS
 
     def baseband(self, points: Floats, wavelength_m: float) -> Complexes:
-        """Phase that takes the `carrier` out of an image of points (..., 3).
+        """Phasor that removes the phase of the `carrier` range from an image at points (..., 3).
 
-        The image keeps the spectrum of the aperture. A backprojected image has the phase of the range to each pixel,
-        which close to a platform is a chirp across the patch and hides the aperture from autofocus.
+        The image keeps the spectrum of the aperture. A backprojected image has the phase of the range to each pixel.
+        Close to a platform this phase is a chirp across the patch, which hides the aperture from autofocus.
         """
         carrier_range = self.carrier(points) - self.carrier(np.zeros(2))
         phase: Complexes = np.exp(-2j * math.pi / wavelength_m * carrier_range)
         return phase
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
-        """Pixels around a ground point.
+        """Pixels of a patch around a ground point, along lines of equal range and of equal Doppler.
 
         Parameters
         ----------
         centre : (2,) float
-            East, north; the pixel (nx // 2, ny // 2). [m]
+            East and north of the pixel (nx // 2, ny // 2). [m]
         spacing : (2,) float
-            At the centre, across the lines and along them. [m]
+            Distance of neighbouring pixels at the centre, across the lines of equal range and along them. [m]
         shape : (2,) int
-            Lines, towards the platforms, and pixels of a line, counter-clockwise.
+            Number of lines, which follow each other towards the platforms, and number of pixels of a line,
+            counter-clockwise.
 
         Returns
         -------
@@ -226,11 +241,11 @@ class RangeLines:
         doppler_step = -spacing[1] * float(by_doppler @ _left(by_range)) / float(np.hypot(*by_range))
 
         def across(points: Floats) -> Floats:
-            """Step to the next line, along equal Doppler."""
+            """Step from points to the next line of equal range, along lines of equal Doppler."""
             return range_step * self._column(*self.gradients(points))
 
         def along(points: Floats) -> Floats:
-            """Step to the next pixel of a line, by an equal change of Doppler, with a limited length."""
+            """Step from points to the next pixel of a line, by an equal change of Doppler, limited in length."""
             g, d = self.gradients(points)
             tangent = -_left(g) / np.sqrt(_dot(g, g))
             slope, longest = _dot(d, tangent), _MAX_STRETCH_FACTOR * spacing[1]
@@ -256,7 +271,7 @@ class RangeLines:
 class Chip(NamedTuple):
     """Image of a patch, (nx, ny), and the ground points of its pixels, (nx, ny, 3). [m]
 
-    `spacing` is the distance of neighbouring pixels in the middle of the patch, along x′ and y′ [m]. Lines of pixels
+    `spacing` is the distance of neighbouring pixels in the middle of the patch, along x′ and y′. [m] Lines of pixels
     along y′ have equal range, and columns have equal Doppler, both by the measured paths. The phase of the
     range to each pixel at the midpoint is removed, so the spectrum of the image is that of the aperture, about zero.
     """
@@ -267,12 +282,12 @@ class Chip(NamedTuple):
 
     @property
     def cut(self) -> Complexes:
-        """Cross-range line through the centre, (ny,)."""
+        """Cross-range cut through the centre pixel, (ny,)."""
         middle: Complexes = self.image[self.image.shape[0] // 2]
         return middle
 
     def within(self, cells: int) -> "Chip":
-        """The middle of the chip, at most `cells` resolution cells along y′."""
+        """Middle part of the chip, at most `cells` resolution cells wide along y′."""
         columns = 2 * round(cells * OVERSAMPLING_FACTOR / 2)
         start = self.image.shape[1] // 2 - columns // 2
         if start <= 0:
@@ -282,7 +297,7 @@ class Chip(NamedTuple):
 
 
 class PointCollection:
-    """A mission's collection, for images of a single point."""
+    """Collection of a mission, for images of a single point."""
 
     def __init__(self, mission: Mission, geometry: BistaticGeometry) -> None:
         self.radar, self.geometry = mission.radar, geometry
@@ -302,7 +317,7 @@ class PointCollection:
         return SPEED_OF_LIGHT_MPS / self.radar.bandwidth
 
     def window(self, count: int) -> Floats:
-        """Weights over the aperture, or over the band, at the centres of `count` equal cells."""
+        """Weights of `count` samples over the aperture or over the band, at the centres of equal cells."""
         return taylor_window(count) if self.is_tapered else np.ones(count)
 
     def flight(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> Flight:
@@ -335,7 +350,7 @@ class PointCollection:
         frequencies: int,
         **noise: Unpack[ReceiverNoise],
     ) -> PhaseHistory:
-        """Phase history of scatterers (n, 3) at `frequencies` frequencies over the band, under the window."""
+        """Record scatterers (n, 3) at `frequencies` frequencies over the band, weighted by the window."""
         frequency = self.radar.center_frequency + cell_centres(self.radar.bandwidth, frequencies)
         history = flight.record(scatterers, amplitudes, slow_time, frequency, **noise)
         if self.is_tapered:
@@ -343,7 +358,7 @@ class PointCollection:
         return history
 
     def effect(self, errors: Errors, seen_from: GroundVector = (0.0, 0.0)) -> ExactEffect:
-        """Displacement and phases of a point of the ground, by exact ranges.
+        """Displacement and phases of a ground point, by exact ranges.
 
         Raises
         ------
@@ -355,7 +370,7 @@ class PointCollection:
         return exact_effect(self._nodes, transmitter, receiver, flight.seen, self.radar, self.aperture_time)
 
     def range_lines(self, errors: Errors) -> RangeLines:
-        """Lines of equal range by the measured paths without vibration, along which a processor lays its grid."""
+        """Lines of equal range for the measured paths without vibration, along which a processor lays its pixels."""
         times = np.linspace(-1.0, 1.0, _PATH_SAMPLES) * self.aperture_time / 2
         return RangeLines(*(path.measured for path in self.flight(errors.smooth(), times).paths))
 
@@ -376,20 +391,20 @@ class PointCollection:
         centre : (2,) float
             East, north. [m]
         errors : Errors
-            In the recorded data, and in the paths that the image is formed with.
+            Errors of the recorded data and of the measured paths from which the image is formed.
         scatterer : (2,) float
             East, north. [m]
         cells, range_cells : int
-            Extent in resolution cells along y′ and x′; no range cells give the single line through the centre.
+            Extent in resolution cells along y′ and x′. 0 range cells give a single line through the centre.
         is_reference : bool
-            The platforms flew as they were measured, with a perfect clock. This is the image of the same processor
-            without error.
+            Whether the platforms fly the measured paths, with a perfect clock. The result is the image that the same
+            processor forms without errors.
 
         Raises
         ------
         ValueError
-            The patch aliases with the mission's pulses, or is too large to be formed; or forming or reading it takes
-            more than `memory_limit`. No data are formed before that is known.
+            The patch aliases with the mission's number of pulses, the patch is too large, or forming or measuring the
+            image needs more memory than `memory_limit`. All three are checked before data are computed.
         """
         grid, spacing = self._grid(centre, errors, cells, range_cells)
         slow_time = cell_centres(self.aperture_time, pulses_for(cells))
@@ -408,7 +423,10 @@ class PointCollection:
     def pair(
         self, errors: Errors, ground_point: GroundVector, cells: int = CUT_CELLS, range_cells: int = RANGE_CELLS
     ) -> tuple[Chip, Chip]:
-        """Image with errors around the ground point to which they move the point, and the reference image there."""
+        """Form an image with errors around the displaced `ground_point` of the scene centre, and its reference image.
+
+        The reference image has a scatterer at `ground_point` and no errors.
+        """
         return (
             self.chip(ground_point, errors, cells=cells, range_cells=range_cells),
             self.chip(
@@ -419,7 +437,7 @@ class PointCollection:
     def _grid(
         self, centre: GroundVector, errors: Errors, cells: int, range_cells: int
     ) -> tuple[Floats, tuple[float, float]]:
-        """Pixels of a chip and their spacing. The last grid is kept, since images come in pairs."""
+        """Pixels of a chip, and their spacing. The last grid is cached, because images are formed in pairs."""
         key = (centre, errors.smooth(), cells, range_cells)
         if self._last_grid is None or self._last_grid[0] != key:
             lines = self.range_lines(errors)
@@ -435,7 +453,7 @@ class PointCollection:
         return self._last_grid[1:]
 
     def _frequencies(self, grid: Floats, flight: Flight, scatterer: GroundVector) -> int:
-        """Number of frequencies that keeps a range profile from repeating within a patch with its range walk."""
+        """Number of frequencies with which a range profile does not repeat within the patch, including range walk."""
         farthest = 0.0
         point = np.array([*scatterer, 0.0])
         for pulse in (0, len(flight.clock) // 2, -1):
@@ -450,7 +468,10 @@ class PointCollection:
         return max(_MIN_CHIP_FREQUENCY_COUNT, 16 * math.ceil((cells + _MIN_CHIP_FREQUENCY_COUNT / 2) / 16))
 
     def _require_room(self, cells: int, range_cells: float) -> None:
-        """Refuse a patch that aliases or is too large. More pulses than it needs would not change its image."""
+        """Raise a `ValueError` if a patch aliases or is too large.
+
+        More pulses than the patch needs would not change its image.
+        """
         if cells > MAX_CELLS:
             raise ValueError(f"a patch of {cells} resolution cells, at most {MAX_CELLS} are formed")
         if self.pulses is not None and self.pulses < 2 * cells:
@@ -462,7 +483,7 @@ class PointCollection:
         self._require_memory(pixels, pulses_for(cells), _MIN_CHIP_FREQUENCY_COUNT)
 
     def _require_memory(self, pixels: int, pulses: int, frequencies: int) -> None:
-        """Refuse a pair of images if forming or reading it takes more memory than the limit."""
+        """Raise a `ValueError` if forming or measuring a pair of images needs more memory than the limit."""
         forming = pulses * frequencies * _BYTES_PER_SAMPLE + bytes_held(self.kernel)
         reading = _BYTES_PER_CONTRIBUTION * min(pulses * pixels, 2 * MAX_CONTRIBUTION_COUNT) + bytes_held("numpy")
         needed = pixels * _BYTES_PER_PIXEL + max(forming, reading)
@@ -474,12 +495,18 @@ class PointCollection:
 
 
 def pulses_for(cells: int) -> int:
-    """Pulses of an image; half as many per cell for a large patch, whose repeats are far enough away."""
+    """Number of pulses for a patch of `cells` resolution cells.
+
+    A large patch needs only half as many pulses per cell, because its aliases are far enough away.
+    """
     return max(_PULSES_PER_CELL * min(cells, _LARGE_PATCH_CELLS), _PULSES_PER_CELL // 2 * cells)
 
 
 def _followed(step: Callable[[Floats], Floats], start: Floats, count: int) -> Floats:
-    """Follow a field of steps in both directions from points (..., 2): (count, ..., 2), the start at count // 2."""
+    """Follow a field of steps in both directions from points (..., 2).
+
+    Returns (count, ..., 2), with the start at index count // 2.
+    """
     back = count // 2
     direction = np.array([-1.0, 1.0]).reshape(2, *[1] * start.ndim)
     points = np.stack((start, start))
@@ -497,7 +524,7 @@ def _followed(step: Callable[[Floats], Floats], start: Floats, count: int) -> Fl
 
 
 def _between(a: Floats, slope_a: Floats, b: Floats, slope_b: Floats, t: Floats) -> Floats:
-    """Cubic through two points with their slopes per pixel."""
+    """Cubic interpolation between the points a and b, from their slopes per pixel, at fractions t."""
     slope_a, slope_b = _GRID_STRIDE_PIXELS * slope_a, _GRID_STRIDE_PIXELS * slope_b
     s = 1 - t
     cubic: Floats = s * s * (1 + 2 * t) * a + t * t * (1 + 2 * s) * b + s * t * (s * slope_a - t * slope_b)

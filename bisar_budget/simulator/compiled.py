@@ -1,10 +1,12 @@
-"""Backprojection compiled by Numba, in parallel: needs the extra `fast`. Import it only where Numba may be missing.
+"""Parallel backprojection compiled by Numba, which needs the extra `fast`.
 
-Profiles are refined until a B-spline of two taps (linear) or four (cubic) can read them. The transform of the spline
-is known in closed form, and the spectrum is divided by it. On a lattice of pixels the range is exact at the middle of
-every 32 pixels of a line and expanded to fourth order along them; elsewhere it is exact at every pixel. Whole cycles
-and whole samples are split off in double precision or integers, so that single precision holds only fractions, for
-any position of the scene and any wavelength.
+Import this module only where a missing Numba is handled.
+
+Range profiles are refined until a B-spline of two taps (linear) or four taps (cubic) can interpolate them. The
+spectrum is divided by the transform of the spline, which is known in closed form. On a lattice of pixels, the range
+is exact in the middle of each 32 pixels of a line, and expanded to fourth order along these pixels. For other pixels
+it is exact at each pixel. Whole cycles and whole samples are split off in double precision or integers. Single
+precision is used only for the fractions, for any position of the scene and any wavelength.
 """
 
 import math
@@ -52,7 +54,7 @@ _COUNTS_PER_CYCLE = 2.0**32  # a cycle in 32 bits, so that integer arithmetic dr
 
 
 class Lattice(NamedTuple):
-    """Evenly spaced pixels: origin + i·across + j·along, vectors (3,) [m]."""
+    """Evenly spaced pixels at origin + i·across + j·along, with vectors (3,) [m]."""
 
     origin: Floats
     across: Floats
@@ -60,7 +62,7 @@ class Lattice(NamedTuple):
     shape: tuple[int, int]
 
     def disc(self) -> tuple[Floats, float]:
-        """Centre and radius of a disc that holds all pixels, lines filled up to whole segments. [m]"""
+        """Centre and radius of a disc that contains all pixels, with lines extended to whole segments. [m]"""
         i, j = (self.shape[0] - 1) / 2, (-(-self.shape[1] // _SEGMENT_LENGTH) * _SEGMENT_LENGTH - 1) / 2
         centre = self.origin + i * self.across + j * self.along
         corners = (i * self.across + j * self.along, i * self.across - j * self.along)
@@ -68,12 +70,12 @@ class Lattice(NamedTuple):
 
 
 def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
-    """Recognise evenly spaced pixels.
+    """Recognise evenly spaced pixels, and return their lattice.
 
     Parameters
     ----------
     points : (..., 3) ndarray
-        [m]
+        Positions of the pixels. [m]
     tolerance : float
         Largest distance of a pixel from its place on the lattice. [m]
 
@@ -99,16 +101,16 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
 
 
 def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Complexes | None:
-    """Image by backprojection, see `image_formation.backprojection`; all inputs finite.
+    """Form an image by backprojection, as `image_formation.backprojection` does; all inputs must be finite.
 
     Parameters
     ----------
     history : PhaseHistory
         Frequencies evenly spaced.
     points : (..., 3) ndarray
-        Pixels, anywhere; fastest on a lattice. [m]
+        Positions of the pixels. It is fastest if they are on a lattice. [m]
     spline : "linear" or "cubic"
-        Spline that reads the profiles.
+        Spline that interpolates the profiles.
 
     Returns
     -------
@@ -154,9 +156,9 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
 
 
 def _neglected_phase(history: PhaseHistory, lattice: Lattice) -> float:
-    """Bound of the fifth order of the ranges along half a segment. [rad]
+    """Upper bound of the phase of the fifth order, which the expansion of ranges along half a segment omits. [rad]
 
-    In units of the distance, |r + x e| has the coefficients (P_{n-2} - P_n)/(2n - 1), P Legendre polynomials.
+    In units of the distance, |r + x e| has the coefficients (P_{n-2} - P_n)/(2n - 1), with Legendre polynomials P.
     """
     centre, radius = lattice.disc()
     half = _SEGMENT_LENGTH / 2 * float(np.linalg.norm(lattice.along))
@@ -170,7 +172,10 @@ def _neglected_phase(history: PhaseHistory, lattice: Lattice) -> float:
 
 
 class _Block(NamedTuple):
-    """Refined profiles of a block of pulses, two floats to an integer, and the numbers needed to read them."""
+    """Refined profiles of a block of pulses, and the numbers needed to interpolate them.
+
+    A sample of a profile is two floats stored in one 64-bit integer.
+    """
 
     profiles: np.ndarray[tuple[int, int], np.dtype[np.int64]]
     first: Floats  # position of each profile's first sample, in samples
@@ -182,16 +187,17 @@ class _Block(NamedTuple):
 
 
 class _Needed(NamedTuple):
-    """Part of each profile that pixels read: its first sample, (pulses,), and the number of samples."""
+    """Part of each profile that the pixels need: its first sample, (pulses,), and the number of samples."""
 
     first: np.ndarray[tuple[int], np.dtype[np.int64]]
     samples: int
 
 
 def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats, pixels: int) -> _Needed | None:
-    """Samples that pixels between two range sums, (pulses,) [m], can read; None if too many for the pixels.
+    """Part of the profiles that pixels between two range sums, (pulses,) [m], need.
 
-    A profile repeats: if more samples are needed than it has, they are repeats.
+    None if it has too many samples for the number of pixels. A profile is periodic: if more samples are needed than
+    it has, they repeat.
     """
     length = profile_length(history, _FFT_OVERSAMPLING_FACTOR)
     per_metre = cells_per_metre(history, length)
@@ -218,14 +224,14 @@ def _kernel(offset: Floats) -> Floats:
     """Exponential of a semicircle over ±_KERNEL_SAMPLES/2 cells, 1 at the centre.
 
     Source: Barnett, Magland & af Klinteberg, "A parallel non-uniform fast Fourier transform library based on an
-    'exponential of semicircle' kernel", 2019; the shape parameter is theirs for the oversampling.
+    'exponential of semicircle' kernel", 2019; the shape parameter is their value for this oversampling.
     """
     shape = 0.976 * math.pi * _KERNEL_SAMPLES * (1 - 1 / (2 * _FFT_OVERSAMPLING_FACTOR))
     return np.exp(shape * (np.sqrt(np.clip(1 - (2 * offset / _KERNEL_SAMPLES) ** 2, 0.0, None)) - 1))
 
 
 def _kernel_transform(angle: Floats) -> Floats:
-    """Fourier transform of the kernel at an angular frequency per cell, by Gauss-Legendre quadrature."""
+    """Fourier transform of `_kernel` at angular frequencies in radians per cell, by Gauss-Legendre quadrature."""
     nodes, weights = np.polynomial.legendre.leggauss(64)
     offset = nodes * _KERNEL_SAMPLES / 2
     transform: Floats = np.cos(np.outer(angle, offset)) @ (weights * _kernel(offset)) * _KERNEL_SAMPLES / 2
@@ -233,10 +239,10 @@ def _kernel_transform(angle: Floats) -> Floats:
 
 
 def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> Iterator[_Block]:
-    """Refine the needed part of each profile, for blocks of as many pulses as fit in a cache.
+    """Refine the needed part of each profile, for blocks of as many pulses as fit into a cache.
 
-    Patches follow resolution cells, which may be a hundred times longer than wide: the pixels of a patch need fewer
-    samples than a ball around the patch.
+    A patch is laid out in resolution cells, which may be a hundred times longer than wide. Its pixels need fewer
+    samples than a sphere around the patch.
     """
     length, factor, order = (
         profile_length(history, _FFT_OVERSAMPLING_FACTOR),
@@ -274,7 +280,7 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> I
 
 @_parallel
 def _refine(profiles, first, weights, refined):
-    """Interpolate between the samples of repeating profiles, into real and imaginary parts."""
+    """Interpolate periodic profiles to a finer sampling, with real and imaginary parts alternating in `refined`."""
     length, factor = profiles.shape[1], weights.shape[1]
     count = refined.shape[1] // (2 * factor)
     for pulse in prange(profiles.shape[0]):
@@ -305,7 +311,7 @@ _C0, _C1, _C2, _C3, _C4 = (np.float32(c) for c in _COSINE)
 
 @_compiled
 def _phasor(cycles):
-    """exp(2πj·cycles) in single precision for |cycles| up to a bit beyond ½: the square of half the turn."""
+    """exp(2πj·cycles) in single precision, as the square of exp(πj·cycles); |cycles| may slightly exceed ½."""
     z = cycles * cycles
     sine = cycles * (_S0 + z * (_S1 + z * (_S2 + z * (_S3 + z * _S4))))
     cosine = _C0 + z * (_C1 + z * (_C2 + z * (_C3 + z * _C4)))
@@ -314,7 +320,10 @@ def _phasor(cycles):
 
 @_compiled
 def _expand(middle, platform, along, ranges):
-    """Add one leg's range at the middle of each segment and its orders along it, per pixel."""
+    """Add the range from one platform to `ranges`: its value at the middle of each segment, and four further orders.
+
+    The orders are the coefficients of the expansion along the segment, per pixel.
+    """
     px, py, pz = platform[0], platform[1], platform[2]
     ex, ey, ez = along[0], along[1], along[2]
     square = ex * ex + ey * ey + ez * ez
@@ -333,7 +342,10 @@ def _expand(middle, platform, along, ranges):
 
 @_compiled
 def _split(ranges, per_metre, first, cycles, whole_samples, fraction, turn, order):
-    """Split off whole samples and whole cycles, in double precision."""
+    """Split the ranges of segments into whole and fractional samples, and remove whole cycles.
+
+    This is done in double precision.
+    """
     for i in range(ranges.shape[1]):
         cell, step = ranges[0, i] * per_metre - first, ranges[1, i] * per_metre
         whole_samples[0, i], whole_samples[1, i] = _I(np.floor(cell)), _I(np.rint(step))
@@ -353,7 +365,7 @@ def _split(ranges, per_metre, first, cycles, whole_samples, fraction, turn, orde
 def _sample_points(whole_samples, fraction, turn, order, cells_per_cycle, index, between, cycles):
     """Sample before each pixel, distance of the pixel from that sample, and cycles of the carrier at the pixel.
 
-    Cycles are in integers up to second order, in fractions of a cycle beyond.
+    Cycles up to second order are computed in integers, and higher orders as fractions of a cycle.
     """
     for i in range(between.shape[0]):
         base, step, start, slope = whole_samples[0, i], whole_samples[1, i], fraction[0, i], fraction[1, i]
@@ -386,7 +398,7 @@ def _cubic(v):
 
 @_compiled
 def _fetch(profile, index, cubic, fetched):
-    """Fetch the taps of each pixel, two or four."""
+    """Copy the profile samples that each pixel needs, two or four, to `fetched`."""
     for i in range(index.shape[0]):
         if cubic:
             for j in range(_SEGMENT_LENGTH):
@@ -408,7 +420,7 @@ def _fetch(profile, index, cubic, fetched):
 
 @_compiled
 def _add_taps(taps, between, cycles, cubic, real, imag):
-    """Add the value of the B-spline times the carrier."""
+    """Add the interpolated value of the profile, times the phasor of the carrier, to each pixel."""
     for i in range(real.shape[0]):
         if cubic:
             for j in range(_SEGMENT_LENGTH):
@@ -433,7 +445,7 @@ def _add_taps(taps, between, cycles, cubic, real, imag):
 def _add_lattice(
     profiles, first, transmitter, receiver, reference, per_metre, cycles, origin, across, along, cubic, image
 ):
-    """Add a block of pulses to the pixels of a lattice, in tiles of segments of lines."""
+    """Add the contributions of a block of pulses to the pixels of a lattice, in tiles of line segments."""
     segments = image.shape[1] // _SEGMENT_LENGTH
     groups = (image.shape[0] + _TILE_ROWS - 1) // _TILE_ROWS
     cells_per_cycle = _F(per_metre / cycles)
@@ -469,7 +481,7 @@ def _add_lattice(
 
 @_compiled
 def _sums(points, transmitter, receiver, reference, sums):
-    """Range sum of each pixel minus the reference of a pulse."""
+    """Compute the range sum of each pixel minus the reference range sum of a pulse, into `sums`. [m]"""
     tx, ty, tz = transmitter[0], transmitter[1], transmitter[2]
     rx, ry, rz = receiver[0], receiver[1], receiver[2]
     for i in range(sums.shape[0]):
@@ -479,7 +491,10 @@ def _sums(points, transmitter, receiver, reference, sums):
 
 
 def _boxes(lines: Floats) -> tuple[Floats, Floats]:
-    """Boxes around runs of points (nx, ny, 3), along the direction from the first to the last point of each run.
+    """Boxes that enclose runs of successive points in each line (nx, ny, 3), oriented from first to last point.
+
+    With the boxes, the part of a profile that a patch needs is found in a few steps. With the pixels themselves it
+    would take as long as an image.
 
     The boxes give the part of a profile that a patch reads in a few steps; the pixels would take as long as an image.
 
@@ -511,7 +526,7 @@ def _boxes(lines: Floats) -> tuple[Floats, Floats]:
 
 @_compiled
 def _leg(position, box, centres):
-    """Distance and direction from a platform to the middle of a box; the direction is 0 at distance 0."""
+    """Distance from a platform to the middle of a box, and unit vector; the vector is 0 if the distance is 0."""
     x, y, z = centres[0, box] - position[0], centres[1, box] - position[1], centres[2, box] - position[2]
     distance = math.sqrt(x * x + y * y + z * z)
     scale = 1.0 / distance if distance > 0.0 else 0.0
@@ -520,13 +535,17 @@ def _leg(position, box, centres):
 
 @_compiled
 def _bend(distance, size):
-    """Upper bound of the error when a distance is approximated linearly around a point, up to `size` from it. [m]"""
+    """Upper bound of the error if a distance is approximated linearly up to `size` from a point. [m]"""
     return min(size, size * size / (2.0 * (distance - size))) if distance > size else 2.0 * size
 
 
 @_parallel
 def _reach(transmitter, receiver, centres, halves):
-    """Bounds of the range sum at each pulse over boxes: convex, so above its tangent, with a bend of r²/2R."""
+    """Lower and upper bound of the range sum over all boxes, at each pulse. [m]
+
+    The range sum is convex, so it is above its tangent at the middle of a box, and exceeds the tangent by at most
+    r²/2R.
+    """
     nearest, farthest = np.empty(transmitter.shape[0]), np.empty(transmitter.shape[0])
     for pulse in prange(transmitter.shape[0]):
         low, high = np.inf, -np.inf
@@ -547,7 +566,7 @@ def _reach(transmitter, receiver, centres, halves):
 
 @_compiled
 def _split_points(sums, per_metre, first, cycles, index, between, turn):
-    """Sample before each pixel, distance of the pixel from that sample, and fraction of its cycles."""
+    """Sample before each pixel, distance of the pixel from that sample, and fractional cycles of the carrier."""
     for i in range(index.shape[0]):
         for j in range(_SEGMENT_LENGTH):
             cell = sums[i * _SEGMENT_LENGTH + j] * per_metre - first
@@ -559,7 +578,7 @@ def _split_points(sums, per_metre, first, cycles, index, between, turn):
 
 @_parallel
 def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cycles, points, cubic, image):
-    """Add a block of pulses to scattered pixels, (3, n), each at its exact range."""
+    """Add the contributions of a block of pulses to scattered pixels, (3, n), each at its exact range."""
     for tile in prange((image.shape[0] + _TILE_ROWS * _SEGMENT_LENGTH - 1) // (_TILE_ROWS * _SEGMENT_LENGTH)):
         start = tile * _TILE_ROWS * _SEGMENT_LENGTH
         count = min(_TILE_ROWS * _SEGMENT_LENGTH, image.shape[0] - start)

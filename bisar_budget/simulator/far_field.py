@@ -1,6 +1,6 @@
-"""Image formation in the far field, plane waves for ranges: the filter (7), (12), and the polar format (13), (14).
+"""Image formation in the far field, with plane waves: the filter (7), (12), and the polar format (13), (14).
 
-Both defocus and displace points away from the scene centre. That is the effect of the approximation (5).
+Both methods defocus and displace points away from the scene centre, because of the approximation (5).
 """
 
 import math
@@ -26,18 +26,18 @@ _STENCIL_SAMPLES = 12  # per interpolation
 def far_field_filter(
     history: PhaseHistory, points: Floats, method: Literal["auto", "direct", "nufft"] = "auto"
 ) -> Complexes:
-    """Image by the far-field filter: (7), which for points on the ground is (12).
+    """Form an image by the far-field filter (7), which for points on the ground is (12).
 
     Parameters
     ----------
     history : PhaseHistory
-        Any frequencies.
+        Frequencies may be spaced unevenly.
     points : (..., 3) ndarray
-        Pixels, anywhere. [m]
+        Positions of the pixels. [m]
     method : "auto", "direct" or "nufft"
-        Direct is the sum as printed. NUFFT is by finufft (extra `fast`), gives the same numbers to -120 dB and is
-        much faster on images. Auto uses it if it is installed, except for points so far apart that its grid would
-        not fit into memory.
+        "direct" computes the sum as in the paper. "nufft" uses finufft (extra `fast`), gives the same values to
+        -120 dB, and is much faster for images. "auto" uses finufft if it is installed, except for points so far apart
+        that its grid would not fit into memory.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def far_field_filter(
     ValueError
         A position that is not finite.
     ImportError
-        The NUFFT is asked for and finufft is missing.
+        `method` is "nufft" and finufft is not installed.
     """
     flat = np.reshape(np.asarray(points, dtype=float), (-1, 3))
     if not np.isfinite(flat).all():
@@ -70,16 +70,16 @@ def far_field_filter(
 
 @cache
 def is_nonuniform() -> bool:
-    """Whether finufft is installed, for a non-uniform FFT."""
+    """Whether finufft, which computes a non-uniform FFT, is installed."""
     return find_spec("finufft") is not None
 
 
 def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: bool) -> Complexes | None:
-    """Sum of (7) by a non-uniform FFT; None if it is `bounded` and its grid would be too large.
+    """Sum of (7) by a non-uniform FFT; None if `bounded` and the grid of the FFT would be too large.
 
-    The size of the grid is the box around the points times the box around the wavenumbers, each along and across the
-    look direction. Along different axes, the box of a patch, whose cells may be kilometres wide, would have millions
-    of cells.
+    The number of cells of the grid is the size of the box around the points times the size of the box around the
+    wavenumbers. Both boxes are along and across the look direction. Along other axes, the box of a patch whose cells
+    are kilometres wide would give millions of cells.
     """
     import finufft
 
@@ -108,7 +108,7 @@ def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: 
 
 
 class PolarFormat(NamedTuple):
-    """Image (nx, ny), and the grid (13) it was formed from: f′x (Nx,) and f′y (Ny,). [Hz]"""
+    """Image (nx, ny), and the frequency grid (13) from which it was formed: f′x (Nx,) and f′y (Ny,). [Hz]"""
 
     image: Complexes
     frequency_x: Floats
@@ -122,10 +122,11 @@ def polar_format(
     shape: tuple[int, int],
     centre: GroundVector = (0.0, 0.0),
 ) -> PolarFormat:
-    """Image by (14): samples interpolated to the rectangular grid (13) of the rotated frame, then an FFT.
+    """Form an image by (14): interpolate samples to the rectangular grid (13) of the rotated frame, then use an FFT.
 
-    The grid is a rectangle within the recorded frequencies, so it trims the aperture's corners, the more the larger
-    the relative bandwidth and the squint are. Its step is c/(2·size): the image repeats with its size.
+    The grid is a rectangle within the recorded frequencies, so it omits the corners of the aperture. It omits more if
+    the relative bandwidth or the squint is larger. The step of the grid is c/(2·size), so the image repeats with its
+    size.
 
     Parameters
     ----------
@@ -134,12 +135,12 @@ def polar_format(
     look_azimuth : float
         φ_b of (11). [rad]
     size : (2,) float
-        Extent along x′ and y′ about the patch's centre. [m]
+        Extent along x′ and y′, centred on the patch. [m]
     shape : (2,) int
-        Pixels along x′ and y′; they are those of `ground_grid(centre, look_azimuth, size, shape)`.
+        Number of pixels along x′ and y′. The pixels are those of `ground_grid(centre, look_azimuth, size, shape)`.
     centre : (2,) float
-        Centre of the patch, east and north. The samples are moved to it by plane waves before they are interpolated:
-        this is (14) at other pixels, with the same approximation (5). [m]
+        Centre of the patch, east and north. [m] The phase of a plane wave at the centre is removed from the samples
+        before they are interpolated. This is (14) at other pixels, with the same approximation (5).
 
     Returns
     -------
@@ -198,18 +199,19 @@ def polar_format(
 
 
 def _grid(low: float, high: float, step: float) -> Floats:
-    """Multiples of a step within bounds, whose FFT has no carrier."""
+    """Multiples of a step between two bounds; the FFT of such a grid has no carrier."""
     first, last = math.ceil(low / step), math.floor(high / step)
     return np.arange(first, last + 1, dtype=float) * step
 
 
 def _interpolated(rows: Complexes, positions: Floats) -> Complexes:
-    """Lagrange interpolation of evenly spaced samples; at the ends the stencil stays inside.
+    """Lagrange interpolation of evenly spaced samples; near the ends the stencil stays within the samples.
 
     Parameters
     ----------
     rows : (rows, samples) ndarray
-        Sampled at least about twice as finely as necessary: the scene is at most half as large as it could be.
+        Samples, at least about twice as dense as necessary; the scene is then at most half as large as the sampling
+        allows.
     positions : (rows, points) ndarray
         Positions along the rows. [samples]
     """

@@ -1,8 +1,8 @@
-"""Image formers with the same methods: the pixels that each one takes, where it puts a point, its baseband image.
+"""Image formers with a common interface: the pixels they use, where they show a point, and their baseband image.
 
-A former by exact ranges, (4), puts a response at the displaced point itself and takes pixels along lines of equal
-range. One by plane waves, (7) to (14), puts it where plane waves have the recorded range history, and takes straight
-lines along the axes (x′, y′) of (10). Ground points are east, north [m].
+A former by exact ranges, (4), shows a point at the displaced point, and uses pixels along lines of equal range. A
+former by plane waves, (7) to (14), shows a point where plane waves have the recorded range history. It uses straight
+lines of pixels along the axes (x′, y′) of (10). Ground points are east and north. [m]
 """
 
 import math
@@ -34,7 +34,7 @@ OnPixels = Callable[[int], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExactRangeFormer:
-    """Matched filter (4) or backprojection, which equals it."""
+    """Image former by exact ranges: matched filter (4), or backprojection, which gives the same image."""
 
     lines: RangeLines
     radar: Band
@@ -47,19 +47,19 @@ class ExactRangeFormer:
         return _DIRECT_BYTES if self.is_direct else bytes_held(self.kernel)
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
-        """Ground point at which the image shows a point, from its displaced point and recorded range history. [m]"""
+        """Ground point at which the image shows a target; here the displaced point itself. [m]"""
         return displaced
 
     def remaining_range(self, ground_point: GroundVector, remaining_range: Floats, recorded: Floats) -> Floats:
-        """Remaining range history at a ground point, from that by exact ranges at the displaced point. [m]"""
+        """Range history that remains at a ground point; here `remaining_range`, that at the displaced point. [m]"""
         return remaining_range
 
     def cells(self, centre: GroundVector) -> tuple[float, float]:
-        """Resolution along x′ and y′, peak to first null. [m]"""
+        """Resolution along x′ and y′, from peak to first null. [m]"""
         return self.lines.cells(centre, self.radar)
 
     def sampled(self, centre: GroundVector) -> tuple[float, float]:
-        """Cells for pixels to sample, no larger than the resolution. [m]"""
+        """Cell sizes that pixels must sample, at most the resolution. [m]"""
         return self.lines.sampled(centre, self.radar)
 
     def look(self, centre: GroundVector) -> Floats:
@@ -68,7 +68,7 @@ class ExactRangeFormer:
         return towards
 
     def offsets(self, ground_points: Floats, centre: GroundVector) -> Floats:
-        """Resolution cells from the centre along x′ and y′; ground points (n, 2) give (n, 2)."""
+        """Distances of ground points (n, 2) from a centre along x′ and y′, in resolution cells, (n, 2)."""
         return self.lines.offsets(ground_points, centre, self.radar)
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
@@ -80,7 +80,7 @@ class ExactRangeFormer:
         return _in_blocks(lambda block: self._formed(history, block), grid, on_pixels)
 
     def seconds(self, trial_history: PhaseHistory, pulses: int, grid: Floats) -> float:
-        """Approximate time to form an image of `pulses` pulses, measured with a trial of few pulses. [s]"""
+        """Estimate the time to form an image from `pulses` pulses, measured in a trial with few pulses. [s]"""
         is_quick = not self.is_direct and self.kernel != "numpy"
         return _extrapolated(
             self._formed, trial_history, pulses, grid, _COMPILED_TRIAL_PIXELS if is_quick else _TRIAL_PIXELS
@@ -94,10 +94,10 @@ class ExactRangeFormer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaneWaves:
-    """Far-field filter (12), or polar format (13) and (14).
+    """Image former by plane waves: far-field filter (12), or polar format (13) and (14).
 
-    `sight` is the sum of the look vectors of both measured platforms over slow time, (times, 2), for an odd number of
-    times with the midpoint in the middle.
+    `sight` (times, 2) is the sum of the unit vectors to both measured platforms on the ground, at an odd number of
+    slow times with the aperture midpoint in the middle.
     """
 
     sight: Floats
@@ -108,17 +108,17 @@ class PlaneWaves:
 
     @property
     def middle(self) -> Floats:
-        """Sum of look vectors at the midpoint, (2,)."""
+        """Sum of the unit vectors to the platforms at the aperture midpoint, on the ground, (2,)."""
         towards: Floats = self.sight[len(self.sight) // 2]
         return towards
 
     @property
     def azimuth(self) -> float:
-        """φ_b of (11) by the measured paths. [rad]"""
+        """Bistatic look direction φ_b of (11), for the measured paths. [rad]"""
         return math.atan2(self.middle[1], self.middle[0])
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
-        """Point whose plane waves leave the phase with the least variance, (5) in place of exact ranges."""
+        """Ground point for which the phase that plane waves (5) leave has the smallest variance. [m]"""
         slow_time, sampling = np.linspace(-1, 1, len(self.sight)), nodes(_HISTORY_ORDER + 1)
         fitted = np.polynomial.legendre.legfit(slow_time, np.c_[self.sight, recorded], _HISTORY_ORDER)
         *sight, error = np.polynomial.legendre.legval(sampling.places, fitted)[..., None]
@@ -127,18 +127,18 @@ class PlaneWaves:
         return float(by_east), float(by_north)
 
     def remaining_range(self, ground_point: GroundVector, remaining_range: Floats, recorded: Floats) -> Floats:
-        """Remaining range history at a ground point, which includes the error of the far field. [m]"""
+        """Remaining range history at a ground point, including the error of the far-field approximation. [m]"""
         range_history: Floats = recorded + self.sight @ np.asarray(ground_point)
         return range_history
 
     def cells(self, centre: GroundVector) -> tuple[float, float]:
-        """Resolution of the full recorded support, corners of the aperture included. [m]"""
+        """Resolution along x′ and y′ from the full wave-number support, including the corners of the aperture. [m]"""
         cosine, sine = math.cos(self.azimuth), math.sin(self.azimuth)
         along, across = cells_of_support(self.sight, np.array([[cosine, -sine], [sine, cosine]]), self)  # (9)
         return float(along), float(across)
 
     def sampled(self, centre: GroundVector) -> tuple[float, float]:
-        """Cells for pixels to sample: those of the full recorded support. [m]"""
+        """Cell sizes that pixels must sample: those of the full wave-number support. [m]"""
         return self.cells(centre)
 
     def look(self, centre: GroundVector) -> Floats:
@@ -146,18 +146,18 @@ class PlaneWaves:
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth)])
 
     def offsets(self, ground_points: Floats, centre: GroundVector) -> Floats:
-        """Cells from the centre, in the axes of (10)."""
+        """Distances of ground points (n, 2) from a centre along the axes of (10), in resolution cells, (n, 2)."""
         cosine, sine = self.look(centre)
         rotated = (ground_points - np.asarray(centre)) @ np.array([[cosine, -sine], [sine, cosine]])
         return np.asarray(rotated / np.array(self.cells(centre)))
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
-        """Pixels along the axes of (10)."""
+        """Pixels of a patch along the axes of (10), (nx, ny, 3). [m]"""
         size = (spacing[0] * shape[0], spacing[1] * shape[1])
         return ground_grid(centre, self.azimuth, size, shape)
 
     def image(self, history: PhaseHistory, grid: Floats, on_pixels: OnPixels) -> Complexes:
-        """Form the image; by polar format on a grid of `grid` only."""
+        """Form the image at pixels (nx, ny, 3). The polar format takes only pixels from `grid`."""
         if not self.is_polar:
             return _in_blocks(lambda block: far_field_filter(history, block) * self._carrier(block), grid, on_pixels)
         nx, ny = grid.shape[:2]
@@ -171,7 +171,7 @@ class PlaneWaves:
         return formed * self._carrier(grid)
 
     def seconds(self, trial_history: PhaseHistory, pulses: int, grid: Floats) -> float:
-        """Approximate time to form an image: a Fourier transform uses each sample and each pixel a few times. [s]"""
+        """Estimate the time to form an image; a Fourier transform uses each sample and each pixel a few times. [s]"""
         if not self.is_polar and not is_nonuniform():
             return _extrapolated(far_field_filter, trial_history, pulses, grid, _TRIAL_PIXELS)
         pixels = grid.shape[0] * grid.shape[1]
@@ -179,7 +179,7 @@ class PlaneWaves:
         return _SECONDS_PER_SAMPLE * float(blocks * pulses * trial_history.frequency.size + pixels)
 
     def _carrier(self, points: Floats) -> Complexes:
-        """Phase of the range at the midpoint for plane waves, as in `RangeLines.baseband`."""
+        """Phasor that removes the phase of the plane-wave range at mid-aperture, as `RangeLines.baseband` does."""
         wavenumber = 2 * math.pi * self.center_frequency / SPEED_OF_LIGHT_MPS
         carrier: Complexes = np.exp(1j * wavenumber * (points[..., :2] @ self.middle))
         return carrier
@@ -195,7 +195,7 @@ def _extrapolated(
     grid: Floats,
     trial_count: int,
 ) -> float:
-    """Time for a grid and all pulses, from the second run of a trial with few pixels and few pulses. [s]"""
+    """Estimate the time for a full image from the second run of a trial with few pixels and few pulses. [s]"""
     trial_pixels = grid[: max(1, trial_count // grid.shape[1]), :trial_count]
     form(trial_history, trial_pixels)
     start_time = time.perf_counter()

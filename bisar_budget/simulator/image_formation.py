@@ -1,6 +1,6 @@
-"""Image formation: the matched filter (4), which is exact, and backprojection, which is fast.
+"""Image formation by the matched filter (4), which is exact, and by backprojection, which is fast.
 
-Both use the measured positions, as a processor must, and give a point scatterer of amplitude A the peak |A|.
+Both use the measured positions, as a processor must. A point scatterer of amplitude A has the peak |A|.
 """
 
 import math
@@ -26,7 +26,7 @@ Kernel = Literal["auto", "numpy", "cubic", "linear"]
 
 
 def differential_range(history: PhaseHistory, points: Floats, pulse: int) -> Floats:
-    """ΔR of points (n, 3) for the measured positions at a pulse, exact, (n,). [m]"""
+    """Exact differential range ΔR of points (n, 3) at a pulse, for the measured positions, (n,). [m]"""
     total: Floats = np.zeros(len(points))
     for position in (history.transmitter[pulse], history.receiver[pulse]):
         total = total + np.linalg.norm(position - points, axis=-1) - np.linalg.norm(position, axis=-1)
@@ -34,14 +34,14 @@ def differential_range(history: PhaseHistory, points: Floats, pulse: int) -> Flo
 
 
 def matched_filter(history: PhaseHistory, points: Floats) -> Complexes:
-    """Image by (4): the sum over pulses and frequencies, nothing approximated.
+    """Form an image by (4): the sum over pulses and frequencies, without approximation.
 
     Parameters
     ----------
     history : PhaseHistory
-        Weighted beforehand if a window is wanted.
+        Samples; apply a window to them before the call if one is wanted.
     points : (..., 3) ndarray
-        Pixels, anywhere. [m]
+        Positions of the pixels. [m]
 
     Returns
     -------
@@ -54,7 +54,7 @@ def matched_filter(history: PhaseHistory, points: Floats) -> Complexes:
 
 
 def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, int], Floats]) -> Complexes:
-    """Sum of (4) over pulses and frequencies, with ΔR of points (n, 3) at a pulse by `ranges(points, pulse)`."""
+    """Compute the sum of (4) over pulses and frequencies, with ΔR from `ranges(points, pulse)` for points (n, 3)."""
     image: Complexes = np.zeros(points.shape[0], dtype=complex)
     wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT_MPS
     coarse, fine = split(wavenumber) if is_even(history.frequency) else (wavenumber, np.zeros(1))
@@ -73,21 +73,22 @@ def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, 
 
 
 def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto") -> Complexes:
-    """Image by interpolation of range profiles: (4) to -120 dB at a fraction of its cost.
+    """Form an image by interpolation of range profiles, equal to (4) to -120 dB at a fraction of its cost.
 
-    Each pulse's spectrum is divided by the transform of a spline, taken to a range profile by FFT, and read at the
-    pixels' differential ranges. A profile repeats every c/Δf in range; pixels farther
-    apart than that alias; the caller must prevent this.
+    The spectrum of each pulse is divided by the transform of a spline, transformed to a range profile by FFT, and
+    interpolated at the differential ranges of the pixels. A profile repeats every c/Δf in range, with Δf the step of
+    frequency. Pixels that are farther apart alias; the caller must prevent this.
 
     Parameters
     ----------
     history : PhaseHistory
         Frequencies evenly spaced.
     points : (..., 3) ndarray
-        Pixels, anywhere. [m]
+        Positions of the pixels. [m]
     kernel : "auto", "numpy", "cubic" or "linear"
-        NumPy does every job; cubic and linear are compiled by Numba (extra `fast`), by splines of these orders.
-        Linear is faster and good to -80 dB. Auto is cubic where Numba is installed, else NumPy.
+        "numpy" works for all pixels. "cubic" and "linear" use splines of these orders and are compiled by Numba
+        (extra `fast`); "linear" is faster and accurate to -80 dB. "auto" is "cubic" if Numba is installed, else
+        "numpy".
 
     Returns
     -------
@@ -99,7 +100,7 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
     ValueError
         A position that is not finite.
     ImportError
-        A compiled kernel is asked for and Numba is missing.
+        `kernel` is "cubic" or "linear" and Numba is not installed.
     """
     points = np.asarray(points, dtype=float)
     for name, positions in (("points", points), ("transmitter", history.transmitter), ("receiver", history.receiver)):
@@ -118,18 +119,18 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
 
 
 def kernel_within(memory_limit: float) -> Kernel:
-    """Kernel for a limit of memory [B]: the compiled kernel, whose code takes 60 MB, only if memory is ample."""
+    """Choose the kernel for a memory limit. [B] The compiled kernel, whose code takes 60 MB, needs ample memory."""
     return "cubic" if is_compiled() and memory_limit >= _SPACIOUS_BYTES else "numpy"
 
 
 def bytes_held(kernel: Kernel) -> float:
-    """Memory that backprojection takes in addition to data and image. [B]"""
+    """Memory that backprojection needs in addition to data and image. [B]"""
     return _WORKING_BYTES["numpy" if kernel == "numpy" else "cubic"]
 
 
 @cache
 def is_compiled() -> bool:
-    """Whether images are formed by compiled kernels: Numba is installed, has memory and can cache compiled code."""
+    """Whether compiled kernels are available: Numba is installed, has enough memory and can cache compiled code."""
     if not is_spacious():
         return False
     try:
@@ -165,7 +166,10 @@ def _backprojection(history: PhaseHistory, points: Floats) -> Complexes:
 
 
 def _read(spline: Complexes, cell: Floats) -> Complexes:
-    """Values at any cells, (n,), of a cyclic cubic B-spline (samples + 3,), padded by one before and two behind."""
+    """Values of a cyclic cubic B-spline at any cells, (n,).
+
+    `spline` (samples + 3,) are the samples, padded cyclically by one before and two after.
+    """
     first = np.floor(cell)
     fraction = cell - first
     remainder = 1 - fraction
@@ -184,42 +188,42 @@ def _read(spline: Complexes, cell: Floats) -> Complexes:
 
 # ---------------------------------------------------------------------- range profiles
 def profile_length(history: PhaseHistory, oversampling: int) -> int:
-    """Samples of a profile, a power of two: they span the c/Δf after which it repeats."""
+    """Number of samples of a profile, a power of two. They span the range c/Δf after which the profile repeats."""
     return 1 << (history.frequency.size * oversampling - 1).bit_length()
 
 
 def cells_per_metre(history: PhaseHistory, length: int) -> float:
-    """Profile samples per metre of ΔR."""
+    """Number of profile samples per metre of ΔR."""
     step = (history.frequency[-1] - history.frequency[0]) / max(1, history.frequency.size - 1)
     return float(length * step / SPEED_OF_LIGHT_MPS)
 
 
 def carrier_frequency(history: PhaseHistory) -> float:
-    """Frequency that profiles leave out: the middle sample, which is not always the middle of the band. [Hz]"""
+    """Carrier frequency that is removed from profiles: that of the middle sample, not always mid-band. [Hz]"""
     return float(history.frequency[history.frequency.size // 2])
 
 
 def range_profiles(history: PhaseHistory, length: int, transform: Floats, pulses: slice) -> Complexes:
-    """Profiles of a slice of pulses: Σ S_k exp(+2πj k n/length), k counted from the carrier.
+    """Range profiles of a slice of pulses: Σ S_k exp(+2πj k n/length), with k counted from the carrier.
 
-    A profile is the sum of (4) over frequency, without the carrier, as a function of ΔR. It is oversampled and read
-    by convolution with a short kernel. The spectrum is divided by the transform of this kernel beforehand.
+    A profile is the sum of (4) over frequency, without the carrier, as a function of ΔR. It is oversampled, and later
+    interpolated by convolution with a short kernel. The spectrum is divided by the transform of this kernel first.
 
     Parameters
     ----------
     history : PhaseHistory
         Frequencies evenly spaced.
     length : int
-        Samples of a profile.
+        Number of samples of a profile.
     transform : (frequencies,) ndarray
-        Fourier transform of the kernels that will read the profile, at `harmonics`.
+        Fourier transform of the kernel that later interpolates the profile, at `harmonics`.
     pulses : slice
-        Which pulses.
+        Pulses whose profiles are computed.
 
     Returns
     -------
     (pulses, length) ndarray
-        Sample n is at ΔR = n over `cells_per_metre`, and repeats.
+        Sample n is at ΔR = n / `cells_per_metre`. The profiles are periodic.
     """
     samples = history.samples[pulses]
     spectrum = np.zeros((samples.shape[0], length), dtype=complex)
@@ -230,7 +234,7 @@ def range_profiles(history: PhaseHistory, length: int, transform: Floats, pulses
 
 
 def harmonics(history: PhaseHistory) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Number of each frequency, 0 at the carrier."""
+    """Index of each frequency, counted from 0 at the carrier."""
     count = history.frequency.size
     return np.arange(count) - count // 2
 

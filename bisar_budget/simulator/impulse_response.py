@@ -1,10 +1,11 @@
-"""Measures of a point response: width, peak, sidelobe ratios, and the quadratic phase error itself.
+"""Measures of a point response: width, peak, and sidelobe ratios.
 
-A cut is a line of complex image samples, evenly spaced, that holds the full response. Sidelobes are counted outside a
-fixed mask, the first nulls of the error-free response, or outside the nulls of the response itself. Under a window
-the nulls of the response hide a quadratic phase error, because the shoulder that it raises joins the mainlobe. Other
-tools stop counting at a distance: perseo-quality takes its PSLR within five widths of the peak and its ISLR within
-ten, which for a uniform aperture makes the ISLR -10.21 dB, not -9.68 dB.
+A cut is a line of evenly spaced complex image samples that contains the full response. Sidelobes are counted outside
+a mask: a fixed mask, given by the first nulls of the error-free response, or one given by the nulls of the response
+itself. If an image is formed with a window, the nulls of the response itself hide a quadratic phase error, because
+the shoulder that the error raises merges with the mainlobe. Other tools count sidelobes only up to a distance from
+the peak. For example, perseo-quality takes its PSLR within five widths of the peak and its ISLR within ten. For a
+uniform aperture its ISLR is therefore -10.21 dB, not -9.68 dB.
 """
 
 import math
@@ -35,9 +36,9 @@ _TAPS_COUNT = 6  # with which a response sampled three times per cell is read to
 class ImpulseResponse:
     """Measures of one cut.
 
-    `irw_m` is the width at half power, `peak` the magnitude and `peak_m` its position along the cut from the middle
-    sample. `pslr_db` and `islr_db` count sidelobes beyond `mask_m` from the peak. ISLR is the energy of the sidelobes
-    over the energy of the mainlobe.
+    `irw_m` is the width at half power. `peak` is the magnitude of the peak, and `peak_m` its position along the cut,
+    relative to the middle sample. `pslr_db` and `islr_db` count sidelobes that are farther than `mask_m` from the
+    peak. ISLR is the ratio of the energy of the sidelobes to the energy of the mainlobe.
     """
 
     irw_m: float
@@ -50,10 +51,10 @@ class ImpulseResponse:
 
 @dataclass(frozen=True, kw_only=True)
 class ImpulseResponse2D:
-    """Measures of a chip: both cuts through its peak, which lies between samples, and sidelobes of the full area.
+    """Measures of a chip: two cuts through its peak, which is between samples, and the sidelobes of its full area.
 
-    `peak_m` counts from the middle sample of each axis. For `pslr_db` and `islr_db` the mainlobe is the rectangle of
-    the `mask_m` of both cuts, and sidelobes are the area outside it.
+    `peak_m` is relative to the middle sample of each axis. For `pslr_db` and `islr_db`, the mainlobe is the rectangle
+    given by `mask_m` of both cuts, and the sidelobes are the area outside it.
     """
 
     range_cut: ImpulseResponse
@@ -65,7 +66,10 @@ class ImpulseResponse2D:
 
 
 def upsampled(cut: Complexes, factor: int) -> Complexes:
-    """Interpolate periodic cuts, (..., samples), each a full period. The carrier may lie anywhere in the band."""
+    """Interpolate periodic cuts (..., samples), each a full period, by a factor.
+
+    The carrier may lie anywhere in the band.
+    """
     count = cut.shape[-1]
     steps = np.arange(count * factor) / factor
     carrier: Complexes = np.exp(2j * math.pi / count * _carrier_of(cut) * steps)
@@ -78,10 +82,10 @@ def upsampled(cut: Complexes, factor: int) -> Complexes:
 
 
 def _kernel(offset: Floats) -> Floats:
-    """Weights (n, taps) of the samples around positions at offsets (n,) from a sample: a sinc under a Kaiser window.
+    """Interpolation weights (n, taps) for positions at offsets (n,) from a sample: a sinc with a Kaiser window.
 
-    A Fourier transform of the full line would be exact for a periodic line. But an image ends amid its sidelobes, and
-    near a platform its band changes along it: distant samples would then add errors.
+    A Fourier transform of the full line would be exact if the line were periodic. But an image is cut off within its
+    sidelobes, and near a platform its band changes along the line. Distant samples would then add errors.
     """
     distances = np.subtract.outer(offset, np.arange(1 - _REACH_SAMPLES, _REACH_SAMPLES + 1))
     inside = np.sqrt(np.maximum(1 - (distances / _REACH_SAMPLES) ** 2, 0))
@@ -90,12 +94,15 @@ def _kernel(offset: Floats) -> Floats:
 
 
 def _carrier_of(cut: Complexes) -> int:
-    """Bin at the centre of gravity of the spectra of cuts, (..., samples)."""
+    """FFT bin at the centre of gravity of the spectra of cuts, (..., samples)."""
     return _carrier(np.abs(np.fft.fft(cut).reshape(-1, cut.shape[-1])) ** 2)
 
 
 def _carrier(power: Floats) -> int:
-    """Bin at the centre of gravity of spectra, (lines, bins), on the circle, opposite to their empty bins."""
+    """FFT bin at the centre of gravity of power spectra, (lines, bins), computed on a circle.
+
+    It is opposite to the empty bins of the spectra.
+    """
     count = power.shape[1]
     turn = np.exp(2j * math.pi * np.arange(count) / count)
     cycles = float(np.angle(power.sum(axis=0) @ turn)) / (2 * math.pi)
@@ -106,18 +113,18 @@ def _carrier(power: Floats) -> int:
 def impulse_response(
     cut: Complexes, spacing_m: float, mask_m: float | None = None, reach_m: float | None = None
 ) -> ImpulseResponse:
-    """Measure a cut through the peak.
+    """Measure a cut through the peak of a response.
 
     Parameters
     ----------
     cut : (samples,) ndarray
-        Complex, two samples per resolution cell or more.
+        Complex samples, at least two per resolution cell.
     spacing_m : float
-        Between samples.
+        Distance between samples. [m]
     mask_m : float, optional
-        Half width of the mainlobe mask; None searches the nulls of this response.
+        Half width of the mainlobe mask. [m] None uses the nulls of this response.
     reach_m : float, optional
-        Sidelobes are counted to this distance from the peak; None counts the whole cut.
+        Distance from the peak up to which sidelobes are counted. [m] None counts the whole cut.
 
     Returns
     -------
@@ -126,8 +133,8 @@ def impulse_response(
     Raises
     ------
     ValueError
-        The samples of the cut are all zero or not finite, or the peak, its half-power points, its mask or the reach
-        lie at the edge of the cut.
+        The samples of the cut are all zero or not finite; or the peak, its half-power points, its mask or the reach
+        are at the edge of the cut.
     """
     _check(cut)
     fine = np.abs(upsampled(cut, _UPSAMPLING_FACTOR))
@@ -166,16 +173,17 @@ def impulse_response(
 def impulse_response_2d(
     chip: Complexes, spacing_m: tuple[float, float], mask_m: tuple[float, float] | None = None
 ) -> ImpulseResponse2D:
-    """Measure a chip: cuts along x′ and y′ through its interpolated peak, and its full area.
+    """Measure a chip: its cuts along x′ and y′ through the interpolated peak, and its full area.
 
     Parameters
     ----------
     chip : (nx, ny) ndarray
-        Complex, two samples per resolution cell or more, with the whole response.
+        Complex samples of the whole response, at least two per resolution cell.
     spacing_m : (2,) float
-        Between samples along x′ and y′.
+        Distance between samples along x′ and y′. [m]
     mask_m : (2,) float, optional
-        Half widths of the mainlobe mask, as the error-free response gives them; None searches the nulls.
+        Half widths of the mainlobe mask, usually from the error-free response. [m] None uses the nulls of this
+        response.
 
     Returns
     -------
@@ -230,7 +238,7 @@ def impulse_response_2d(
 
 
 def line_at(chip: Complexes, row: float | Floats) -> Complexes:
-    """Line of a chip along its second axis, at a fraction of a row; lines (n, ny) at rows (n,)."""
+    """Interpolate a line of a chip along its second axis at a fractional row; rows (n,) give lines (n, ny)."""
     count = chip.shape[0]
     turn = 2j * math.pi / count * _carrier_of(chip.T)
     rows = np.atleast_1d(row)
@@ -242,9 +250,10 @@ def line_at(chip: Complexes, row: float | Floats) -> Complexes:
 
 
 def row_of_peak(image: Complexes, window: tuple[slice, slice] = _FULL_WINDOW) -> float:
-    """Row of the peak in a window of an image (nx, ny), which repeats beyond its edges.
+    """Fractional row of the peak within a window of an image (nx, ny), which is treated as periodic.
 
-    A peak lies between two lines of pixels. With lines a third of a cell apart, the nearer may be 0.4 dB below it.
+    The peak is usually between two lines of pixels. With lines a third of a resolution cell apart, the nearer line
+    may be 0.4 dB below the peak.
     """
     magnitude = np.abs(image[window])
     row = float(np.argmax(magnitude.max(axis=1))) + window[0].indices(image.shape[0])[0]
@@ -257,7 +266,7 @@ def row_of_peak(image: Complexes, window: tuple[slice, slice] = _FULL_WINDOW) ->
 
 
 def place_of_peak(image: Complexes) -> tuple[float, float]:
-    """Row and column of the peak of an image (nx, ny)."""
+    """Fractional row and column of the peak of an image (nx, ny)."""
     row = row_of_peak(image)
     power = np.abs(upsampled(line_at(image, row), _UPSAMPLING_FACTOR)) ** 2
     top = int(np.argmax(power))
@@ -265,7 +274,7 @@ def place_of_peak(image: Complexes) -> tuple[float, float]:
 
 
 def highest(chip: Complexes) -> float:
-    """Largest magnitude of the interpolation of a chip (nx, ny)."""
+    """Largest magnitude of a chip (nx, ny) after interpolation."""
     columns = upsampled(chip, _CHIP_UPSAMPLING_FACTOR).T
     blocks = (columns[start : start + _BLOCK_COLUMNS] for start in range(0, len(columns), _BLOCK_COLUMNS))
     return max(float(np.abs(upsampled(block, _CHIP_UPSAMPLING_FACTOR)).max()) for block in blocks)
@@ -287,7 +296,7 @@ def _peak(cut: Complexes) -> float:
 
 
 def _inside(count: int, lower: float, upper: float) -> Floats:
-    """Share of each sample's cell of unit width that lies in an interval, (count,)."""
+    """Fraction of each sample's cell, of width 1, that is within an interval, (count,)."""
     positions = np.arange(count)
     return np.asarray(np.clip(np.minimum(positions + 0.5, upper) - np.maximum(positions - 0.5, lower), 0.0, 1.0))
 
@@ -317,7 +326,7 @@ def _null(power: Floats, top: int, direction: int) -> float:
 
 
 def _vertex(values: Floats, top: int) -> float:
-    """Offset from a sample to the extremum of the parabola through the sample and its neighbours."""
+    """Offset of the extremum of a parabola from a sample; the parabola passes the sample and its neighbours."""
     before, middle, after = values[top - 1 : top + 2]
     bend = before - 2 * middle + after
     return float((before - after) / (2 * bend)) if bend else 0.0
@@ -325,7 +334,7 @@ def _vertex(values: Floats, top: int) -> float:
 
 # ---------------------------------------------------------------------- an image read anywhere
 def between(values: Floats, row: Floats, column: Floats) -> Floats:
-    """Linear interpolation of a table (nx, ny, k) at fractional rows and columns (n,), continued beyond the table."""
+    """Interpolate a table (nx, ny, k) linearly at fractional rows and columns (n,), and extrapolate beyond it."""
     nx, ny = values.shape[:2]
     i = np.clip(np.floor(row).astype(np.int64), 0, nx - 2)
     j = np.clip(np.floor(column).astype(np.int64), 0, ny - 2)
@@ -357,12 +366,12 @@ def places_in(grid: Floats, points: Floats) -> tuple[Floats, Floats]:
 
 
 def resampled(image: Complexes, grid: Floats, points: Floats) -> Complexes:
-    """Interpolate an image at other ground points, as of a rotated grid.
+    """Interpolate an image at other ground points, such as those of a rotated grid.
 
     Parameters
     ----------
     image : (nx, ny) ndarray
-        At baseband, three samples per resolution cell or more.
+        Image at baseband, with at least three samples per resolution cell.
     grid : (nx, ny, 3) ndarray
         Pixels of the image: east, north, up. [m]
     points : (mx, my, 3) ndarray
@@ -371,7 +380,7 @@ def resampled(image: Complexes, grid: Floats, points: Floats) -> Complexes:
     Returns
     -------
     (mx, my) ndarray
-        Zero outside the grid.
+        Interpolated image; zero at points outside the grid.
     """
     flat = points[..., :2].reshape(-1, 2)
     read = np.zeros(len(flat), dtype=complex)
@@ -386,7 +395,7 @@ def resampled(image: Complexes, grid: Floats, points: Floats) -> Complexes:
 
 
 def _interpolated(image: Complexes, row: Floats, column: Floats) -> Complexes:
-    """Lagrange interpolation at scattered rows and columns. An image repeats beyond its edges."""
+    """Lagrange interpolation at scattered rows and columns of an image, which is treated as periodic."""
     total = np.zeros(row.size, dtype=complex)
     (i, by_row), (j, by_column) = _weights(row), _weights(column)
     for a in range(_TAPS_COUNT):
@@ -398,13 +407,13 @@ def _interpolated(image: Complexes, row: Floats, column: Floats) -> Complexes:
 
 
 def _weights(positions: Floats) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], list[Floats]]:
-    """First sample of each stencil, (n,), and the stencil's weights, (n,) for each tap."""
+    """First sample of each interpolation stencil, (n,), and a list with the weights (n,) of each tap."""
     first = np.floor(positions).astype(np.int64) - _TAPS_COUNT // 2 + 1
     return first, [lagrange_weight(positions - first, tap, _TAPS_COUNT) for tap in range(_TAPS_COUNT)]
 
 
 def lagrange_weight(offset: Floats, tap: int, taps: int) -> Floats:
-    """Lagrange weight of one sample of a stencil, at offsets from the first sample of the stencil."""
+    """Lagrange weight of one sample of a stencil, for positions at `offset` from the first sample."""
     weight: Floats = np.ones(offset.shape)
     for node in range(taps):
         if node != tap:

@@ -1,7 +1,7 @@
-"""Path error of a platform in free fall: the orbit from its measured state minus the orbit from its true state.
+"""Path error of a platform in free fall: the orbit from the measured state minus the orbit from the true state.
 
-Both orbits follow the full law of gravity. The budget uses the linearised dynamics of `paths.free_fall` instead. The
-simulator checks the budget, so it does not use these dynamics.
+Both orbits are integrated with the full law of gravity. The budget uses the linearised dynamics of `paths.free_fall`.
+The simulator checks the budget and therefore does not use them.
 """
 
 import math
@@ -29,17 +29,17 @@ def orbit_error(
     Parameters
     ----------
     state : PlatformState
-        The true path; it has the dynamics `fall`.
+        The true path. Its attribute `fall`, the dynamics of its errors, must be set.
     position, velocity, acceleration : (3,)
-        Error at mid-aperture, east, north, up. [m, m/s, m/s²] The velocity is the rate of the Earth-fixed vector; the
-        acceleration is constant in Earth-fixed axes.
+        Errors at mid-aperture: east, north, up. [m], [m/s], [m/s²] The velocity error is the rate of the position
+        error in Earth-fixed axes. The acceleration error is constant in Earth-fixed axes.
     slow_time : (times,)
-        [s]
+        Slow times. [s]
 
     Returns
     -------
     (times, 3)
-        East, north, up. [m]
+        Measured minus true position: east, north, up. [m]
     """
     fall = state.fall
     assert fall is not None
@@ -54,7 +54,7 @@ def orbit_error(
     push = np.array(acceleration, dtype=float)
 
     def rates(time: float, states: Floats) -> Floats:
-        """Velocity and acceleration of both orbits against the stars, in the axes of mid-aperture, (2, 2, 3)."""
+        """Velocity and acceleration of both orbits relative to the stars, in the axes of mid-aperture, (2, 2, 3)."""
         places = states[:, 0]
         fallen = (
             -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 * places / np.linalg.norm(places, axis=1, keepdims=True) ** 3
@@ -79,7 +79,7 @@ def orbit_error(
 
 
 def _turned_by(rotation: Floats, time: float) -> Floats:
-    """Matrix that turns a vector by a rotation rate for a time, (3, 3)."""
+    """Rotation matrix (3, 3) of a rotation at the rate `rotation` for a time."""
     rate = float(np.linalg.norm(rotation))
     if rate == 0:
         return np.eye(3)

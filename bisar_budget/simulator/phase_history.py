@@ -1,7 +1,7 @@
 """Bistatic phase history of point scatterers, (1) to (3) of Rigling & Moses, from exact ranges.
 
-There is no Taylor series here: the simulator judges the expansions, so it must not share them.
-Frame: scene centre at the origin, x east, y north, z up. SI units.
+The simulator checks the series expansions of the budget, so it uses no Taylor series. Frame: scene centre at the
+origin, x east, y north, z up. SI units.
 """
 
 import math
@@ -30,10 +30,10 @@ Complexes = NDArray[np.complex128]
 
 
 class PathSinusoid(NamedTuple):
-    """One vibration: amplitude 0 to peak [m], frequency [Hz], phase at τ = 0 [rad].
+    """One sinusoidal vibration of a platform: zero-to-peak amplitude [m], frequency [Hz], and phase at τ = 0 [rad].
 
-    It moves its platform along `axis`, a unit vector. Without an axis it moves the platform along the line of sight,
-    which turns.
+    The platform moves along `axis`, a unit vector. Without an axis it moves along the line of sight, which turns over
+    the aperture.
     """
 
     amplitude: float
@@ -43,7 +43,7 @@ class PathSinusoid(NamedTuple):
 
 
 class ReceiverNoise(TypedDict, total=False):
-    """Noise of a receiver, as `phase_history` takes it."""
+    """Keyword arguments of `phase_history` for receiver noise."""
 
     noise_power: float
     rng: np.random.Generator | None
@@ -51,41 +51,42 @@ class ReceiverNoise(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """An error over slow time: `times` (n,) [s] and `values` (n,) or (n, 3), joined by straight lines."""
+    """Error as a function of slow time: `times` (n,) [s], and `values` (n,) or (n, 3) with linear interpolation."""
 
     times: Floats
     values: Floats
 
     def at(self, slow_time: Floats) -> Floats:
-        """Values at other times, (m,) or (m, 3)."""
+        """Interpolate the values linearly at other slow times, (m,) or (m, 3)."""
         if self.values.ndim == 1:
             values: Floats = np.interp(slow_time, self.times, self.values)
             return values
         return np.stack([np.interp(slow_time, self.times, column) for column in self.values.T], axis=1)
 
     def smooth(self, order: int = SMOOTH_ORDER) -> "Course":
-        """The polynomial fitted to the course: the slow part, which displaces and defocuses a response."""
+        """Polynomial fitted to the values: the slow part of the error, which displaces and defocuses a response."""
         scaled_time = 2 * (self.times - self.times[0]) / (self.times[-1] - self.times[0]) - 1
         fit = np.polynomial.legendre.legfit(scaled_time, self.values, order)
         return Course(self.times, np.polynomial.legendre.legval(scaled_time, fit).T)
 
     @property
     def mean(self) -> float:
-        """Mean over time of values (n,)."""
+        """Mean of the values (n,) over time."""
         middles = (self.values[1:] + self.values[:-1]) / 2
         return float(middles @ np.diff(self.times) / (self.times[-1] - self.times[0]))
 
 
 class PathError(NamedTuple):
-    """Measured minus actual position of one platform, r̃(τ): (22) and faster errors.
+    """Measured minus actual position of one platform, r̃(τ): the polynomial (22) and faster errors.
 
-    Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], an error of any form over time, are
-    east-north-up. Noise and vibrations without an axis are along the line of sight, positive away from the scene.
-    A platform in free fall flies the errors of position, velocity and acceleration at mid-aperture as another orbit;
-    for any other they are a polynomial of time. `height` [m] is the height by which a scene is too high: it moves the
-    measured path up, and is no error of an orbit.
-    `time_tag` [s] is the delay of a time tag: the measured path is the true path that much later. `wideband_rms` [m]
-    is the RMS noise of the pulses, white or within `wideband_band` (low, high) [Hz], and needs a generator.
+    Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], an error of any form over time, are in
+    east-north-up. Noise, and vibrations without an axis, are along the line of sight, positive away from the scene.
+    The errors of position, velocity and acceleration are those at mid-aperture. For a platform in free fall they give
+    the difference between two orbits; for any other platform they are a polynomial of time. `height` [m] is the
+    height by which the scene is assumed too high. It moves the measured path up, and does not change an orbit.
+    `time_tag` [s] is the delay of a time tag: the measured position is the true position at a time later by the
+    delay. `wideband_rms` [m] is the RMS position noise of the pulses, white or within `wideband_band` (low, high)
+    [Hz]. It requires a random generator.
     """
 
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -99,7 +100,7 @@ class PathError(NamedTuple):
     height: float = 0.0
 
     def slow(self) -> "PathError":
-        """The same error with the smooth part of its course."""
+        """The same error with its `course` replaced by the smooth part."""
         return self if self.course is None else self._replace(course=self.course.smooth())
 
     def still(self) -> "PathError":
@@ -107,7 +108,7 @@ class PathError(NamedTuple):
         return self._replace(sinusoids=(), wideband_rms=0.0)
 
     def plus(self, other: "PathError") -> "PathError":
-        """Sum of both polynomial errors and both time tags, without vibration."""
+        """Sum of the polynomial errors and of the time tags of two errors, without vibration."""
         position, velocity, acceleration = (
             (u[0] + v[0], u[1] + v[1], u[2] + v[2]) for u, v in zip(self[:3], other[:3], strict=True)
         )
@@ -116,11 +117,11 @@ class PathError(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """Errors in one image: of both platforms, of the clock, and of the air.
+    """Errors in one image: of both platforms, of the clock, and of the atmosphere.
 
-    `clock` holds t̃₀ … t̃₃ of (1), in s, 1, 1/s and 1/s². `clock_course` [s] is an error of the clock of any form over
-    time; a delay in the air is part of it. `electrons` [s·Hz²] is the delay by free electrons at a frequency f of
-    1 Hz, which falls as 1/f² and advances the phase.
+    `clock` are the coefficients t̃₀ … t̃₃ of (1), in s, 1, 1/s and 1/s². `clock_course` [s] is a clock error of any
+    form over time; it includes delays in the atmosphere that do not depend on frequency. `electrons` [s·Hz²] is the
+    delay by free electrons at a frequency f of 1 Hz. This delay is proportional to 1/f², and advances the phase.
     """
 
     transmitter: PathError = PathError()
@@ -130,11 +131,11 @@ class Errors(NamedTuple):
     electrons: Course | None = None
 
     def of(self, platform: str, error: PathError) -> "Errors":
-        """The same errors with the error of one platform replaced."""
+        """Return the same errors, with the error of one platform replaced."""
         return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
 
     def smooth(self) -> "Errors":
-        """The same errors without vibration and with the smooth parts of all courses."""
+        """The same errors without vibration, and with each error over time replaced by its smooth part."""
         return self.slow().still()
 
     def still(self) -> "Errors":
@@ -142,7 +143,7 @@ class Errors(NamedTuple):
         return self._replace(transmitter=self.transmitter.still(), receiver=self.receiver.still())
 
     def slow(self) -> "Errors":
-        """The same errors, but each error course is replaced by its smooth part.
+        """The same errors, with each error over time replaced by its smooth part.
 
         Noise would distort a phase that is computed from a few nodes only.
         """
@@ -155,7 +156,7 @@ class Errors(NamedTuple):
 
 
 def superposed(errors_of_sources: Iterable[Errors]) -> Errors:
-    """Sum of several polynomial errors, without vibration."""
+    """Sum of several polynomial errors, without vibration, such as those of several sources."""
     total = Errors()
     for errors in errors_of_sources:
         total = Errors(
@@ -168,23 +169,23 @@ def superposed(errors_of_sources: Iterable[Errors]) -> Errors:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Path:
-    """Where a platform is at each pulse and where its navigation says it is, each (pulses, 3). [m]"""
+    """Actual and measured positions of a platform at each pulse, (pulses, 3) each. [m]"""
 
     actual: Floats
     measured: Floats
 
     def seen_from(self, ground_point: GroundVector) -> "Path":
-        """The same path with a ground point as its origin."""
+        """The same path relative to a ground point."""
         offset = np.array([*ground_point, 0.0])
         return Path(actual=self.actual - offset, measured=self.measured - offset)
 
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """Paths of both platforms at some slow times, and the error of the clock at these times, (times,). [s]
+    """Paths of both platforms at some slow times, and the clock error at these times, (times,). [s]
 
-    `electrons` is the delay by free electrons at 1 Hz, or None. [s·Hz²] `seen` is the clock error that has the same
-    effect at the centre frequency as the clock and the electrons together. [s]
+    `electrons` is the delay by free electrons at a frequency of 1 Hz, or None. [s·Hz²] `seen` is the clock error that
+    has the same effect at the centre frequency as the clock error and the electrons together. [s]
     """
 
     transmitter: Path
@@ -204,7 +205,7 @@ class Flight:
         return Flight(transmitter, receiver, np.zeros_like(self.clock), np.zeros_like(self.clock))
 
     def range_error(self, scatterer: GroundVector, seen_at: GroundVector) -> Floats:
-        """Recorded range sum of `scatterer` minus the range sum of `seen_at` by the measured paths, (times,). [m]"""
+        """Recorded range sum of `scatterer` minus the range sum of `seen_at` for the measured paths, (times,). [m]"""
         scatterer_position, seen_position = np.array([*scatterer, 0.0]), np.array([*seen_at, 0.0])
         total: Floats = np.zeros(self.clock.shape)
         for path in self.paths:
@@ -221,7 +222,7 @@ class Flight:
         frequency: Floats,
         **noise: Unpack[ReceiverNoise],
     ) -> "PhaseHistory":
-        """The phase history of scatterers as the receiver records it at these slow times: `phase_history`."""
+        """Record the phase history of scatterers at these slow times, as `phase_history` does."""
         return phase_history(
             scatterers,
             amplitudes,
@@ -237,10 +238,10 @@ class Flight:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PhaseHistory:
-    """Received samples after motion compensation to the scene centre, with the paths that the processor knows.
+    """Received samples after motion compensation to the scene centre, with the measured paths.
 
-    `samples` is (pulses, frequencies); `slow_time` [s] and `frequency` [Hz] are evenly spaced;
-    `transmitter` and `receiver` are the measured positions, (pulses, 3). [m]
+    `samples` is (pulses, frequencies). `slow_time` [s] and `frequency` [Hz] are evenly spaced. `transmitter` and
+    `receiver` are the measured positions, (pulses, 3). [m]
     """
 
     samples: Complexes
@@ -251,7 +252,7 @@ class PhaseHistory:
 
 
 def look_sum(transmitter: Floats, receiver: Floats) -> Floats:
-    """Sum of the unit vectors from the origin to both platforms, as in (6). (pulses, 3)"""
+    """Sum of the unit vectors from the origin to both platforms, as in (6), (pulses, 3)."""
     total: Floats = np.zeros(transmitter.shape)
     for positions in (transmitter, receiver):
         total += positions / np.linalg.norm(positions, axis=1, keepdims=True)
@@ -259,22 +260,23 @@ def look_sum(transmitter: Floats, receiver: Floats) -> Floats:
 
 
 def cell_centres(length: float, count: int) -> Floats:
-    """Centres of `count` equal cells of an interval about zero, which together cover the interval."""
+    """Centres of `count` equal cells that divide an interval of a given length about zero."""
     centres: Floats = np.linspace(-(length - length / count) / 2, (length - length / count) / 2, count)
     return centres
 
 
 def is_even(frequency: Floats) -> bool:
-    """Whether frequencies are evenly spaced, to rounding. Over kilometres of range, rounding gives no phase."""
+    """Whether frequencies are evenly spaced except for rounding, which has no effect within kilometres of range."""
     return frequency.size > 2 and float(np.ptp(np.diff(frequency))) <= _FREQUENCY_ROUNDING_FRACTION * float(
         np.abs(frequency).max()
     )
 
 
 def split(wavenumber: Floats) -> tuple[Floats, Floats]:
-    """Coarse and fine wavenumbers whose sums, row by row, are evenly spaced wavenumbers; the last row may be longer.
+    """Split evenly spaced wavenumbers into coarse and fine wavenumbers whose sums, row by row, give them.
 
-    The phasor of a sum is a product, so n wavenumbers take only 2√n exponentials.
+    The last row may extend beyond the given wavenumbers. The phasor of a sum is a product of phasors, so n
+    wavenumbers need only 2√n exponentials.
     """
     fine = math.isqrt(wavenumber.size - 1) + 1
     coarse = -(-wavenumber.size // fine)
@@ -289,25 +291,25 @@ def path(
     rng: np.random.Generator | None = None,
     way: Floats | None = None,
 ) -> Path:
-    """Positions of one platform along its path, and its positions as measured with an error.
+    """Actual positions of one platform along its path, and its positions as measured with an error.
 
     Parameters
     ----------
     state : PlatformState
-        At τ = 0.
+        Path of the platform, with its state at τ = 0.
     slow_time : (pulses,) ndarray
-        [s]
+        Slow times of the pulses. [s]
     error : PathError, optional
-        None: the navigation is perfect.
+        Error of the measured path. None is no error.
     rng : numpy Generator, optional
-        Needed for wideband vibration only.
+        Random generator, required for wideband vibration only.
     way : (pulses, 3) ndarray, optional
-        Movement by a vibration of one metre. None is one metre along the line of sight. [m/m]
+        Displacement per metre of noise and of vibrations without an axis. [m/m] None is along the line of sight.
 
     Raises
     ------
     ValueError
-        Wideband vibration without a generator, or in a band that holds no frequency of the pulses.
+        Wideband vibration without a generator, or in a band that contains no frequency that the pulses can sample.
     """
     actual = _placed(state, slow_time)
     if error is None:
@@ -340,12 +342,12 @@ def path(
 
 
 def _placed(state: PlatformState, slow_time: Floats) -> Floats:
-    """Positions of a path, (times, 3). [m]"""
+    """Positions of a platform on its path at given slow times, (times, 3). [m]"""
     return np.stack(np.broadcast_arrays(*state.place(slow_time)), axis=1)
 
 
 def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.Generator) -> Floats:
-    """Gaussian noise of unit variance over the pulses, white or within a band [Hz]."""
+    """Gaussian noise of variance 1 at the pulses, white or within a band. [Hz]"""
     white: Floats = rng.normal(0.0, 1.0, slow_time.shape)
     if band is None:
         return white
@@ -369,7 +371,9 @@ def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.G
 def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Floats, Floats]:
     """Shortest displacements of both platforms that change the range minus the direct path by one metre. [m/m]
 
-    Each is (pulses, 3), along u_t − b and u_r + b; zero for a platform that does not change that difference.
+    Each is (pulses, 3). That of the transmitter is along u_t − b and that of the receiver along u_r + b, where u is
+    the line of sight and b the unit vector from receiver to transmitter. It is zero for a platform that cannot change
+    the difference.
     """
     platforms = (
         PlatformState(position=platform.place(slow_time), velocity=platform.velocity) for platform in geometry.both
@@ -385,10 +389,10 @@ def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Flo
 
 
 def direct_path_error(paths: tuple[Path, Path]) -> Floats:
-    """Clock error of a receiver that hears the transmitter: error of their measured distance over c, (pulses,). [s]
+    """Clock error of a receiver that takes the direct path as its clock, (pulses,). [s]
 
-    The receiver's clock is the direct signal, which is late by the actual distance. The processor subtracts the
-    measured distance.
+    It is the error of the measured distance between the platforms, divided by c. The receiver's clock is the direct
+    signal, which is delayed by the actual distance; the processor subtracts the measured distance.
     """
     transmitter, receiver = paths
     excess_range: Floats = np.linalg.norm(transmitter.measured - receiver.measured, axis=-1) - np.linalg.norm(
@@ -410,7 +414,7 @@ def phase_history(
     noise_power: float = 0.0,
     rng: np.random.Generator | None = None,
 ) -> PhaseHistory:
-    """Return the samples that the receiver records, motion compensated with the measured positions.
+    """Simulate the samples that the receiver records, with motion compensation by the measured positions.
 
     Parameters
     ----------
@@ -419,11 +423,11 @@ def phase_history(
     amplitudes : (scatterers,) ndarray
         Complex reflection coefficients A_m of (3).
     slow_time : (pulses,) ndarray
-        [s]
+        Slow times. [s]
     frequency : (frequencies,) ndarray
-        [Hz]
+        Frequencies of the samples. [Hz]
     transmitter, receiver : Path
-        At the pulses.
+        Paths at the pulses.
     clock_error : (pulses,) ndarray or float
         t̃(τ) of (1). [s]
     electrons : (pulses,) ndarray, optional
@@ -431,7 +435,7 @@ def phase_history(
     noise_power : float
         Variance of the circular white Gaussian noise of a sample, relative to amplitude 1.
     rng : numpy Generator, optional
-        Needed for noise only.
+        Random generator, required for noise only.
 
     Returns
     -------
@@ -440,7 +444,7 @@ def phase_history(
     Raises
     ------
     ValueError
-        Noise without a generator, or not one amplitude for each scatterer.
+        Noise without a generator, or a number of amplitudes that differs from the number of scatterers.
     """
     wavenumber = 2 * math.pi * frequency / SPEED_OF_LIGHT_MPS
     reference = np.linalg.norm(transmitter.measured, axis=1) + np.linalg.norm(receiver.measured, axis=1)
@@ -484,7 +488,7 @@ def phase_history(
 
 # ---------------------------------------------------------------------- by exact ranges
 class NoGroundPointError(ValueError):
-    """No ground point has the recorded range history: the point has no image."""
+    """No ground point has the recorded range history, so the point has no image."""
 
 
 def exact_effect(
@@ -495,7 +499,7 @@ def exact_effect(
     radar: Radar,
     aperture_time_s: float,
 ) -> ExactEffect:
-    """Effect of one error by exact ranges, with paths sampled at any slow times (see `ranges.exact_ranges`).
+    """Effect of one error by exact ranges, from paths sampled at any slow times (see `ranges.exact_ranges`).
 
     Raises
     ------
@@ -521,12 +525,12 @@ def exact_effect(
 
 
 def _columns(positions: Floats) -> VectorArrays:
-    """Components x, y and z of positions (..., 3), each (..., 1)."""
+    """Components x, y and z of positions (..., 3), each of shape (..., 1)."""
     x, y, z = np.moveaxis(positions, -1, 0)[..., None]
     return x, y, z
 
 
 def _sampling(nodes: Floats) -> Sampling:
-    """Sampling at any nodes in −1 … 1, by a polynomial fitted through them."""
+    """Sampling at any nodes in −1 … 1, with the weights of a polynomial fitted to the samples."""
     legendre = np.polynomial.legendre.legvander(nodes, min(_FIT_ORDER, max(3, nodes.size // 4)))
     return Sampling(nodes, LEGENDRE_LEADING[:, None] * np.linalg.pinv(legendre)[:4])

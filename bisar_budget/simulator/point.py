@@ -1,4 +1,4 @@
-"""Images of points with a mission's declared errors: Section V and VI of Rigling & Moses, Figures 3 to 7."""
+"""Images of points with the declared errors of a mission: Sections V and VI of Rigling & Moses, Figures 3 to 7."""
 
 import math
 import time
@@ -67,16 +67,18 @@ A_POINT = Targets()  # at the scene centre
 
 
 class SimulationError(Exception):
-    """An image that cannot be formed as asked; the message says what to change."""
+    """An image cannot be formed as requested; the message says what to change."""
 
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """One target as the images show it.
+    """Appearance of one target in the images.
 
-    `effect` is the effect of the errors by exact ranges, with the displacement counted from the target. The image
-    former puts the target at `shown` in the rotated images and at `shown_in_scene` in the image along (x, y) (east,
-    north). [m] `clean`, `smeared` and `focused` are measures of its cross-range cuts, None where neighbours hide it.
+    `effect` is the effect of the errors by exact ranges, with the displacement relative to the target. The image
+    former shows the target at `shown` in the rotated images and at `shown_in_scene` in the image along (x, y), east
+    and north. [m] `clean`, `smeared` and `focused` are measures of the cross-range cuts through the target in the
+    image without errors, the image with errors and the image after autofocus; None where neighbours cover the
+    response.
     """
 
     target: Target
@@ -89,24 +91,25 @@ class Response:
 
 
 class PointImages(NamedTuple):
-    """Images of point scatterers, by default of one at the scene centre, and the quantities that explain them.
+    """Images of point scatterers, by default of one at the scene centre, with quantities that explain them.
 
     All points are in the axes of the scene, east and north of its centre. [m]
 
-    Images are complex and lie where the errors move the targets. `in_scene` is on `scene_grid`, (nx, ny, 3) along
-    (x, y), and shows as much of the patch as a quarter of a million pixels hold. `rotated`, `focused` and
-    `error_free` are on `grid`, (nx, ny, 3), along (x′, y′): by exact ranges along lines of equal range, by plane
-    waves along the axes of (10). The pixels are `scene_spacing` and `spacing` apart, (2,). [m]
+    Images are complex, and cover the ground around the displaced targets. `in_scene` is on `scene_grid`, (nx, ny, 3),
+    along (x, y), and shows as much of the patch as fits into a quarter of a million pixels. `rotated`, `focused` and
+    `error_free` are on `grid`, (nx, ny, 3), along (x′, y′). This grid follows lines of equal range if the image
+    former uses exact ranges, and the axes of (10) if it uses plane waves. `scene_spacing` and `spacing`, (2,), are
+    the distances of neighbouring pixels. [m]
 
-    `effect` and `range_error` are for a point at the scene centre; `range_error` is the range error over `slow_time`
+    `effect` and `range_error` are for a point at the scene centre. `range_error` is the range error over `slow_time`
     without its constant and linear part. `segments` (3, 2) are its value [m] and slope [m/s] at `segment_times`.
-    `points` (3, 2) are the ground points (29) of these pieces of the full range error, by the gradients that
-    `points_by` names. (25) puts a point at the scene centre at the middle one of them.
+    `points` (3, 2) are the ground points (29) for the three pieces of the full range error, computed with the
+    gradients that `points_by` names. By (25), the image of the scene centre is at the middle one of these points.
 
     `responses` has one entry for each target. `clean_response`, `response` and `focused_response` are cuts through
-    the peaks of the brightest target, which lie in `rows` of the images. `misread_db` is how much too high a single
-    point without errors is read because its pixels do not sample it; NaN if unknown. `outside` names the declared
-    echoes that lie beyond the patch.
+    the peaks of the brightest target. `rows` are the rows of these peaks in the images. `misread_db` is the error by
+    which a single point without errors is measured too high because its pixels do not sample it well enough; NaN if
+    unknown. `outside` names the declared paired echoes that are beyond the patch.
     """
 
     slow_time: Floats
@@ -138,7 +141,7 @@ class PointImages(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Patch:
-    """Ground patch around the displaced point: pixels along both axes, and their spacing there. [m]"""
+    """Ground patch around a displaced point: numbers of pixels along both axes, and their spacing. [m]"""
 
     shape: tuple[int, int]
     spacing: tuple[float, float]
@@ -156,10 +159,10 @@ class Patch:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Patches, samples and memory that the images of a mission take, known before an image is formed.
+    """Patches, samples and memory that the images of a mission need, determined before an image is formed.
 
-    A range cell has `finer` times as many pixels as a cross-range cell. A target's response takes `own_cells` cells
-    across.
+    A range cell has `finer` times as many pixels as a cross-range cell. The response of a target is `own_cells`
+    resolution cells wide in cross-range.
     """
 
     rotated: Patch
@@ -173,17 +176,17 @@ class Plan:
 
     @property
     def memory(self) -> float:
-        """Largest memory held at a time. [B]"""
+        """Largest memory that is in use at one time. [B]"""
         images = _BYTES_PER_SCENE_PIXEL * self.in_scene.pixels + _BYTES_PER_ROTATED_PIXEL * self.rotated.pixels
         return images + _BYTES_PER_SAMPLE * self.pulses * self.frequencies + self.bytes_held
 
     @property
     def work(self) -> int:
-        """Pixels times pulses: of the image in the scene's axes, the rotated image and the error-free image."""
+        """Number of pixels times pulses, summed over the image along (x, y), the rotated and the error-free image."""
         return self.pulses * (self.in_scene.pixels + 2 * self.rotated.pixels)
 
     def require_memory(self, limit: float, given_pulses: int | None) -> None:
-        """Raise SimulationError where the plan exceeds a limit. [B]"""
+        """Raise a `SimulationError` if the plan needs more memory than a limit. [B]"""
         if self.memory > limit:
             x, y = self.rotated.shape
             fewer = ""
@@ -203,36 +206,36 @@ def simulate_point(
     targets: Targets = A_POINT,
     foreseen: Callable[[float], None] = lambda seconds: None,
 ) -> PointImages:
-    """Form the image of points with the declared errors, before and after autofocus.
+    """Form images of points with the declared errors, before and after autofocus.
 
-    Errors have the signs and the coverage factor of the file. A covariance has no sign: its error is the most
-    probable one whose quadratic phase is one sigma, times the coverage factor. Vibration along the line of sight is
-    in the data; wideband vibration is drawn with the file's seed. The patch lies where the errors move the points,
-    along the lines of equal range of the measured paths, and is as long as the smear and the paired echoes. The
-    error-free image is an image by the same processor: of points at the displaced places, recorded from the measured
-    paths.
+    Errors have the signs and the coverage factor of the mission file. A covariance has no sign: its error is the most
+    probable error whose quadratic phase is one sigma, times the coverage factor. Vibration along the line of sight is
+    part of the data; wideband vibration is drawn with the seed of the file. The patch is around the displaced points,
+    along the lines of equal range of the measured paths, and long enough for the smear and the paired echoes. The
+    error-free image is formed by the same processor, from points at the displaced places that are recorded from the
+    measured paths.
 
     Parameters
     ----------
     mission : Mission
-        As loaded.
+        The mission, as loaded.
     progress : callable
-        Called with the pixels times pulses that are done, and with their total.
+        Called with the number of pixels times pulses that are done, and with the total number.
     image_former : str
-        One of `IMAGE_FORMERS`. With polar format, which forms the rotated images, the image along (x, y) is formed by
-        backprojection, as Figure 5 of the paper is by (4) and Figure 6 by (14).
+        One of `IMAGE_FORMERS`. The polar format forms only the rotated images; the image along (x, y) is then formed
+        by backprojection. In the paper, too, Figure 5 is formed by (4) and Figure 6 by (14).
     targets : Targets
         Points and clutter of the scene. Clutter is one random scatterer for each resolution cell of the patch.
     foreseen : callable
-        Called before the images are formed with the time that they will take [s], estimated from a trial with a few
-        pulses and pixels.
+        Called before the images are formed, with the time that this will take [s]. The time is estimated from a trial
+        with a few pulses and pixels.
 
     Raises
     ------
     SimulationError
-        No ground point has the recorded range history, too few pulses for the patch, images and phase history
-        beyond `simulation.memory_limit`, or a collection that the image former cannot take. These are checked before
-        an image is formed.
+        No ground point has the recorded range history; the pulses are too few for the patch; images and phase history
+        need more memory than `simulation.memory_limit`; or the image former cannot process the collection. These are
+        checked before an image is formed.
     ValueError
         An unknown image former.
     """
@@ -304,7 +307,7 @@ def simulate_point(
     formed, windows = (error_free, rotated, focused), [_window(plan, cells, index) for index in range(len(shown))]
 
     def rows_of(index: int) -> tuple[float, ...]:
-        """Rows of a target's peaks, one for each image. Errors bring a target into focus at another range."""
+        """Rows of the peaks of a target, one for each image. With errors a target is in focus at another range."""
         smeared_rows = [row_of_peak(image, windows[index]) for image in formed[1:]]
         if isinstance(former, ExactRangeFormer):
             return (
@@ -373,9 +376,9 @@ def simulate_point(
 
 
 def declared_errors(mission: Mission) -> Errors:
-    """The declared errors of a mission as flown once, with its signs, its seed and its coverage factor.
+    """Declared errors of a mission in one flight, with the signs, the seed and the coverage factor of its file.
 
-    A covariance has no sign: its error is the most probable one with one sigma of quadratic phase.
+    A covariance has no sign: its error is the most probable error whose quadratic phase is one sigma.
     """
     analysis, factor, common = Analysis(mission), mission.allocation.coverage_factor, mission.common_motion_error
     errors = drawn_errors(analysis)
@@ -417,7 +420,7 @@ def _turned(vectors: Sequence[Sequence[float] | None], state: PlatformState, fra
 
     The errors keep their signs and are multiplied by `factor`. For a platform in free fall, a velocity error in the
     frame `ric` is relative to the stars and is converted to the rate of the position error in the scene's axes, which
-    turn with the Earth. In all further frames, a velocity error is this rate already.
+    turn with the Earth. In all other frames, a velocity error already is this rate.
     """
     axes, turned = state.frame(frame), []
     for vector in vectors:
@@ -434,7 +437,7 @@ def _turned(vectors: Sequence[Sequence[float] | None], state: PlatformState, fra
 def _formers(
     collection: PointCollection, image_former: str, lines: RangeLines, flight: Flight
 ) -> tuple[Former, Former]:
-    """Image formers of the rotated images and of the image along (x, y)."""
+    """Image formers for the rotated images, and for the image along (x, y)."""
     radar = collection.radar
     exact = ExactRangeFormer(lines, radar, image_former == "matched_filter", collection.kernel)
     if image_former in ("backprojection", "matched_filter"):
@@ -445,7 +448,7 @@ def _formers(
 
 
 def _middle(points: Sequence[GroundVector] | Floats) -> GroundVector:
-    """Middle of the box around ground points, on which a patch is centred."""
+    """Centre of the box around ground points; a patch is centred there."""
     low, high = np.min(points, axis=0), np.max(points, axis=0)
     return float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2
 
@@ -459,10 +462,10 @@ def _plan(
     remaining_range: Floats,
     slope: Floats,
 ) -> Plan:
-    """Choose the smallest patches and samples that hold the responses, from their range error and its slope.
+    """Choose the smallest patches and numbers of samples with which the images contain the responses.
 
-    Along lines of equal range and of equal Doppler the band of a response is a box, and its smear lies along y′; in
-    (x, y) both are turned.
+    The sizes follow from the remaining range error and its slope. Along lines of equal range and of equal Doppler,
+    the band of a response is a box and its smear is along y′. In (x, y) both are rotated.
     """
     T, radar = mission.collection.aperture_time, mission.radar
     centre, scene_centre = _middle(shown), _middle(scene_shown)
@@ -524,12 +527,12 @@ def _plan(
 
 
 def _flown_lines(mission: Mission) -> list[PathSinusoid]:
-    """Declared vibrations, and the phases that they cause in oscillators."""
+    """Declared vibrations of both platforms, and motions with the phases that they cause in oscillators."""
     return [line for name in PLATFORMS for line in _sinusoids(mission, name) if line.amplitude]
 
 
 def _sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
-    """Declared vibrations of one platform, and the phases that they cause in its oscillator."""
+    """Declared vibrations of one platform, and motions with the phases that they cause in its oscillator."""
     count = len(getattr(mission.platforms, name).motion_error.vibration.sinusoidal)
     declared_lines = (line for entry in range(count) for line in sinusoids_of(mission, name, entry))
     return (*declared_lines, *oscillator_sinusoids(mission, name))
@@ -538,7 +541,7 @@ def _sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
 def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
     """Motion of one declared vibration: along three axes, or along the line of sight if the file gives one number.
 
-    The phases of the axes are those with which the motions add along the line of sight of mid-aperture.
+    The phases of the axes are chosen so that the motions add up along the line of sight at mid-aperture.
     """
     error: DeclaredError = getattr(mission.platforms, name).motion_error
     line = error.vibration.sinusoidal[entry]
@@ -553,7 +556,11 @@ def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
 
 
 def pulses_for(mission: Mission, cells: int) -> int:
-    """Pulses that sample the patch and every declared vibration twice over."""
+    """Number of pulses that samples the patch and every declared vibration without aliasing.
+
+    Without `collection.pulses` it is at least two per resolution cell and four per cycle of vibration. A
+    `SimulationError` reports if the declared number is too small, or the necessary number too large.
+    """
     pulses = mission.collection.pulses
     cycles = max((line.frequency for line in _flown_lines(mission)), default=0.0) * mission.collection.aperture_time
     if pulses is not None and pulses <= 2 * cycles:
@@ -578,10 +585,10 @@ def pulses_for(mission: Mission, cells: int) -> int:
 
 
 def _measured(cut: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:
-    """Measure the impulse response of a cross-range cut, with the peak rolled to the middle of the cut.
+    """Measure the impulse response of a cross-range cut, with its peak shifted cyclically to the middle.
 
-    A smear over most of the patch peaks near one end of the cut, so a roll wraps the smear around. If the measurement
-    fails, zeros double the length of the cut, and the cut is measured again.
+    If a smear covers most of the patch, its peak is near one end of the cut, and the shift wraps the smear around. If
+    the measurement then fails, it is repeated with zeros that double the length of the cut.
     """
     count, column = cut.size, int(np.argmax(np.abs(cut)))
     try:
@@ -592,11 +599,11 @@ def _measured(cut: Complexes, spacing: float, mask_m: float | None) -> ImpulseRe
 
 
 def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> tuple[Floats, Complexes]:
-    """Random scatterers over a patch, (n, 2) [m] and (n,): one for each resolution cell, circular normal.
+    """Random scatterers of clutter over a patch: positions (n, 2) [m] and circular normal amplitudes (n,).
 
-    A cell is as large as the energy of a response of unit peak, so `level_db` is the mean power of a pixel. A patch
-    of finer pixels is narrower than a range cell: scatterers up to a range cell beyond the patch contribute to it,
-    out of focus by some cells across for each finer line.
+    There is one scatterer for each resolution cell. The area of a cell is the energy of a response whose peak is 1,
+    so `level_db` is the mean power of a pixel. A patch of finer pixels is narrower than a range cell. Scatterers up
+    to a range cell beyond the patch then contribute to it, out of focus by some cells across for each finer line.
     """
     if level_db is None:
         return np.empty((0, 2)), np.empty(0, dtype=complex)
@@ -614,7 +621,7 @@ def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> t
 
 
 def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
-    """Window of the rotated patch around a target's response, as far from other targets as they leave room."""
+    """Rows and columns of the rotated patch around a target, as far as halfway to the nearest other target."""
     distances = np.abs(cells - cells[index])
     neighbours = distances[(distances[:, 0] < 2 * _SEPARATE_RANGE_CELLS) & (distances[:, 1] > 0), 1]
     reach = plan.own_cells // 2 if len(cells) > 1 else plan.rotated.shape[1]
@@ -631,7 +638,10 @@ def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
 def _cuts(
     images: Sequence[Complexes], rows: Sequence[float], columns: slice, spacing: float, amplitude: float
 ) -> list[ImpulseResponse | None]:
-    """Measures of a target in each image, with the mask of the error-free image (the first); None if not there."""
+    """Measures of a target in each image, with the mask from the first image, which is error-free.
+
+    The entry of an image is None if the target cannot be measured there.
+    """
     measures: list[ImpulseResponse | None] = []
     mask = None
     for image, row in zip(images, rows, strict=True):

@@ -1,7 +1,8 @@
-"""Random time series of the errors of sensors, clocks and the air within one aperture.
+"""Random time series of the errors of sensors, clocks and the atmosphere within one aperture.
 
-The time series are independent of the formulas that they judge: walks are sums of steps, correlated noise follows its
-recursion, phase noise is a sum of tones, and synchronisation joins samples of it by straight lines.
+The time series check the formulas of the budget and do not use them. Random walks are sums of steps. Correlated noise
+is computed by its recursion. Phase noise is a sum of tones. Synchronisation joins samples of the phase noise by
+straight lines.
 """
 
 import math
@@ -63,11 +64,12 @@ _MAX_FLOWN_STEPS = 1 << 19  # of phase noise; with more, fast tones are joined b
 def position_courses(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, Floats]:
-    """Position errors by one sensor, for one sigma of the declared size, by the name of the platform.
+    """Random position errors from one sensor, for one sigma of the declared size, by the name of the platform.
 
-    Each is (draws, times, 3), east, north, up. [m] A common error of both platforms has the same draws along the axes
-    of each. The error is an inertial sensor's, a lever arm's, or correlated noise; its `declared` may be any size.
-    Times (times,) are slow times within the aperture [s]. The mission gives the sizes along each axis.
+    Each is (draws, times, 3): east, north, up. [m] An error that is common to both platforms uses the same random
+    numbers along the axes of each. The error is one of an inertial sensor, of a lever arm, or correlated noise. Its
+    `declared` may be any size; the mission gives the sizes along each axis. `times` (times,) are slow times within
+    the aperture. [s]
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     courses = {}
@@ -86,7 +88,7 @@ _Motions = list[tuple[Floats, Floats]]
 def _drawn_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Motion of each platform by a unit of the largest axis."""
+    """Random series and directions of the motion of each platform, for one unit along the largest axis."""
     kind, figure = error.subject.kind, error.subject.axis
     if kind in CORRELATED:
         process = process_of(mission, error)
@@ -134,9 +136,9 @@ def _motion(mission: Mission, name: str) -> MotionError:
 def delay_courses(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Floats:
-    """Group delays at the centre frequency, (draws, times), for one sigma of the declared size. [m]
+    """Random group delays at the centre frequency, (draws, times), for one sigma of the declared size. [m]
 
-    The delay of one leg, or, for one air along both legs, the sum of both.
+    The delay is that of one leg, or the sum of both legs if both have the same atmosphere.
     """
     return group_delays(mission, error, times, zenith_delays(mission, error, times, draws, rng))
 
@@ -144,7 +146,7 @@ def delay_courses(
 def zenith_delays(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Floats:
-    """Delays at the zenith in declared sigmas, (draws, times): constant, or correlated over time."""
+    """Random zenith delays in units of the declared sigma, (draws, times): constant, or correlated over time."""
     correlation_time = correlation_time_of(mission, error.owner)
     if correlation_time is not None:
         return _correlated(float(correlation_time), times, draws, rng)
@@ -152,7 +154,10 @@ def zenith_delays(
 
 
 def group_delays(mission: Mission, error: RandomError, times: Floats, at_zenith: Floats) -> Floats:
-    """Group delays at the centre frequency from delays at the zenith in declared sigmas, (draws, times). [m]"""
+    """Group delays at the centre frequency, (draws, times). [m]
+
+    They are computed from `at_zenith`, the zenith delays in units of the declared sigma.
+    """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     of_unit = np.zeros(times.shape)
     for name in legs_of(error.owner):
@@ -162,20 +167,28 @@ def group_delays(mission: Mission, error: RandomError, times: Floats, at_zenith:
 
 
 def electrons_at_1_hz(mission: Mission, times: Floats, group: Floats) -> Course:
-    """Convert group delays by free electrons at the centre frequency, (times,) [m], to `Errors.electrons`. [s·Hz²]"""
+    """Convert group delays by free electrons to `Errors.electrons`, the delay at 1 Hz. [s·Hz²]
+
+    `group` are the delays at the centre frequency, (times,). [m]
+    """
     return Course(times, group / SPEED_OF_LIGHT_MPS * mission.radar.center_frequency**2)
 
 
 def has_unset_clocks(mission: Mission) -> bool:
-    """Whether oscillators are flown without mean and slope, because the file does not state how they are set."""
+    """Whether the phases of oscillators are simulated without mean and slope.
+
+    This is so if the file does not state how the oscillators are set.
+    """
     return any(error.displaces_unknown for error in random_errors(mission))
 
 
 def drawn_errors(analysis: Analysis) -> Errors:
-    """One time series of each declared error of sensors, clocks and the air, times the coverage factor, by the seed.
+    """Draw one time series of each declared error of sensors, clocks and the atmosphere.
 
-    A clock is flown as it is set. An oscillator is flown without mean and slope in two cases: `timing_error` states
-    the remainder of the setting, or the oscillator is free and the file does not state how it is set.
+    The random numbers have the seed of the mission. Each series is multiplied by the coverage factor. The phase of a
+    clock includes the error of its setting. The phase of an oscillator has no mean and slope in two cases:
+    `timing_error` states the remainder of the setting, or the oscillator is free and the file does not state how it
+    is set.
     """
     mission = analysis.mission
     seed, factor = (mission.simulation or Simulation()).seed, mission.allocation.coverage_factor
@@ -237,7 +250,10 @@ _Draw = Callable[[Floats, int, np.random.Generator], tuple[Floats, Floats]]
 
 
 def _biased(order: int) -> _Draw:
-    """Draw the position error by a bias, and the tilt of the bias, which has two integrals fewer."""
+    """Return a function that draws the position error from a constant bias, and the tilt from the bias.
+
+    The position error is the bias times τⁿ/n!, with n = `order`. The tilt has two integrals fewer.
+    """
 
     def draw(times: Floats, draws: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
         bias: Floats = rng.standard_normal((draws, 1))
@@ -247,7 +263,10 @@ def _biased(order: int) -> _Draw:
 
 
 def _walk(integrals: int) -> _Draw:
-    """Draw white noise integrated `integrals` times from mid-aperture, and once; the two sides are independent."""
+    """Return a function that draws white noise integrated `integrals` times, and the same noise integrated once.
+
+    The integrals start at mid-aperture. The noise before and after mid-aperture is independent.
+    """
 
     def draw(times: Floats, draws: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
         end = float(np.abs(times).max())
@@ -272,7 +291,7 @@ def _walk(integrals: int) -> _Draw:
 
 
 def _correlated(correlation_time: float, times: Floats, draws: int, rng: np.random.Generator) -> Floats:
-    """First-order Gauss-Markov noise of variance 1 by its recursion over time, (draws, times)."""
+    """First-order Gauss-Markov noise of variance 1, computed by its recursion over time, (draws, times)."""
     noise = rng.standard_normal((times.size, draws))
     for index, step in enumerate(np.diff(times).tolist(), 1):
         decay = math.exp(-step / correlation_time)
@@ -299,10 +318,10 @@ def phase_courses(
     rng: np.random.Generator,
     highest: float = math.inf,
 ) -> Floats:
-    """Phases of one oscillator, or of the link, at the centre frequency, (draws, times), for one sigma. [rad]
+    """Random phases of one oscillator, or of the link, at the centre frequency, for one sigma, (draws, times). [rad]
 
-    For an oscillator, `declared` is a factor on its amplitude. Times are evenly spaced and divide the aperture. Tones
-    above `highest` [Hz] may be omitted if no exchange of pulses folds them.
+    For an oscillator, `declared` is a factor on its amplitude. `times` are evenly spaced and divide the aperture.
+    Tones above `highest` [Hz] may be omitted if no exchange of pulses folds them.
     """
     sync, T = mission.synchronization, mission.collection.aperture_time
     size = error.declared or 0.0
@@ -365,8 +384,9 @@ def _between_exchanges(
 ) -> Floats:
     """Phases minus the straight lines between their values at exchanges of pulses, (draws, times). [rad]
 
-    The tones repeat after a whole number of intervals, so that exchanges divide their period evenly, as moments do.
-    For this the moments are stretched, by less than the share of one moment in the period.
+    The tones are periodic in a whole number of exchange intervals. Both the exchanges and the moments at which the
+    phase is sampled then divide the period evenly. For this the moments are stretched slightly, by less than the
+    ratio of one moment's spacing to the period.
     """
     step = min(interval, _FAR_FACTOR * aperture_time)
     exchanges = max(_MIN_EXCHANGES_COUNT, math.ceil(_PERIOD_FACTOR * aperture_time / step))
@@ -396,23 +416,26 @@ def _between_exchanges(
 
 
 def _below(pieces: tuple[PowerLawPiece, ...], highest: float) -> tuple[PowerLawPiece, ...]:
-    """Pieces of a spectrum below a frequency."""
+    """Select the part of a spectrum below a frequency."""
     return tuple(piece._replace(high=min(piece.high, highest)) for piece in pieces if piece.low < highest)
 
 
 def _above(pieces: tuple[PowerLawPiece, ...], lowest: float) -> tuple[PowerLawPiece, ...]:
-    """Pieces of a spectrum above a frequency."""
+    """Select the part of a spectrum above a frequency."""
     return tuple(piece._replace(low=max(piece.low, lowest)) for piece in pieces if piece.high > lowest)
 
 
 def _fastest(mission: Mission, error: RandomError) -> float:
-    """Highest frequency of an error that has a spectrum, else 0. [Hz]"""
+    """Highest frequency in the spectrum of an error, or 0 if it has no spectrum. [Hz]"""
     highest_of_noise = max((piece.high for piece in error.noise.pieces), default=0.0) if error.noise else 0.0
     return max(highest_of_noise, fastest_shake(mission, error))
 
 
 def fastest_shake(mission: Mission, error: RandomError) -> float:
-    """Highest frequency in the spectrum of a vibration, or of an oscillator's phase by a vibration, else 0. [Hz]"""
+    """Highest frequency in the spectrum of a vibration, or of the oscillator phase that a vibration causes. [Hz]
+
+    0 for any other error.
+    """
     pieces: tuple[PowerLawPiece, ...] = ()
     if error.subject.kind == "vibration":
         pieces = pieces_of_vibration(mission, error.owner)
@@ -422,15 +445,16 @@ def fastest_shake(mission: Mission, error: RandomError) -> float:
 
 
 def slowest_shake(mission: Mission, error: RandomError) -> float:
-    """Lowest frequency in the spectrum of a vibration, or of an oscillator's phase by a vibration. [Hz]"""
+    """Lowest frequency in the spectrum of a vibration, or of the oscillator phase that a vibration causes. [Hz]"""
     pieces = pieces_of_vibration if error.subject.kind == "vibration" else pieces_by_acceleration
     return min((piece.low for piece in pieces(mission, error.owner)), default=0.0)
 
 
 def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
-    """Motions of a platform with the phases of its oscillator's tones of one cycle per aperture or more.
+    """Sinusoidal motions of a platform that give the same phases as the tones of its vibrating oscillator.
 
-    They are a quarter of a cycle from the vibration that causes the tones. Slower tones are drawn by `phase_courses`.
+    Only tones of at least one cycle per aperture are included; slower tones are drawn by `phase_courses`. The tones
+    differ in phase by a quarter of a cycle from the vibration that causes them.
     """
     metres, T = mission.radar.wavelength / (2 * math.pi), mission.collection.aperture_time
     return tuple(
@@ -449,9 +473,10 @@ def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...
 
 
 def _folded_tones(mission: Mission, error: RandomError) -> list[tuple[float, float]]:
-    """Frequencies [Hz] and amplitudes per unit of an oscillator's tones that exchanges of pulses fold to slow ones.
+    """Frequencies [Hz] and amplitudes per unit of oscillator tones that exchanges of pulses fold to low frequencies.
 
-    A vibration that is slow itself is not among them: its phase is drawn before the straight lines are subtracted.
+    Vibrations that are slow themselves are not included: their phase is drawn before the straight lines are
+    subtracted.
     """
     T, name = mission.collection.aperture_time, error.owner
     tones: list[tuple[float, LeftTone]] = []
@@ -469,9 +494,10 @@ def _folded_tones(mission: Mission, error: RandomError) -> list[tuple[float, flo
 
 
 class _TurnPhase:
-    """Phase of an oscillator by slow tones and by the turn of its platform, per unit of sensitivity.
+    """Random phase of an oscillator from slow tones and from the turn of its platform, per unit of sensitivity.
 
-    All directions of the sensitivity are equally likely, and all phases of a tone. One sigma is the largest effect.
+    All directions of the sensitivity are equally likely, and so are all phases of a tone. One sigma is the effect in
+    the direction with the largest effect.
     """
 
     def __init__(self, mission: Mission, name: str) -> None:
@@ -487,7 +513,7 @@ class _TurnPhase:
         ]
 
     def draw(self, rng: np.random.Generator) -> Callable[[Floats], Floats]:
-        """Draw one phase, as a function of times. [rad]"""
+        """Draw one random phase, as a function of slow times. [rad]"""
         direction, starts = rng.standard_normal(3), rng.uniform(0, 2 * math.pi, len(self.slow))
 
         def at(times: Floats) -> Floats:
@@ -502,20 +528,23 @@ class _TurnPhase:
 
 
 def _knots(times: Floats, interval: float, rng: np.random.Generator) -> Floats:
-    """Times of exchanges of pulses, from before the first time to after the last, with a random start. [s]"""
+    """Times of exchanges of pulses, with a random start, that enclose all given times. [s]"""
     start = float(times.min()) - interval * float(rng.random())
     knots: Floats = np.arange(start, float(times.max()) + interval, interval)
     return knots
 
 
 def _cosines_and_sines(frequency: Floats, times: Floats) -> tuple[Floats, Floats]:
-    """Cosines and sines of tones at times, each (times, tones)."""
+    """Cosines and sines of tones of given frequencies at given times, (times, tones) each."""
     turn = 2 * math.pi * np.multiply.outer(times, frequency)
     return np.cos(turn), np.sin(turn)
 
 
 def _phasors(turns: float, count: int) -> Complexes:
-    """Phasors exp(2πi·n·turns) of the tones n = 1 … `count`, (count,); tone 1 has made `turns` cycles."""
+    """Phasors exp(2πi·n·turns) for n = 1 … `count`, (count,).
+
+    They are the phasors of the harmonics n at a time at which the fundamental has completed `turns` cycles.
+    """
     side = math.isqrt(count) + 1
     coarse = np.exp(2j * math.pi * turns * np.arange(side + 1) * side)
     phasors: Complexes = np.multiply.outer(coarse, np.exp(2j * math.pi * turns * np.arange(side))).ravel()
@@ -526,7 +555,7 @@ Summed = TypeVar("Summed", np.float64, np.complex128)
 
 
 def _folded(values: NDArray[Summed], count: int) -> NDArray[Summed]:
-    """Sums of the tones 1, 2 … that are equal at `count` moments of their period, (count,)."""
+    """Sum the values of harmonics 1, 2 … that are the same at `count` moments of their period, (count,)."""
     padded = np.zeros(-(-(values.size + 1) // count) * count, values.dtype)
     padded[1 : values.size + 1] = values
     folded: NDArray[Summed] = padded.reshape(-1, count).sum(axis=0)
@@ -534,22 +563,25 @@ def _folded(values: NDArray[Summed], count: int) -> NDArray[Summed]:
 
 
 def fast_steps(least: int) -> int:
-    """Smallest suitable number of steps for a Fourier transform, from `least` to a sixteenth more."""
+    """Small number of steps that suits a Fourier transform, at least `least` and at most a sixteenth more."""
     unit = 1 << max(0, least.bit_length() - 5)
     return -(-least // unit) * unit
 
 
 def tones_at(amplitudes: Complexes, count: int) -> Floats:
-    """Sum of the tones 1, 2 … at `count` moments that divide their period evenly, from its start, (count,)."""
+    """Sum of harmonics 1, 2 … at `count` moments that divide their period evenly, from its start, (count,)."""
     sums: Floats = np.fft.ifft(_folded(amplitudes, count), norm="forward").real
     return sums
 
 
 def powers_at(powers: Floats, count: int) -> Floats:
-    """Powers of the tones 0 … count / 2 with the covariance of the tones 1, 2 … of random phase at `count` moments.
+    """Powers of harmonics 0 … count / 2 that replace harmonics 1, 2 … of random phase at `count` moments.
 
-    The phase of tone k at moment n is 2πkn/count. Tone k + count has the same phase, and tone count − k the opposite
-    phase, which a random phase does not distinguish. So their powers add.
+    The covariance at these moments is the same.
+
+    The phase of harmonic k at moment n is 2πkn/count. Harmonic k + count has the same phase. Harmonic count − k has
+    the opposite phase, which does not differ if the phase is random. The powers of these harmonics are therefore
+    added.
     """
     folded = _folded(powers, count)
     one_sided: Floats = folded[: count // 2 + 1].copy()
@@ -558,11 +590,11 @@ def powers_at(powers: Floats, count: int) -> Floats:
 
 
 class _Tones:
-    """A spectrum as tones: fast tones at even distances, slow tones at logarithmic distances.
+    """Spectrum as a set of tones: fast tones at equal steps of frequency, slow tones at logarithmic steps.
 
-    Fast tones turn within the aperture and repeat after `period` [s]. A narrow piece, which holds few fast tones, has
-    additional tones, which follow the slow tones in the arrays. Faster noise is independent at each moment, with the
-    standard deviation `rest`.
+    Fast tones complete cycles within the aperture, and repeat after `period` [s]. A narrow piece of the spectrum
+    contains few fast tones. It gets additional tones, which follow the slow tones in the arrays. Noise above the fast
+    tones is independent at each time, with the standard deviation `rest`.
     """
 
     def __init__(
@@ -599,12 +631,12 @@ class _Tones:
         self.rest = math.sqrt(math.fsum(beyond))
 
     def draw_slow(self, draws: int, rng: np.random.Generator) -> Floats:
-        """Random sizes of cosine and sine of the slow tones, (2, draws, tones)."""
+        """Draw random amplitudes of the cosine and sine of each slow tone, (2, draws, tones)."""
         drawn: Floats = rng.standard_normal((2, draws, self.slow.size)) * self.slow_size
         return drawn
 
     def slow_at(self, times: Floats, drawn: Floats) -> Floats:
-        """Sums of the slow tones and the tones of narrow pieces, (draws, times). [rad]"""
+        """Sums of the slow tones and the tones of narrow pieces, with the drawn amplitudes, (draws, times). [rad]"""
         coarse_times = times if times.size <= _COURSE_SAMPLES else np.linspace(times[0], times[-1], _COURSE_SAMPLES)
         cosines, sines = _cosines_and_sines(self.slow[: self.count], coarse_times)
         sums: Floats = drawn[0, :, : self.count] @ cosines.T + drawn[1, :, : self.count] @ sines.T
@@ -616,7 +648,10 @@ class _Tones:
         return sums
 
     def fast_at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
-        """Sums of the fast tones at times that divide their period evenly, (draws, times); see `at`. [rad]"""
+        """Random sums of the fast tones at times that divide their period evenly, (draws, times). [rad]
+
+        With `later`, the change within that many seconds, as in `at`.
+        """
         count = 2 * round(self.period * (times.size - 1) / float(times[-1] - times[0]) / 2)
         square, white_variance = np.square(self.fast_size), self.rest**2
         if later is not None:
@@ -634,7 +669,10 @@ class _Tones:
         return sums
 
     def at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
-        """Sums of all tones at evenly spaced times, (draws, times), or their change within `later` seconds. [rad]"""
+        """Random sums of all tones at evenly spaced times, (draws, times). [rad]
+
+        With `later`, the change of the sum within that many seconds.
+        """
         slow = self.draw_slow(draws, rng)
         sums = self.slow_at(times, slow)
         if later is not None:
@@ -643,10 +681,11 @@ class _Tones:
 
 
 class _Setting:
-    """A clock that was set before the aperture, by a line fitted to its phase over the averaging.
+    """Setting of a clock before the aperture, by a line that is fitted to its phase over an averaging time.
 
-    Slow tones are the same in the averaging and in the aperture. Tones faster than one cycle per eight apertures that
-    have turned two dozen times within the age are drawn for the averaging separately.
+    Slow tones are the same in the averaging time and in the aperture. Tones that are faster than one cycle per eight
+    apertures, and that complete two dozen cycles within the age of the setting, are drawn independently for the
+    averaging time.
     """
 
     def __init__(self, pieces: tuple[PowerLawPiece, ...], aperture_time: float, age: float, averaging: float) -> None:
@@ -665,7 +704,10 @@ class _Setting:
         self.fast = _Tones(fast_pieces, averaging) if fast_pieces else None
 
     def lines(self, slow: Floats, times: Floats, rng: np.random.Generator) -> Floats:
-        """The fitted lines at other times, (draws, times); `slow` are the drawn sizes of the slow tones. [rad]"""
+        """Fitted lines at other slow times, (draws, times). [rad]
+
+        `slow` are the drawn amplitudes of the slow tones.
+        """
         lines = self.of_cosine @ slow[0].T + self.of_sine @ slow[1].T
         if self.fast is not None:
             lines += self.fit @ self.fast.at(self.window, slow.shape[1], rng).T
@@ -674,5 +716,5 @@ class _Setting:
 
 
 def clock_seconds(phase: Floats, wavelength_m: float) -> Floats:
-    """Clock error with a given phase at the centre frequency. [s]"""
+    """Clock error that corresponds to a phase at the centre frequency. [s]"""
     return phase * wavelength_m / (2 * math.pi * SPEED_OF_LIGHT_MPS)

@@ -1,4 +1,4 @@
-"""Contents of a simulated scene: point targets and clutter, as the command line gives them."""
+"""Contents of a simulated scene, as given on the command line: point targets and clutter."""
 
 import csv
 import math
@@ -24,7 +24,7 @@ _MAX_LIST_BYTES = 1 << 20
 
 
 class Target(NamedTuple):
-    """A point on the ground: east and north of the scene centre [m], and power relative to amplitude 1 [dB]."""
+    """Point target on the ground: east and north of the scene centre [m], and power relative to amplitude 1. [dB]"""
 
     east: float = 0.0
     north: float = 0.0
@@ -32,14 +32,17 @@ class Target(NamedTuple):
 
 
 class Targets(NamedTuple):
-    """Points of a scene, and its clutter: mean power of a pixel relative to a point of 0 dB [dB], or None."""
+    """Point targets of a scene, and the clutter level, or None.
+
+    The level is the mean power of a pixel relative to a point of 0 dB. [dB]
+    """
 
     points: tuple[Target, ...] = (Target(),)
     clutter_db: float | None = None
 
 
 def parse_targets(text: str) -> Targets:
-    """Read `0, 0; 30 m, -20 m, -6 dB; clutter -25 dB`, or `grid:3x3:50 m`, or the name of a list.
+    """Read targets from `0, 0; 30 m, -20 m, -6 dB; clutter -25 dB`, `grid:3x3:50 m`, or the name of a file.
 
     Entries are points, grids about the scene centre, and at most one clutter level, in the units of a mission file;
     bare numbers are metres and decibels. An entry that ends in .csv names a file with the columns east [m],
@@ -48,7 +51,8 @@ def parse_targets(text: str) -> Targets:
     Raises
     ------
     ValueError
-        The first entry that cannot be read, with the reason; or no point, or more than a hundred.
+        An entry cannot be read; the message names the first such entry and the reason. Or there is no point, or there
+        are more than a hundred.
     """
     points: list[Target] = []
     clutter = None
@@ -79,7 +83,7 @@ def parse_targets(text: str) -> Targets:
 
 
 def _grid(entry: str) -> Iterator[Target]:
-    """Points of equal level, `grid:NXxNY:SPACING`, about the scene centre."""
+    """Points of equal power in a grid about the scene centre, from an entry `grid:NXxNY:SPACING`."""
     match = _GRID_PATTERN.fullmatch(entry)
     if match is None:
         raise ValueError(f"{entry!r} is no grid; accepted: {_ACCEPTED_FORMS}")
@@ -93,7 +97,10 @@ def _grid(entry: str) -> Iterator[Target]:
 
 
 def read_list(file: str) -> list[Target]:
-    """Read points from a CSV file; a `ValueError` names the file and the line that is not a point."""
+    """Read points from a CSV file.
+
+    A `ValueError` names the file and the line that is not a point.
+    """
     try:
         data = DISK.content(file, _MAX_LIST_BYTES)
     except UnreadableError as error:

@@ -1,4 +1,4 @@
-"""Derivation of the limits from the geometry, by SymPy. Nothing outside this package imports SymPy."""
+"""Derivation of the limits from the geometry, with SymPy. No other package imports SymPy."""
 
 # What other rooms may use.
 __all__ = ["emit", "render"]

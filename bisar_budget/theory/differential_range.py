@@ -1,6 +1,6 @@
-"""From the exact bistatic ranges to the polynomial in slow time: equations (1) to (31) of Rigling & Moses.
+"""Derivation of the polynomial in slow time from the exact bistatic ranges: (1) to (31) of Rigling & Moses.
 
-Each function derives one numbered equation from the one before it. Frame, units: see `symbols`.
+Each function derives one numbered equation from the one before it. For the frame and the units see `symbols`.
 """
 
 from functools import cache
@@ -40,12 +40,16 @@ _EPSILON = Symbol("epsilon", real=True)
 
 
 def distance(one: Matrix, other: Matrix) -> Expr:
-    """Distance of two points, d(τ) of (1). [m]"""
+    """Distance between two points, d(τ) of (1). [m]"""
     return sqrt(sum((r - x) ** 2 for r, x in zip(one, other, strict=True)))
 
 
 def observed_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORM_SYMBOLS) -> Expr:
-    """Return ΔR̂_m of (1): true distances to a scatterer minus measured distances to the centre, and the clock. [m]"""
+    """Return ΔR̂_m of (1). [m]
+
+    It is the sum of the true distances to a scatterer, minus the measured distances to the scene centre, plus the
+    clock error c·t̃.
+    """
     total = c * Function("ttilde")(tau)
     for platform in platforms:
         measured = platform.position + measured_error(platform)
@@ -59,10 +63,10 @@ def measured_error(platform: PlatformSymbols) -> Matrix:
 
 
 def direct_path_clock() -> Expr:
-    """The c·t̃ of (1) for a receiver that hears the transmitter: measured minus actual distance of both. [m]
+    """Clock error c·t̃ of (1) for a receiver that takes the direct path as its clock. [m]
 
-    The receiver's clock is the direct signal, which is late by the actual distance. The processor subtracts the
-    measured distance.
+    It is the measured minus the actual distance between the platforms. The receiver's clock is the direct signal,
+    which is delayed by the actual distance. The processor subtracts the measured distance.
     """
     transmitter, receiver = (platform.position + measured_error(platform) for platform in PLATFORM_SYMBOLS)
     actual = distance(*(platform.position for platform in PLATFORM_SYMBOLS))
@@ -84,7 +88,7 @@ def far_field_differential_range() -> Expr:
 
 
 def in_angles(expression: Expr) -> Expr:
-    """Write positions by slant range, azimuth and elevation, as (6) does."""
+    """Express positions by slant range, azimuth and elevation, as in (6)."""
     for platform in PLATFORM_SYMBOLS:
         R, phi, theta = platform.slant_range, platform.azimuth, platform.elevation
         spherical = (R * cos(phi) * cos(theta), R * sin(phi) * cos(theta), R * sin(theta))
@@ -94,14 +98,15 @@ def in_angles(expression: Expr) -> Expr:
 
 @cache
 def far_field_in_angles() -> Expr:
-    """Return (6): (5) in azimuth and elevation. [m]"""
+    """Return (6): the differential range (5) in terms of azimuth and elevation. [m]"""
     return in_angles(far_field_differential_range())
 
 
 def hold_range_constant(expression: Expr) -> Expr:
-    """Put R_k for |r_k| and r_k + v_k·τ for r_k: the motion model of (17).
+    """Replace |r_k| by the constant R_k, and r_k by r_k + v_k·τ: the motion model of (17).
 
-    This is the paper's key approximation: numerators move, ranges do not. The full model drops it.
+    This is the main approximation of the paper: positions in numerators change with time, ranges do not. The full
+    model does not use it.
     """
     for platform in PLATFORM_SYMBOLS:
         expression = expression.subs(platform.exact_slant_range(), platform.slant_range)
@@ -111,16 +116,16 @@ def hold_range_constant(expression: Expr) -> Expr:
 
 
 def linear_differential_range() -> tuple[Expr, Expr]:
-    """Return β₀, β₁ of (17). [m], [m/s]
+    """Return β₀ and β₁ of (17). [m], [m/s]
 
-    The print lost the + between its two brackets.
+    The plus sign between the two brackets is missing in the printed equation.
     """
     beta_0, beta_1 = coefficients(hold_range_constant(far_field_differential_range()))[:2]
     return beta_0, beta_1
 
 
 def coefficients(expression: Expr) -> tuple[Expr, ...]:
-    """Collect a cubic in slow time: four coefficients, constant first."""
+    """Return the four coefficients of a cubic in slow time, the constant first."""
     polynomial = Poly(expand(expression), tau)
     if polynomial.degree() > 3:
         raise ValueError(f"degree {polynomial.degree()} in slow time, at most 3 expected")
@@ -133,7 +138,7 @@ def error_polynomial(platform: PlatformSymbols) -> Matrix:
 
 
 def clock_polynomial() -> Expr:
-    """Timing error between transmitter and receiver, t̃(τ) of Section IV. [s]"""
+    """Timing error between transmitter and receiver as a polynomial, t̃(τ) of Section IV. [s]"""
     return sum(coefficient * tau**n for n, coefficient in enumerate(clock_coefficients))
 
 
@@ -143,17 +148,17 @@ def first_order_range_error(platform: PlatformSymbols) -> Expr:
 
 
 def error_track(platform: PlatformSymbols) -> Matrix:
-    """Position error as any function of slow time, x̃_t(τ) …, (3,). [m]"""
+    """Position error of a platform as a general function of slow time: x̃_t(τ), and so on, (3,). [m]"""
     return ImmutableMatrix([Function(f"{axis}tilde_{platform.subscript}")(tau) for axis in AXES])
 
 
 def _first_order(platform: PlatformSymbols) -> Expr:
-    """Part of a platform in (1) for a scatterer at the scene centre, to first order in its error. [m]"""
+    """Terms of one platform in (1) for a scatterer at the scene centre, to first order in its error. [m]"""
     return _grown(observed_differential_range((platform,)).subs(dict.fromkeys(scatterer, 0)))
 
 
 def _grown(expression: Expr) -> Expr:
-    """First order of an expression in the errors of both platforms, as functions of slow time."""
+    """First-order part of an expression in the position errors of both platforms, as functions of slow time."""
     for platform in PLATFORM_SYMBOLS:
         grown = zip(measured_error(platform), _EPSILON * error_track(platform), strict=True)
         expression = expression.subs(dict(grown))
@@ -162,9 +167,10 @@ def _grown(expression: Expr) -> Expr:
 
 @cache
 def direct_path_range_error() -> Expr:
-    """First order of (1) for the scene centre if the direct path is the clock, for any errors over time. [m]
+    """First-order part of (1) for the scene centre if the direct path is the clock. [m]
 
-    Slant ranges and the distance of the platforms are written R_t, R_r and D.
+    The errors may have any form over time. The slant ranges and the distance between the platforms have the symbols
+    R_t, R_r and D.
     """
     observed = observed_differential_range().subs(dict.fromkeys(scatterer, 0))
     total = _grown(observed.subs(c * Function("ttilde")(tau), direct_path_clock()))
@@ -176,10 +182,10 @@ def direct_path_range_error() -> Expr:
 
 @cache
 def range_error_of_tracks() -> Expr:
-    """Return (23): error of the differential range for any errors over time. [m]
+    """Return (23): error of the differential range for errors of any form over time. [m]
 
-    The processor subtracts the measured distance |r + r̃| while the data have |r|, so (1) leaves
-    |r| − |r + r̃| for each platform. First order in r̃, then the motion model of (17).
+    The processor subtracts the measured distance |r + r̃| and the data contain |r|, so (1) leaves |r| − |r + r̃| for
+    each platform. The result is of first order in r̃, with the motion model of (17).
     """
     total = c * Function("ttilde")(tau)
     for platform in PLATFORM_SYMBOLS:
@@ -189,7 +195,7 @@ def range_error_of_tracks() -> Expr:
 
 @cache
 def range_error() -> Expr:
-    """Return (23) with (22) put in, a cubic in slow time. [m]"""
+    """Return (23) with the error polynomials of (22) inserted: a cubic in slow time. [m]"""
     total = range_error_of_tracks().subs(Function("ttilde")(tau), clock_polynomial())
     for platform in PLATFORM_SYMBOLS:
         total = total.subs(dict(zip(error_track(platform), error_polynomial(platform), strict=True)))
@@ -197,31 +203,31 @@ def range_error() -> Expr:
 
 
 def ground_matrix() -> Matrix:
-    """Q of (19), (2, 2): takes a ground point (x, y) to (β₀, β₁). [-], [1/s]"""
+    """Return Q of (19), (2, 2), the matrix that maps a ground point (x, y) to (β₀, β₁). [-], [1/s]"""
     ground = Matrix(point[:2])
     return Matrix(linear_differential_range()).subs(point[2], 0).jacobian(ground)
 
 
 def ground_inverse() -> tuple[Matrix, Expr]:
-    """Adjugate (2, 2) and determinant of Q, so that Q⁻¹ of (30) is their quotient."""
+    """Adjugate (2, 2) and determinant of Q. The inverse Q⁻¹ of (30) is their quotient."""
     Q = ground_matrix()
     return Q.adjugate(), Q[0, 0] * Q[1, 1] - Q[0, 1] * Q[1, 0]
 
 
 @cache
 def look_vector() -> Matrix:
-    """Sum of the unit vectors to the platforms on the ground, (2,): (8) without f/2. [-]"""
+    """Sum of the unit vectors to the platforms, on the ground, (2,): (8) without the factor f/2. [-]"""
     return ImmutableMatrix([-diff(far_field_in_angles(), x) for x in point[:2]])
 
 
 def look_azimuth() -> Expr:
-    """Bistatic look angle φ_b of (11), by atan2: the printed arctan loses the quadrant. [rad]"""
+    """Bistatic look angle φ_b of (11), with atan2, because the printed arctan loses the quadrant. [rad]"""
     s_x, s_y = look_vector()
     return atan2(s_y, s_x)
 
 
 @cache
 def smear_direction() -> Matrix:
-    """Return (31), (2,): direction of the second column of Q⁻¹, along which quadratic errors smear. [-]"""
+    """Return (31), (2,): direction of the second column of Q⁻¹, along which quadratic errors smear a response. [-]"""
     adjugate, _ = ground_inverse()
     return ImmutableMatrix(in_angles(adjugate[:, 1]))

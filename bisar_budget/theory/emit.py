@@ -1,8 +1,9 @@
-"""Write the derived formulas to `bisar_budget/evaluators.py`, plain arithmetic without imports, and `catalogue.py`.
+"""Write the derived formulas to `bisar_budget/evaluators.py` and `bisar_budget/catalogue.py`.
 
-The catalogue has the formulas' text by name, and their LaTeX and MathML by text, so that a report typesets formulas
-without SymPy. Emission is deterministic: arguments, rows and common subexpressions keep a fixed order, constants are
-literals, and there are no dates. The caller prevents divisions by zero.
+The evaluators are plain arithmetic without imports. The catalogue has the text of each formula by name, and its LaTeX
+and MathML by text, so that a report typesets formulas without SymPy. The output is deterministic: arguments, rows and
+common subexpressions have a fixed order, constants are literals, and there are no dates. Callers of the evaluators
+must prevent divisions by zero.
 """
 
 import textwrap
@@ -66,10 +67,10 @@ MathML the invisible times, so that numbers can be put in.
 
 @dataclass(frozen=True)
 class Evaluator:
-    """One function to emit: its arguments in order and its rows of results, with names if there are several rows.
+    """One function to emit: its arguments in order, and its rows of results, with names if there are several rows.
 
-    `quotients` names negated quotients -numerator/denominator in which the rows are written. If a quotient is itself
-    a result, arrays are divided once and no intermediate array stays alive.
+    `quotients` names negated quotients -numerator/denominator that the rows contain. If a quotient is itself a
+    result, arrays are then divided only once and no intermediate array is kept.
     """
 
     name: str
@@ -110,7 +111,10 @@ def both_platforms_arguments() -> tuple[tuple[Symbol, str], ...]:
 
 
 def effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
-    """Return the effects of one unit of an error: β̃₀, β̃₁, QPE, cubic phase at the aperture edge, signed like β̃."""
+    """Return the effects of one unit of an error: β̃₀, β̃₁, and the quadratic and cubic phase at the aperture edge.
+
+    The phases have the sign of β̃.
+    """
     per_unit = [published.sensitivity(term, error) for term in beta]
     return (
         per_unit[0],
@@ -121,7 +125,7 @@ def effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
 
 
 def evaluators() -> tuple[Evaluator, ...]:
-    """Return every evaluator of the package, in the order of the generated file."""
+    """Return all evaluators of the package, in the order of the generated file."""
     beta = dr.coefficients(dr.range_error())
     # By kind, then axis: the order in which the tool reports them. Table I has them by axis, then kind.
     motion = (
@@ -218,7 +222,7 @@ def evaluators() -> tuple[Evaluator, ...]:
 
 
 def _of_random_errors() -> tuple[Evaluator, ...]:
-    """Evaluators for the effect of noise over an aperture; mean squares for processes."""
+    """Evaluators of the effects of noise over an aperture; those of random processes give mean squares."""
     figures = random_errors.inertial()
     columns = "Columns: quadratic and cubic phase at the aperture edge, what is left after the cubic. "
     parts = "Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic, "
@@ -308,7 +312,7 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
 
 
 def _decimal(expression: Expr) -> Expr:
-    """Write factors such as 1/8 as decimals if that is exact."""
+    """Replace factors such as 1/8 by decimals where these are exact."""
     dyadic = {r: Float(r) for r in expression.atoms(Rational) if r.q > 1 and r.q & (r.q - 1) == 0}
     return expression.xreplace(dyadic)
 
@@ -342,7 +346,7 @@ def _function(evaluator: Evaluator) -> str:
 
 
 def evaluators_module() -> str:
-    """Return the text of `evaluators.py` as the derivation gives it today."""
+    """Return the text of `evaluators.py` that the current derivation gives."""
     return _EVALUATORS + "".join(_function(evaluator) for evaluator in evaluators())
 
 
@@ -352,13 +356,13 @@ _SHOWN = ("(11)", "(19)", "(22)", "(25)", "(30)", "(31)")
 
 
 def equations() -> tuple[Equation, ...]:
-    """Return the equations that a report shows, the paper's first. (30) is shown at mid-aperture."""
+    """Return the equations for a report, those of the paper first. (30) is for mid-aperture."""
     shown = (one for one in published.equations() if one.number in _SHOWN and not one.right.has(published.tau_i))
     return (*shown, *full.equations())
 
 
 def named() -> Iterator[tuple[str, Expr]]:
-    """Expressions that an explanation asks for by name."""
+    """Names and expressions of the formulas that explanations use."""
     columns: tuple[tuple[FormulaTable, Sequence[int]], ...] = (
         (published.table_1(), range(4)),
         (published.table_2(), [0]),
@@ -383,7 +387,7 @@ def named() -> Iterator[tuple[str, Expr]]:
 
 
 def formulas() -> Iterator[Expr]:
-    """All expressions of the catalogue: the named expressions, and both sides of the equations."""
+    """All expressions of the catalogue: those with a name, and both sides of the equations."""
     yield from (formula for _, formula in named())
     for equation in equations():
         yield equation.left
@@ -391,7 +395,7 @@ def formulas() -> Iterator[Expr]:
 
 
 def catalogue_module() -> str:
-    """Return the text of `catalogue.py` as the derivation gives it today."""
+    """Return the text of `catalogue.py` that the current derivation gives."""
     every = {as_text(formula): formula for formula in formulas()}
     symbols = {as_text(s): s for formula in every.values() for s in formula.free_symbols}
     lines = [_CATALOGUE, "", "TEXTS: dict[str, str] = {"]

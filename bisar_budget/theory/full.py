@@ -1,13 +1,12 @@
 """The full model: all first-order terms of the range error, and the terms that the displacement of the image adds.
 
-Rigling & Moses hold the range constant and use only the quadratic term. Here the line of sight turns: with u(τ) the
-unit vector to a platform, a position error r̃(τ) changes the range by −u(τ)·r̃(τ) to first order. Constant and linear
-terms move the response to x̂, where a point has a range history. The range error minus that history defocuses. The
-model is derived here; it is not in the paper.
+Rigling & Moses assume a constant range and use only the quadratic term. Here the line of sight turns: a position
+error r̃(τ) changes the range by −u(τ)·r̃(τ) to first order, with u(τ) the unit vector to the platform. The constant
+and linear terms displace the response to a point x̂ whose range history has the same terms. The range error minus
+this history defocuses the response. The model is derived here; it is not in the paper.
 
-Numbers come from `range_error_at` at the nodes of Gauss-Legendre quadrature, as in `ranges`, for any length of the
-aperture. The series about the middle of the aperture is for comparison with Table I: over a short aperture both
-agree.
+Numerical results use `range_error_at` at the nodes of Gauss-Legendre quadrature, as in `ranges`, for any length of
+the aperture. The series about mid-aperture serves for comparison with Table I. For a short aperture both agree.
 """
 
 from collections.abc import Sequence
@@ -59,7 +58,7 @@ DISPLACEMENT = ImmutableMatrix([real("xhat"), real("yhat")])
 
 
 def growth(platform: PlatformSymbols) -> dict[Symbol, Expr]:
-    """d₁ … d₄ of |r|² = R²(1 + d₁τ + d₂τ² + d₃τ³ + d₄τ⁴) on a path of constant acceleration. [1/sⁿ]"""
+    """Coefficients d₁ … d₄ of |r|² = R²(1 + d₁τ + d₂τ² + d₃τ³ + d₄τ⁴) for constant acceleration. [1/sⁿ]"""
     track = platform.position + platform.velocity * tau + platform.acceleration * tau**2 / 2
     square = Poly(expand(track.dot(track)), tau)
     return {
@@ -70,7 +69,10 @@ def growth(platform: PlatformSymbols) -> dict[Symbol, Expr]:
 
 @cache
 def look_series(platform: PlatformSymbols) -> tuple[Matrix, ...]:
-    """Derivatives of the line of sight u = r/|r| at τ = 0, orders 0 to 4, (3,) each, in `growth`. [1/sⁿ]"""
+    """Derivatives of the line of sight u = r/|r| at τ = 0, orders 0 to 4, (3,) each. [1/sⁿ]
+
+    They are expressed by the coefficients of `growth`.
+    """
     growth_sum = 1 + sum(d * tau**n for n, d in enumerate(growth(platform), start=1))
     inverse = [diff(1 / sqrt(growth_sum), tau, n).subs(tau, 0) / factorial(n) for n in range(SLOW_TIME_ORDER + 1)]
     track = (platform.position, platform.velocity, platform.acceleration / 2)
@@ -82,14 +84,14 @@ def look_series(platform: PlatformSymbols) -> tuple[Matrix, ...]:
 
 
 def range_error_at(platform: PlatformSymbols) -> Expr:
-    """Range error of one platform at one slow time to first order, −u·r̃(τ), with the position at τ. [m]"""
+    """Range error of one platform at one slow time to first order: −u·r̃(τ), for the position at τ. [m]"""
     first_order = dr.first_order_range_error(platform)
     return first_order.subs(platform.exact_slant_range(), platform.slant_range)
 
 
 @cache
 def range_error() -> tuple[Expr, ...]:
-    """β̃₀ … β̃₄ of −Σ u(τ)·r̃(τ) + c·t̃(τ), in the derivatives of u. [m/sⁿ]"""
+    """Coefficients β̃₀ … β̃₄ of −Σ u(τ)·r̃(τ) + c·t̃(τ), in terms of the derivatives of u. [m/sⁿ]"""
     total = c * dr.clock_polynomial()
     for platform in PLATFORM_SYMBOLS:
         look = sum(
@@ -115,21 +117,24 @@ def direct_range_error(platform: PlatformSymbols) -> Expr:
 
 
 def direct_sight(platform: PlatformSymbols) -> Matrix:
-    """Decrease of the range per metre of each error if the direct path is the clock: u_t − b or u_r + b."""
+    """Decrease of the range per metre of a platform's error if the direct path is the clock: u_t − b or u_r + b."""
     unit_sight = dict(zip(platform.position, platform.slant_range * platform.look[0], strict=True))
     return Matrix([-direct_range_error(platform).coeff(e).subs(unit_sight) for e in dr.error_track(platform)])
 
 
 def ground_history() -> tuple[Matrix, ...]:
-    """Derivatives of s = u_t + u_r on the ground, orders 0 to 4, (2,) each: a point has the range −s(τ)·x."""
+    """Derivatives of s = u_t + u_r on the ground, orders 0 to 4, (2,) each.
+
+    The range of a ground point x, relative to the scene centre, is −s(τ)·x.
+    """
     looks = zip(*(platform.look for platform in PLATFORM_SYMBOLS), strict=True)
     return tuple(Matrix([sum(u[axis] for u in looks_of_both) for axis in range(2)]) for looks_of_both in looks)
 
 
 def gradient_inverse() -> tuple[tuple[Symbol, ...], Matrix, Expr]:
-    """Gradients s_x, s_y, ṡ_x, ṡ_y on the ground, and adjugate (2, 2) and determinant of their Q = −[s; ṡ].
+    """Symbols s_x, s_y, ṡ_x, ṡ_y of the gradients on the ground, and adjugate (2, 2) and determinant of Q = −[s; ṡ].
 
-    Q maps a ground point to its constant and linear range. [-], [1/s]
+    Q maps a ground point to the constant and the linear term of its range. [-], [1/s]
     """
     s, rate = Matrix([real("s_x"), real("s_y")]), Matrix([real("sdot_x"), real("sdot_y")])
     Q = -Matrix([list(s), list(rate)])
@@ -137,23 +142,27 @@ def gradient_inverse() -> tuple[tuple[Symbol, ...], Matrix, Expr]:
 
 
 def amplitude_share(own: Expr, other: Expr) -> Expr:
-    """Part of a platform in an amplitude of both platforms, in the ratio of the roots of their shares of power."""
+    """Fraction of an amplitude that one platform gets if both platforms share it.
+
+    The amplitudes of the platforms are proportional to the square roots of their shares of power.
+    """
     platform_part = positive("a")
     (solution,) = solve(Eq(platform_part * sqrt(other), (1 - platform_part) * sqrt(own)), platform_part)
     return solution
 
 
 def motion_of_phase(phase: Expr) -> Expr:
-    """Motion of one platform along its line of sight that causes a given phase on the one-way path. [m]"""
+    """Motion of one platform along its line of sight that causes a given phase, by its one-way path. [m]"""
     motion = positive("A")
     (solution,) = solve(Eq(published.one_way_phase(motion), phase), motion)
     return solution
 
 
 def quartic_as_quadratic() -> Expr:
-    """Quadratic coefficient of the cubic fitted to x⁴ over −1 … 1: 6/7.
+    """Quadratic coefficient of the cubic that is fitted to x⁴ over −1 … 1: 6/7.
 
-    It follows from the projection on the second Legendre polynomial, the only one up to the third that has an x².
+    It follows from the projection on the second Legendre polynomial, the only one up to the third order that has an
+    x².
     """
     x = real("x")
     second = legendre(2, x)
@@ -161,23 +170,23 @@ def quartic_as_quadratic() -> Expr:
 
 
 def quadratic_phase(coefficients: Sequence[Expr]) -> Expr:
-    """Phase at the aperture edge of the quadratic fitted to β₀ … β₄ over the aperture. [rad]"""
+    """Phase at the aperture edge of the quadratic polynomial that is fitted to β₀ … β₄ over the aperture. [rad]"""
     quadratic, quartic = (published.edge_phase(coefficients[n], n) for n in (2, 4))
     return quadratic + quartic_as_quadratic() * quartic
 
 
 def cubic_phase(coefficients: Sequence[Expr]) -> Expr:
-    """Phase of β₃ at the aperture edge. [rad]"""
+    """Phase of the cubic term β₃ at the aperture edge. [rad]"""
     return published.edge_phase(coefficients[3], 3)
 
 
 def displacement_coefficients() -> tuple[Expr, ...]:
-    """Change of β₀ … β₄ by a displacement (x̂, ŷ): +s⁽ⁿ⁾·x̂/n!. [m/sⁿ]"""
+    """Change of the coefficients β₀ … β₄ by a displacement x̂ = (x̂, ŷ): +s⁽ⁿ⁾·x̂/n!. [m/sⁿ]"""
     return tuple(s.dot(DISPLACEMENT) / factorial(n) for n, s in enumerate(ground_history()))
 
 
 def effective_coefficients() -> tuple[Expr, Expr, Expr]:
-    """β₂, β₃, β₄ at the displaced point: β̃ₙ + s⁽ⁿ⁾·x̂/n!."""
+    """Coefficients β₂, β₃, β₄ of the range error at the displaced point: β̃ₙ + s⁽ⁿ⁾·x̂/n!. [m/sⁿ]"""
     beta, added = range_error(), displacement_coefficients()
     second, third, fourth = (beta[n] + added[n] for n in (2, 3, 4))
     return second, third, fourth
@@ -185,7 +194,7 @@ def effective_coefficients() -> tuple[Expr, Expr, Expr]:
 
 @cache
 def table() -> FormulaTable:
-    """Coefficients of the range error with all first-order terms, without the terms of the displacement."""
+    """Table of the coefficients of the range error with all first-order terms, without those of the displacement."""
     return FormulaTable(
         number="Full model",
         title="Differential range errors with the line of sight turning as it does",
@@ -201,7 +210,7 @@ def table() -> FormulaTable:
 
 @cache
 def equations() -> tuple[Equation, ...]:
-    """Turn of the line of sight, displacement of a response, and the coefficients that defocus it."""
+    """Equations of the turn of the line of sight, the displacement, and the coefficients that defocus a response."""
     platform = PLATFORM_SYMBOLS[0]
     second, third, fourth = effective_coefficients()
     history = ground_history()
@@ -234,7 +243,7 @@ def equations() -> tuple[Equation, ...]:
 
 
 def _of_the_direct_path() -> tuple[Equation, ...]:
-    """If the receiver hears the transmitter: the terms that replace u_t, u_r and t̃."""
+    """Equations of the terms that replace u_t, u_r and t̃ if the receiver takes the direct path as its clock."""
     direction = (TRANSMITTER.position - RECEIVER.position) / baseline
     return (
         Equation("", "Direct path, from receiver to transmitter", Symbol("b"), direction),
@@ -251,18 +260,19 @@ def _of_the_direct_path() -> tuple[Equation, ...]:
 
 
 def _collected(coefficient: Expr) -> Expr:
-    """Coefficient as β̃ₙ of the table plus the terms that the displacement adds."""
+    """Write a coefficient as β̃ₙ of the table plus the terms that the displacement adds."""
     order = 2 + effective_coefficients().index(coefficient)
     return Add(real(f"beta_{order}tilde"), expand(coefficient - range_error()[order]), evaluate=False)
 
 
 @cache
 def vibration() -> FormulaTable:
-    """Vibration from first principles: the effect of a phase of peak φ or RMS σ, and the motion with that phase.
+    """Table of vibration from first principles: the effect of a phase of peak φ or RMS σ, and the allowable motion.
 
-    A sinusoid's echoes are J₁(φ)/J₀(φ) of the response, φ/2 to first order. With Gaussian noise, exp(-σ²) of the
-    power stays in the response, and a share E of that within its first nulls. So the ISLR is (exp(σ²) - 1)/E. Both
-    platforms at one frequency share the amplitude; both with independent noise share the power.
+    The paired echoes of a sinusoid have the amplitude J₁(φ)/J₀(φ) relative to the response, φ/2 to first order. With
+    Gaussian noise, a fraction exp(-σ²) of the power stays in the response, and a fraction E of this is within its
+    first nulls. The ISLR is therefore (exp(σ²) - 1)/E. If both platforms vibrate at one frequency, they share the
+    amplitude. If both have independent noise, they share the power.
     """
     amplitude, rms, phase, platform_part, energy = (positive(name) for name in ("A", "sigma", "phi", "a", "E"))
     first_order, zeroth_order = (series(besselj(n, phase), phase, 0, 2).removeO() for n in (1, 0))

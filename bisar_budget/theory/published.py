@@ -1,8 +1,9 @@
-"""Rigling & Moses as published: every numbered equation, (1) to (31), Tables I and II, vibration and pull-in.
+"""Rigling & Moses as published: all numbered equations (1) to (31), Tables I and II, vibration and pull-in.
 
-Equations are defined as in the paper, or derived from earlier equations. Tables are derived row by row in print
-order. An error of the print is noted at its equation, and the equation here is correct. Sums keep their indices: i
-counts frequencies, k pulses, m scatterers, k_x and k_y the samples of the rectangular grid.
+An equation is either defined as in the paper, or derived from earlier equations. The rows of the tables are derived
+in printed order. Errors of the printed paper are noted at the equation, and the equation given here is correct.
+Indices of sums are those of the paper: i counts frequencies, k pulses, m scatterers, and k_x and k_y the samples of
+the rectangular grid.
 """
 
 from collections.abc import Sequence
@@ -66,7 +67,7 @@ EQUAL_SHARE_QPE_RAD = pi / 8  # per platform, half of the monostatic custom, Sec
 
 @dataclass(frozen=True)
 class TableRow:
-    """One row of a table: its number in print, its error, and its cells from left to right."""
+    """Row of a table: its printed number, its error, and its cells from left to right."""
 
     number: int | None
     error: Symbol
@@ -77,7 +78,7 @@ class TableRow:
 
 @dataclass(frozen=True)
 class FormulaTable:
-    """A table with the paper's number, its column heads and its rows in print order."""
+    """Table with the number in the paper, the column heads, and the rows in printed order."""
 
     number: str
     title: str
@@ -88,7 +89,7 @@ class FormulaTable:
 
 @dataclass(frozen=True)
 class Equation:
-    """A numbered equation: whether it is `defined` or `derived`, and what the print gets wrong."""
+    """Numbered equation, with a note whether it is `defined` or `derived` and what the printed paper has wrong."""
 
     number: str
     title: str
@@ -105,13 +106,13 @@ def motion_errors(platform: PlatformSymbols) -> tuple[Symbol, ...]:
 
 
 def single_error(expression: Expr, error: Symbol) -> Expr:
-    """Keep the effect of one error: all other errors are set to zero."""
+    """Effect of one error: the expression with all other errors set to zero."""
     every = [*clock_coefficients, *(e for platform in PLATFORM_SYMBOLS for e in motion_errors(platform))]
     return expression.xreplace({other: Integer(0) for other in every if other != error})
 
 
 def coefficient_rows(beta: Sequence[Expr], *, is_numbered: bool) -> tuple[TableRow, ...]:
-    """Rows of a table of coefficients of the range error: the clock alone, then each motion error alone."""
+    """Rows of a table with the coefficients of the range error: for the clock error, then for each motion error."""
     motion_free = {e: 0 for platform in PLATFORM_SYMBOLS for e in motion_errors(platform)}
     clock = Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False)
     number = 1 if is_numbered else None
@@ -129,7 +130,7 @@ def coefficient_rows(beta: Sequence[Expr], *, is_numbered: bool) -> tuple[TableR
 
 @cache
 def table_1() -> FormulaTable:
-    """Table I: coefficients β̃₀ … β̃₃ of the range error, for the clock and each motion error alone."""
+    """Table I: coefficients β̃₀ … β̃₃ of the range error, for the clock error and for each motion error."""
     return FormulaTable(
         number="Table I",
         title="Differential range errors induced by motion measurement errors",
@@ -140,12 +141,12 @@ def table_1() -> FormulaTable:
 
 
 def edge_phase(beta: Expr, order: int) -> Expr:
-    """Phase of one term of the range error at the aperture edge, (2π/λ)·β·(T/2)ⁿ. Signed like β. [rad]"""
+    """Phase of one term of the range error at the aperture edge, (2π/λ)·β·(T/2)ⁿ, with the sign of β. [rad]"""
     return 2 * pi / wavelength * beta * (T / 2) ** order
 
 
 def limit(phase: Expr, error: Symbol, budget: Expr) -> Expr:
-    """Magnitude of an error at which a phase proportional to it reaches the budget."""
+    """Magnitude of an error at which the phase, proportional to it, equals the budget."""
     size = Symbol("size", positive=True)
     (solution,) = solve(Eq(Abs(phase.subs(error, size)), budget), size)
     return solution
@@ -153,7 +154,7 @@ def limit(phase: Expr, error: Symbol, budget: Expr) -> Expr:
 
 @cache
 def table_2() -> FormulaTable:
-    """Table II: quadratic phase error and largest allowable error, with the bars that the print omits."""
+    """Table II: quadratic phase error and largest allowable error, with the absolute-value bars missing in print."""
     beta_2, budget = dr.coefficients(dr.range_error())[2], EQUAL_SHARE_QPE_RAD
     rows = []
     for platform in PLATFORM_SYMBOLS:
@@ -194,16 +195,16 @@ def table_2() -> FormulaTable:
 
 
 def one_way_phase(motion: Expr) -> Expr:
-    """Phase of a motion of one platform along its line of sight, 2πA/λ. [rad]"""
+    """Phase that a motion of one platform along its line of sight causes, 2πA/λ. [rad]"""
     return 2 * pi * motion / wavelength
 
 
 @cache
 def vibration() -> FormulaTable:
-    """Vibration limits of Section V, amplitude and rms along the line of sight, with a share of power.
+    """Table of the vibration limits of Section V: amplitude and rms along the line of sight, for a share of power.
 
-    A phase of peak φ makes paired echoes; the rule of Carrara et al., Table 5.12, that the paper quotes is
-    (2πA/λ)² ≤ PSLR and (2πσ/λ)² ≤ ISLR. Powers add, so a platform's share s multiplies the power.
+    A phase of peak φ causes paired echoes. The paper quotes the rule of Carrara et al., Table 5.12: (2πA/λ)² ≤ PSLR
+    and (2πσ/λ)² ≤ ISLR. Powers add, so the allowable power is multiplied by the share s of a platform.
     """
     amplitude, rms = positive("A"), positive("sigma")
 
@@ -227,15 +228,15 @@ def vibration() -> FormulaTable:
 
 
 def pull_in_factor() -> Expr:
-    """Factor by which autofocus that corrects π·N_pull radians raises a limit: π·N_pull over the total QPE.
+    """Factor by which autofocus that corrects π·N_pull radians raises a limit: π·N_pull / total QPE.
 
-    4·N_pull for the total of π/4, Section VI.
+    For the total of π/4 it is 4·N_pull, Section VI.
     """
     return pi * n_pull / total_qpe
 
 
 def sensitivity(expression: Expr, error: Symbol) -> Expr:
-    """Effect of one unit of an error on an expression linear in it."""
+    """Effect of one unit of an error, for an expression that is linear in the error."""
     slope = diff(expression, error)
     if slope.has(error):
         raise ValueError(f"not linear in {error}")
@@ -266,12 +267,12 @@ piece_range = tuple(real(f"beta_{n}i") for n in range(2))
 
 
 def phase(differential_range: Expr) -> Expr:
-    """Return (2): phase of a sample whose scatterer has a differential range. [rad]"""
+    """Return (2): phase of a sample for a scatterer with a given differential range. [rad]"""
     return -2 * pi * f_i * differential_range / c
 
 
 def in_slow_time(expression: Expr, at: Expr = tau_k) -> Expr:
-    """Replace φ̄_t by φ_t(τ_k), and so on: angles of the aperture's middle by angles at any time."""
+    """Replace the angles at mid-aperture by angles at a slow time: φ̄_t by φ_t(τ_k), and so on."""
     for platform in PLATFORM_SYMBOLS:
         s = platform.subscript
         expression = expression.subs(
@@ -286,58 +287,61 @@ def spatial_frequencies() -> Matrix:
 
 
 def rotation(x: Expr, y: Expr) -> Matrix:
-    """Return (9), (10), (2,): components along the look direction φ_b and 90° counter-clockwise of it."""
+    """Return (9) and (10), (2,): components along the look direction φ_b and 90° counter-clockwise from it."""
     return Matrix([x * cos(phi_b) + y * sin(phi_b), -x * sin(phi_b) + y * cos(phi_b)])
 
 
 def unrotated(x: Expr, y: Expr) -> Matrix:
-    """Undo `rotation`, (2,)."""
+    """Inverse of `rotation`, (2,)."""
     return rotation(x, y).subs(phi_b, -phi_b)
 
 
 def exponent(products: Expr) -> Expr:
-    """Exponent of a far-field filter, −jΦ by (2), with x·f_x + y·f_y + z·f_z for −f·ΔR/2 by (6) and (8)."""
+    """Exponent −jΦ of a far-field filter, by (2).
+
+    `products` is x·f_x + y·f_y + z·f_z, which replaces −f·ΔR/2 by (6) and (8).
+    """
     together = real("products")
     return (-I * phase(-2 * together / f_i)).subs(together, products)
 
 
 def turned_products(f_x: Expr, f_y: Expr) -> Expr:
-    """x·f_x + y·f_y in the rotated coordinates of (9) and (10): x′·f′_x + y′·f′_y."""
+    """Scalar product x·f_x + y·f_y in the rotated coordinates of (9) and (10): x′·f′_x + y′·f′_y."""
     return simplify(unrotated(x_turned, y_turned).dot(unrotated(f_x, f_y)))
 
 
 def summed(over_frequencies_and_pulses: Expr) -> Expr:
-    """Mean of (4) over frequencies and pulses."""
+    """Mean over frequencies and pulses, as in (4)."""
     inner = Sum(over_frequencies_and_pulses, (i, 1, frequencies), (k, 1, pulses))
     return inner / (frequencies * pulses)
 
 
 def received() -> Expr:
-    """Samples S(f_i, τ_k) as a function of both."""
+    """Symbol of the samples S(f_i, τ_k), a function of frequency and slow time."""
     return Function("S")(f_i, tau_k)
 
 
 def grid() -> tuple[Expr, Expr]:
-    """Return (13): the rectangular grid of the projected frequencies. [Hz]"""
+    """Return (13): the rectangular grid of rotated spatial frequencies. [Hz]"""
     return f_0 + B_x * k_x / N_x, -B_y / 2 + B_y * k_y / N_y
 
 
 def half_angle(theta: Expr) -> Expr:
-    """1 − exp(−jθ) as a phase and a sine: exp(−jθ/2)·2j·sin(θ/2)."""
+    """Write 1 − exp(−jθ) as the product of a phasor and a sine: exp(−jθ/2)·2j·sin(θ/2)."""
     angle = real("theta")
     chord = expand(exp(I * angle / 2) - exp(-I * angle / 2), complex=True)
     return (exp(-I * angle / 2) * chord).subs(angle, theta)
 
 
 def geometric_sum(step: Expr, count: Expr) -> tuple[Expr, Expr]:
-    """Σ exp(−j·step·n), n = 0 … count − 1, as the exponent of a phase and a quotient of sines."""
+    """Sum of exp(−j·step·n) over n = 0 … count − 1, as the exponent of a phasor and a quotient of sines."""
     total = half_angle(count * step) / half_angle(step)  # Σ qⁿ = (1 − q^N)/(1 − q)
     turns = [factor for factor in total.args if factor.func is exp]
     return Add(*(turn.args[0] for turn in turns)), total / Mul(*turns)
 
 
 def response() -> Expr:
-    """Return (16): the filter (14) of the samples (15), its sums done: two Dirichlet kernels for each scatterer."""
+    """Return (16): the filter (14) applied to the samples (15), with two Dirichlet kernels for each scatterer."""
     # The sums of one scatterer separate: exp(−j(4π/c)(x′ − x′_m)(f₀ + B_x k_x/N_x)), and the same in y′.
     whole, kernels = [], []
     for offset, start, band, count in (
@@ -354,26 +358,26 @@ def response() -> Expr:
 
 
 def general_matrix() -> Matrix:
-    """Return the matrix of (18), (2, 3): a point of space to (β₀, β₁). [-], [1/s]"""
+    """Return the matrix of (18), (2, 3), which maps a point in space to (β₀, β₁). [-], [1/s]"""
     return Matrix(dr.linear_differential_range()).jacobian(point)
 
 
 def observed_polynomial() -> tuple[Expr, ...]:
-    """β̂₀ … β̂₃ of (24): the sum of (17) and (23), order by order."""
+    """Coefficients β̂₀ … β̂₃ of (24): the sum of (17) and (23) in each order."""
     scatterer = beta[0] + beta[1] * tau
     error = sum(coefficient * tau**n for n, coefficient in enumerate(beta_error))
     return dr.coefficients(scatterer + error)
 
 
 def tangent() -> tuple[Expr, Expr]:
-    """Return (27), (28): value and slope at τ_i of the range error as a cubic. [m], [m/s]"""
+    """Return (27) and (28): value and slope at τ_i of the range error, which is a cubic. [m], [m/s]"""
     error = sum(coefficient * tau**n for n, coefficient in enumerate(beta_error))
     return error.subs(tau, tau_i), diff(error, tau).subs(tau, tau_i)
 
 
 @cache
 def piece_inverse() -> tuple[Matrix, Expr]:
-    """Adjugate (2, 2) and determinant of Q_i, for the platforms at τ_i with constant ranges: (30)."""
+    """Adjugate (2, 2) and determinant of Q_i in (30), for the platforms at τ_i with constant ranges."""
     moved = {
         coordinate: coordinate + speed * tau_i
         for platform in PLATFORM_SYMBOLS
@@ -384,18 +388,18 @@ def piece_inverse() -> tuple[Matrix, Expr]:
 
 
 def column(*names: str) -> Matrix:
-    """Column of symbols."""
+    """Column vector of real symbols with the given names."""
     return Matrix([real(name) for name in names])
 
 
 def product(*factors: Expr) -> Expr:
-    """Matrices side by side, not multiplied out."""
+    """Product of matrices that is displayed but not multiplied out."""
     return MatMul(*(ImmutableMatrix(f) if isinstance(f, MatrixBase) else f for f in factors), evaluate=False)
 
 
 @cache
 def equations() -> tuple[Equation, ...]:
-    """Return every numbered equation of the paper in its order, and the gain by autofocus of Section VI."""
+    """Return all numbered equations of the paper in order, and the gain by autofocus of Section VI."""
     return (*_data(), *_images(), *_point_response(), *_ground_point(), *_errors(), *_effects())
 
 

@@ -1,11 +1,12 @@
-"""Random errors over one aperture: quadratic phase, cubic phase and ISLR by noise of sensors and clocks.
+"""Random errors over one aperture: quadratic phase, cubic phase and ISLR from noise of sensors and clocks.
 
-An error x over the aperture is a sum of Legendre polynomials Pₙ(2τ/T). Orders 0 and 1 displace, 3/2 of order 2 is the
-quadratic phase at the aperture edge, 5/2 of order 3 is the cubic phase, and the rest of the mean square spreads over
-the image. A tone of frequency f has the part (2n + 1)·jₙ(πfT) in order n, so that a spectrum is integrated with its
-square. A range error has the phase k·x, k = 2π/λ, one way. All is derived here; the paper has no random errors.
+An error x over the aperture is a sum of Legendre polynomials Pₙ(2τ/T). Orders 0 and 1 displace the response. The
+coefficient of order 2 times 3/2 is the quadratic phase at the aperture edge, and that of order 3 times 5/2 is the
+cubic phase. The rest of the mean square spreads over the image. The part of a tone of frequency f in order n is (2n +
+1)·jₙ(πfT), so a spectrum is integrated with the square of this factor. A range error has the one-way phase k·x, k =
+2π/λ. All formulas are derived here; the paper has no random errors.
 
-Spectra are one-sided. One sigma each; axes and platforms are independent.
+Spectra are one-sided. Values are for one sigma. Axes and platforms are independent.
 """
 
 from collections.abc import Callable
@@ -60,22 +61,23 @@ _x, _m, _M, _w = real("xi"), positive("m"), positive("M"), positive("w")
 
 
 class Moments(NamedTuple):
-    """Mean squares over an aperture: quadratic and cubic part at its edge, and the remainder after the cubic."""
+    """Mean squares over an aperture: quadratic and cubic part at its edge, and the rest beyond the cubic part."""
 
     quadratic: Expr
     cubic: Expr
     left: Expr
 
     def times(self, factor: Expr) -> "Moments":
-        """The moments times a factor."""
+        """Multiply all moments by a factor."""
         return Moments(*(expand(factor * moment) for moment in self))
 
 
 class PlaceMoments(NamedTuple):
-    """Moments of the orders that displace: mean squares of orders 0 and 1, and their products with orders 2 and 3.
+    """Moments of the Legendre orders 0 and 1, which displace: mean squares, and products with orders 2 and 3.
 
-    The moments are of the constant and the linear part at the aperture edge, of constant times quadratic and of
-    linear times cubic part. For processes that are symmetric in time, even and odd orders are uncorrelated.
+    The mean squares are of the constant part and of the linear part at the aperture edge. The products are constant
+    times quadratic part and linear times cubic part. For processes that are symmetric in time, even and odd orders
+    are uncorrelated.
     """
 
     constant: Expr
@@ -88,7 +90,7 @@ _PLACE_ORDERS = ((0, 0), (1, 1), (0, 2), (1, 3))  # pairs of orders of the field
 
 
 def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
-    """Moments from the mean squares of the coefficients of P₀ … P₃ and the mean square of the full history."""
+    """Moments from the mean squares of the coefficients of P₀ … P₃, and from the mean square of the full history."""
     orders = [square / (2 * n + 1) for n, square in enumerate(coefficients)]
     return Moments(
         LEADING_RATIONALS[2] ** 2 * coefficients[2],
@@ -99,9 +101,10 @@ def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
 
 # ---------------------------------------------------------------------- inertial sensors
 def _from_middle(response: Callable[[Expr], Expr]) -> Callable[[Expr, Expr], Expr]:
-    """Covariance at m ≤ M, on one side of mid-aperture, of white noise that acts from mid-aperture, by its response.
+    """Return the covariance, at times m ≤ M after mid-aperture, of an error that white noise drives from there.
 
-    Both sides are independent: an error that is zero at mid-aperture grows by different noise before and after.
+    `response` is the error at a time after a unit impulse of the noise. Both sides of mid-aperture are independent:
+    an error that is zero at mid-aperture grows by different noise before and after.
     """
 
     def covariance(m: Expr, M: Expr) -> Expr:
@@ -112,7 +115,7 @@ def _from_middle(response: Callable[[Expr], Expr]) -> Callable[[Expr, Expr], Exp
 
 @cache
 def walk(order: int) -> Moments:
-    """Mean squares of white noise integrated `order` times from mid-aperture on, for a unit density and T = 1."""
+    """Moments of white noise integrated `order` times from mid-aperture, for a unit density and T = 1."""
     covariance = _from_middle(lambda t: t ** (order - 1) / factorial(order - 1))
     squares = []
     for n in range(ORDER_COUNT):
@@ -124,7 +127,7 @@ def walk(order: int) -> Moments:
 
 
 def constant(order: int) -> Moments:
-    """Squares of τⁿ/n! for T = 1: a constant acceleration (2) or its rate (3)."""
+    """Moments of τⁿ/n! for T = 1, with n = `order`: 2 for a constant acceleration, 3 for a constant rate of it."""
     history = (_x / 2) ** order / factorial(order)
     squares = tuple(
         (Rational(2 * n + 1, 2) * integrate(expand(history * legendre(n, _x)), (_x, -1, 1))) ** 2
@@ -134,7 +137,7 @@ def constant(order: int) -> Moments:
 
 
 class SensorFigure(NamedTuple):
-    """A figure of an inertial sensor: symbol, name, explanation, and mean squares of the phase of one unit."""
+    """Figure of merit of an inertial sensor: symbol, name, explanation, and mean squares of the phase of one unit."""
 
     symbol: Symbol
     name: str
@@ -144,7 +147,7 @@ class SensorFigure(NamedTuple):
 
 @cache
 def inertial() -> tuple[SensorFigure, ...]:
-    """Figures of an inertial sensor over one aperture, in the order of the mission file. [rad²/unit²]"""
+    """Figures of merit of an inertial sensor for one aperture, in the order of the mission file. [rad²/unit²]"""
     k = one_way_phase(Integer(1))
 
     def figure(symbol: str, name: str, says: str, of_range: Moments, size: Expr, power: Expr) -> SensorFigure:
@@ -164,7 +167,7 @@ def inertial() -> tuple[SensorFigure, ...]:
 
 # ---------------------------------------------------------------------- Gauss-Markov
 def _with_exponential(polynomial: Poly, rate: Expr) -> Expr:
-    """Factor of exp(rate·x) in the antiderivative of polynomial·exp(rate·x), by repeated integration by parts."""
+    """Antiderivative of polynomial·exp(rate·x) without the factor exp(rate·x), by repeated integration by parts."""
     total, sign = Integer(0), 1
     for order in range(polynomial.degree() + 1):
         total += sign * polynomial.as_expr() / rate ** (order + 1)
@@ -173,7 +176,10 @@ def _with_exponential(polynomial: Poly, rate: Expr) -> Expr:
 
 
 def _gauss_markov_coefficients(m: int, n: int) -> Expr:
-    """Mean product of the coefficients of Pₘ and Pₙ, both even or both odd, of a process of variance 1."""
+    """Mean product of the coefficients of Pₘ and Pₙ for a Gauss-Markov process of variance 1.
+
+    Both orders must be even or both odd.
+    """
     first, second = (Poly(legendre(order, _x), _x) for order in (m, n))
     # ∫ Pₙ(t)·exp(−a(s − t)) dt from −1 to s is q(s) − q(−1)·exp(−a(s + 1)). The factor r is the same for Pₘ and −a,
     # and integrates the second term.
@@ -185,27 +191,28 @@ def _gauss_markov_coefficients(m: int, n: int) -> Expr:
 
 @cache
 def gauss_markov() -> Moments:
-    """Mean squares of a stationary process of variance 1 and correlation exp(−|t|/τ_c), in `ratio` and `decay`."""
+    """Moments of a stationary process of variance 1 and correlation exp(−|t|/τ_c), in `ratio` and `decay`."""
     return moments(tuple(_gauss_markov_coefficients(n, n) for n in range(ORDER_COUNT)), Integer(1))
 
 
 @cache
 def gauss_markov_place() -> PlaceMoments:
-    """`PlaceMoments` of the process of `gauss_markov`, in `ratio` and `decay`."""
+    """`PlaceMoments` of the process of `gauss_markov`, in terms of `ratio` and `decay`."""
     return PlaceMoments(*(LEADING_RATIONALS[n] * _gauss_markov_coefficients(m, n) for m, n in _PLACE_ORDERS))
 
 
 @cache
 def gauss_markov_slow() -> tuple[Expr, ...]:
-    """`gauss_markov` and `gauss_markov_place` for a long correlation time, as series in `ratio`."""
+    """Series in `ratio` of `gauss_markov` and `gauss_markov_place`, for a long correlation time."""
     exact = (*gauss_markov(), *gauss_markov_place())
     return tuple(_series(moment.subs(decay, exp(-2 * ratio)), ratio) for moment in exact)
 
 
 def _series(expression: Expr, variable: Symbol) -> Expr:
-    """Series about zero of an expression whose terms cancel there: powers of the variable times e, sine and cosine.
+    """Series about zero of a sum of powers of a variable times exponentials, sines and cosines.
 
-    Taylor polynomials replace these functions: they are exact up to their order, and SymPy is fast at sums of powers.
+    The terms of the sum cancel at zero. Taylor polynomials replace the functions: they are exact up to their order,
+    and SymPy is fast at sums of powers.
     """
     powers = range(4 * ORDER_COUNT + 2 * SERIES_TERMS)
     taylor = {
@@ -222,7 +229,7 @@ def _series(expression: Expr, variable: Symbol) -> Expr:
 
 # ---------------------------------------------------------------------- spectra
 def spherical_bessel(n: int) -> Expr:
-    """jₙ(x), the part of a tone in order n: half of ∫ Pₙ(t)·cos(xt − nπ/2) dt over −1 … 1."""
+    """Spherical Bessel function jₙ(x), the part of a tone in order n: ½∫ Pₙ(t)·cos(xt − nπ/2) dt over −1 … 1."""
     tone = sin(angle * _x) if n % 2 else cos(angle * _x)
     sign = (1, 1, -1, -1)[n % 4]
     return expand(sign * integrate(expand(legendre(n, _x) * tone), (_x, -1, 1)) / 2)
@@ -230,7 +237,10 @@ def spherical_bessel(n: int) -> Expr:
 
 @cache
 def tone() -> Moments:
-    """Amplitudes of the quadratic and the cubic phase of a tone of amplitude 1, and the share of its power left."""
+    """Quadratic and cubic phase of a tone of amplitude 1, and the share of its power beyond the cubic phase.
+
+    The phases are amplitudes at the aperture edge.
+    """
     amplitudes = [spherical_bessel(n) for n in range(ORDER_COUNT)]
     remaining_share = 1 - sum((2 * n + 1) * amplitude**2 for n, amplitude in enumerate(amplitudes))
     return Moments(
@@ -239,26 +249,27 @@ def tone() -> Moments:
 
 
 def tone_place() -> tuple[Expr, Expr]:
-    """Amplitudes of the constant and the linear part of a tone of amplitude 1."""
+    """Amplitudes of the constant part and of the linear part at the aperture edge, for a tone of amplitude 1."""
     return spherical_bessel(0), 3 * spherical_bessel(1)
 
 
 @cache
 def tone_in_terms() -> tuple[Expr, ...]:
-    """`tone` and `tone_place` in `sine` and `cosine` of `angle`."""
+    """Expressions of `tone` and `tone_place` in terms of `sine` and `cosine` of `angle`."""
     return tuple(expression.subs({sin(angle): sine, cos(angle): cosine}) for expression in (*tone(), *tone_place()))
 
 
 def tone_slow() -> tuple[Expr, ...]:
-    """`tone` and `tone_place` of a slow tone, as series in `angle`."""
+    """Series in `angle` of `tone` and `tone_place`, for a slow tone."""
     return tuple(_series(expression, angle) for expression in (*tone(), *tone_place()))
 
 
 def tone_fast() -> tuple[Expr, ...]:
     """Mean squares and products of the parts of a fast tone, in the fields of `Moments` and `PlaceMoments`.
 
-    Products of sine and cosine are averaged over a cycle. The results are in the even inverse powers `inverse` of the
-    angle. Order n of a tone turns by n quarters of a cycle, so orders n and n + 2 have opposite signs.
+    Products of sine and cosine are averaged over a cycle. The results are in terms of `inverse`, the even inverse
+    powers of `angle`. The part of order n is shifted in phase by n quarters of a cycle, so orders n and n + 2 have
+    opposite signs.
     """
     quadratic, cubic, left, constant, linear = tone_in_terms()
     mean = {sine**2: Rational(1, 2), cosine**2: Rational(1, 2), sine * cosine: Integer(0)}
@@ -268,7 +279,10 @@ def tone_fast() -> tuple[Expr, ...]:
 
 
 def power_law_integral(n: int, slope: int) -> Expr:
-    """∫ jₙ(πfT)²·f^(−slope) df from 0 to infinity, over T^(slope − 1); Weber and Schafheitlin, DLMF 10.22.57."""
+    """Integral ∫ jₙ(πfT)²·f^(−slope) df from 0 to infinity, divided by T^(slope − 1).
+
+    Source: Weber and Schafheitlin, DLMF 10.22.57.
+    """
     mu, power = n + Rational(1, 2), slope + 1
     bessel = (
         gamma(power)
@@ -280,7 +294,7 @@ def power_law_integral(n: int, slope: int) -> Expr:
 
 @cache
 def power_law(order: int) -> tuple[Expr, ...]:
-    """Mean squares of the quadratic (2) or cubic (3) phase of a spectrum f⁰ … f⁻⁴ of density 1. [s^(n−1)]"""
+    """Mean squares of the quadratic (2) or cubic (3) phase for spectra f⁻ⁿ of density 1, n = 0 … 4. [s^(n−1)]"""
     return tuple(
         (LEADING_RATIONALS[order] * (2 * order + 1)) ** 2 * power_law_integral(order, slope) * T ** (slope - 1)
         for slope in range(5)
@@ -288,15 +302,19 @@ def power_law(order: int) -> tuple[Expr, ...]:
 
 
 def passed() -> Expr:
-    """Amplitude of a tone that straight lines between its samples pass, sinc²(f·T_s): the transform of a triangle."""
+    """Amplitude that remains of a tone of amplitude 1 after linear interpolation between its samples: sinc²(f·T_s).
+
+    It is the Fourier transform of a triangle.
+    """
     fraction = positive("nu")
     return simplify(2 * integrate((1 - fraction) * cos(step * fraction), (fraction, 0, 1)))
 
 
 def interpolated() -> Expr:
-    """Share of a tone's power that remains after linear interpolation between samples, in y = 2πf·T_s.
+    """Share of a tone's power that remains after the straight lines between its samples are subtracted.
 
-    The share is (1 − sinc²)² at the frequency of the tone, and sinc⁴ at each frequency to which it is folded.
+    The share is a function of y = 2πf·T_s. It is (1 − sinc²)² at the frequency of the tone, and sinc⁴ at each
+    frequency to which the tone is folded.
     """
     fraction = positive("nu")
     error = exp(I * step * fraction) - (1 - fraction) - fraction * exp(I * step)
@@ -306,7 +324,7 @@ def interpolated() -> Expr:
 
 
 def interpolated_noise() -> Expr:
-    """Mean square of samples of variance 1 with linear interpolation between them."""
+    """Mean square of the straight lines between independent samples of variance 1."""
     fraction = positive("nu")
     return integrate((1 - fraction) ** 2 + fraction**2, (fraction, 0, 1))
 
@@ -317,27 +335,27 @@ _acceleration, _frequency, _time = positive("a"), positive("f"), real("t")
 
 
 def vibrating_oscillator() -> Expr:
-    """Peak phase at the centre frequency of an oscillator that is accelerated by a·cos(2πft): ∫2πf₀·y dt. [rad]"""
+    """Peak phase at the centre frequency of an oscillator under the acceleration a·cos(2πft): ∫2πf₀·y dt. [rad]"""
     y = sensitivity * _acceleration * cos(2 * pi * _frequency * _time)
     phase = integrate(2 * pi * center_frequency * y, _time)
     return simplify(phase / sin(2 * pi * _frequency * _time))
 
 
 def vibrating_path() -> Expr:
-    """Amplitude of the displacement by an acceleration a·cos(2πft), without uniform motion. [m]"""
+    """Amplitude of the displacement by an acceleration a·cos(2πft), without the uniform motion. [m]"""
     wave = cos(2 * pi * _frequency * _time)
     return simplify(-integrate(integrate(_acceleration * wave, _time), _time) / wave)
 
 
 def of_spectrum(amplitude: Expr) -> Expr:
-    """Spectrum for accelerations of spectrum S_a, from the amplitude for a tone of acceleration."""
+    """Spectrum that results from accelerations of spectrum S_a, from the amplitude for a tone of acceleration."""
     return amplitude.subs(_acceleration, 1) ** 2 * positive("S_a")
 
 
 # ---------------------------------------------------------------------- for a reader
 @cache
 def table() -> FormulaTable:
-    """Table of the phases at the aperture edge by each figure of an inertial sensor."""
+    """Table of the phases at the aperture edge for each figure of merit of an inertial sensor."""
     rows = tuple(
         TableRow(
             number=None,
@@ -364,7 +382,7 @@ def table() -> FormulaTable:
 
 
 def equations() -> tuple[Equation, ...]:
-    """Parts of a tone, integrals of power laws, remainders after synchronisation, and effects of vibration."""
+    """Equations for the parts of a tone, integrals of power laws, rests after synchronisation, and vibration."""
     quadratic, cubic, left = tone()
     names = (("quadratic", "phi_2", quadratic), ("cubic", "phi_3", cubic))
     laws = (

@@ -1,4 +1,4 @@
-"""Write the derived equations and tables as text, LaTeX, Markdown or MathML, with the paper's numbers."""
+"""Write the derived equations and tables as text, LaTeX, Markdown or MathML, with the numbers of the paper."""
 
 import re
 import textwrap
@@ -60,7 +60,7 @@ def _operator(name: str) -> str:
 
 @dataclass(frozen=True)
 class _Name:
-    """A symbol's name taken apart: `vtilde_xt` is v with a tilde and the subscript xt."""
+    """Parts of a symbol's name: `vtilde_xt` is v with a tilde and the subscript xt."""
 
     letter: str
     accent: str
@@ -198,7 +198,7 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
         return row
 
     def without_fences(self, node: Any) -> Any:
-        """Write brackets as operators. SymPy 1.13 has `mfenced`, which browsers no longer draw, and 1.14 has not."""
+        """Write brackets as operators, because browsers no longer draw the `mfenced` of SymPy 1.13; 1.14 has none."""
         for child in list(node.childNodes):
             node.replaceChild(self.without_fences(child), child)
         if node.nodeName != "mfenced":
@@ -234,22 +234,22 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
 
 
 def as_text(expression: Basic) -> str:
-    """One line of plain text: `π*T^2*|v_xt*ṽ_xt|/(2*R_t*λ)`."""
+    """Write an expression as one line of plain text: `π*T^2*|v_xt*ṽ_xt|/(2*R_t*λ)`."""
     return str(_Text().doprint(expression)).replace("**", "^")
 
 
 def as_latex(expression: Basic, times: str = " ") -> str:
-    """LaTeX without delimiters; `times` is between factors."""
+    """Write an expression in LaTeX without delimiters; `times` is put between factors."""
     return str(_Latex({"mul_symbol": times, "imaginary_unit": "j"}).doprint(expression))
 
 
 def as_mathml(expression: Basic) -> str:
-    """Presentation MathML, one `math` element."""
+    """Write an expression in presentation MathML, as one `math` element."""
     return f'<math xmlns="http://www.w3.org/1998/Math/MathML">{as_mathml_content(expression)}</math>'
 
 
 def as_mathml_content(expression: Basic) -> str:
-    """Presentation MathML without the `math` element around it."""
+    """Write an expression in presentation MathML, without the `math` element around it."""
     printer = _MathML()
     xml = str(printer.without_fences(printer._print(expression)).toxml())
     for name, character in (
@@ -263,7 +263,10 @@ def as_mathml_content(expression: Basic) -> str:
 
 
 def derivation(selection: str, format_name: str) -> str:
-    """Text of `bisar-budget derive`: `all`, `equations`, `I`, `II`, `vibration`, `full` or `random`."""
+    """Text that `bisar-budget derive` prints for a selection.
+
+    The selections are `all`, `equations`, `I`, `II`, `vibration`, `full` and `random`.
+    """
     tables: dict[str, Callable[[], FormulaTable]] = {
         "I": published.table_1,
         "II": published.table_2,
@@ -298,7 +301,7 @@ _TITLE = "Equations of Rigling & Moses"
 
 
 def _heading(equation: Equation) -> str:
-    """Number and title; of the paper's own, whether it defines the equation or SymPy derives it."""
+    """Number and title of an equation; for the paper's own, also whether it is a definition or derived by SymPy."""
     return f"{equation.number} {equation.title} [{equation.origin}]" if equation.number else equation.title
 
 

@@ -1,7 +1,7 @@
-"""The symbols of Rigling & Moses, named so that every printer can draw them.
+"""The symbols of Rigling & Moses, with names that all printers can typeset.
 
-A name is `<letter>[tilde|bar|hat]_<subscript>`: `vtilde_xt` is the transmitter's velocity error along x.
-Frame: scene centre at the origin, ground plane z = 0, x east, y north, z up. SI units and radians.
+A name is `<letter>[tilde|bar|hat]_<subscript>`: `vtilde_xt` is the transmitter's velocity error along x. Frame: scene
+centre at the origin, ground plane z = 0, x east, y north, z up. SI units and radians.
 """
 
 from dataclasses import dataclass
@@ -39,10 +39,10 @@ n_pull = positive("N_pull")  # autofocus corrects π·N_pull radians
 
 @dataclass(frozen=True)
 class PlatformSymbols:
-    """One platform at the aperture midpoint, with the error of its measured motion.
+    """Symbols of one platform at the aperture midpoint, and of the error of its measured motion.
 
-    Vectors are (3,) east-north-up. [m], [m/s], [m/s²]. `look` holds the unit vector to the platform and its
-    first four derivatives, [1/sⁿ]; the paper's model has neither them nor the acceleration.
+    Vectors are (3,), east-north-up. [m], [m/s], [m/s²] `look` are the unit vector to the platform and its first four
+    derivatives. [1/sⁿ] The model of the paper uses neither these nor the acceleration.
     """
 
     name: str
@@ -59,13 +59,13 @@ class PlatformSymbols:
     elevation: Symbol
 
     def exact_slant_range(self) -> Expr:
-        """Return |r| in terms of the position's components. [m]"""
+        """Return |r| in terms of the components of the position. [m]"""
         # Matrix.norm() wraps real components in Abs, which only hides the square.
         return sqrt(sum(component**2 for component in self.position))
 
 
 def platform(name: str, subscript: str) -> PlatformSymbols:
-    """Return the symbols of one platform, subscripted as in the paper."""
+    """Return the symbols of one platform, with the subscripts of the paper."""
 
     def vector(letter: str) -> Matrix:
         return ImmutableMatrix([real(f"{letter}_{axis}{subscript}") for axis in AXES])

@@ -1,4 +1,4 @@
-"""Images with errors exactly at their limits, and verdicts on the limits. Needs NumPy."""
+"""Forms images with errors exactly at their limits, and gives verdicts on the limits. Needs NumPy."""
 
 # What other rooms may use.
 __all__ = [

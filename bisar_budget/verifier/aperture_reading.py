@@ -1,11 +1,12 @@
-"""Phase of an error over the aperture, measured in the image of a chip.
+"""Phase of an error over the aperture, measured from a small image of a point (a chip).
 
-The contribution of each pulse to each pixel follows from exact ranges by the measured paths. A polynomial of the
-phase over the aperture is fitted to the pixels, so that the ends of the patch, where a finite image cuts off
-sidelobes, are modelled too. The fit starts at the position of the response by exact ranges. The remainder of the fit
-shows whether the polynomial describes the image. If not, the image is correlated with the contribution of each pulse,
-which gives the phase of the pulse: the projection of the spectrum to slow time, including range walk and bent lines.
-The error-free response is formed and read with the same paths, so that effects common to both responses cancel.
+The contribution of each pulse to each pixel follows from exact ranges along the measured paths. The phase over the
+aperture is modelled as a polynomial, which is fitted to the pixels. In this way the ends of the patch, where a finite
+image cuts off sidelobes, are modelled too. The fit starts at the position of the response by exact ranges. The
+remainder of the fit shows whether the polynomial describes the image. If it does not, the image is correlated with
+the contribution of each pulse, which gives the phase of the pulse. This is the projection of the spectrum to slow
+time, including range walk and curved lines. The error-free response is formed and read with the same paths, so that
+effects common to both responses cancel.
 """
 
 import math
@@ -52,12 +53,12 @@ _KERNEL_CELLS = np.linspace(0, 64, 4097)  # range cells of a tapered range respo
 
 
 class ApertureReading(NamedTuple):
-    """Phases at the aperture edge, signed like the range error [rad].
+    """Phases of a response at the edge of the aperture, with the sign of the range error. [rad]
 
-    `across_pixels` is the offset of the response from the middle along y′, by the linear part of the phase.
-    `walked_pixels` is the offset of the centre of gravity along x′ by the other parts of the phase: at a frequency of
-    y′ the response lies at the range error minus its slope times slow time. `coverage` is the share of the aperture
-    that the patch holds, 1 unless a smear leaves the patch.
+    `across_pixels` is the offset of the response from the middle along y′, which follows from the linear part of the
+    phase. `walked_pixels` is the offset of the centre of gravity along x′, which follows from the other parts of the
+    phase: at a frequency of y′, the response lies at the range error minus its slope times slow time. `coverage` is
+    the fraction of the aperture that the patch contains. It is 1 unless the smeared response leaves the patch.
     """
 
     quadratic: float
@@ -76,18 +77,18 @@ def read_aperture(
     half_lines: int = 0,
     expected: ExactEffect | None = None,
 ) -> ApertureReading:
-    """Read quadratic and cubic phase of a response.
+    """Measure the quadratic and cubic phase of a response.
 
     Parameters
     ----------
     collection, errors
-        Collection and errors that formed the chips; the errors are in the measured paths.
+        Collection and errors from which the chips were formed. The measured paths contain the errors.
     centre : (2,) float
-        Middle of the chips and place of the reference. [m]
+        Middle of the chips, which is the position of the reference. [m]
     chip, reference : Chip
-        With and without error, on the same pixels.
+        Images with and without error, on the same pixels.
     half_lines : int
-        Additional lines to read, on either side of the middle.
+        Number of additional lines to read on either side of the middle.
     expected : ExactEffect, optional
         Start of the fit. If no polynomial near it fits the pixels, the phases of single pulses are tried too.
 
@@ -135,7 +136,7 @@ def read_aperture(
 
 
 class _Pixels:
-    """Pixels (n, 3) of an image, and the contributions of each pulse to them for a point at a position."""
+    """Pixels (n, 3) of an image, and the contribution of each pulse to them for a point at a given position."""
 
     def __init__(self, collection: PointCollection, errors: Errors, centre: GroundVector, pixels: Floats) -> None:
         self.collection, self.errors, self.places = collection, errors.smooth(), pixels
@@ -148,9 +149,9 @@ class _Pixels:
             self.kernel = np.cos(2 * math.pi * np.outer(_KERNEL_CELLS, frequency)) @ weights / 257
 
     def contributions(self, slow_time: Floats, remaining_range: Floats | None = None) -> NDArray[np.complex64]:
-        """Contributions of pulses (m,) to pixels (n,), (m, n), at baseband.
+        """Contributions of pulses (m,) to pixels (n,) at baseband, (m, n).
 
-        `remaining_range` (m,) is a range error that displaces the range responses without changing the phase. [m]
+        `remaining_range` (m,) is a range error that moves the range responses without changing the phase. [m]
         """
         collection = self.collection
         paths = collection.flight(self.errors, slow_time).paths
@@ -188,9 +189,9 @@ def _squares(points: Floats) -> Floats:
 
 
 def _distance(positions: Floats, points: Floats, squares: Floats) -> Floats:
-    """Distances (m, n) from positions (m, 3) to points (n, 3), exact to 1e-8 m from geostationary orbit. [m]
+    """Distances (m, n) from positions (m, 3) to points (n, 3), accurate to 1e-8 m even from geostationary orbit. [m]
 
-    `squares` (n,) are the squares of the points.
+    `squares` (n,) are the squared norms of the points.
     """
     square: Floats = positions @ (-2 * points.T)
     square += _squares(positions)[:, None]
@@ -201,11 +202,11 @@ def _distance(positions: Floats, points: Floats, squares: Floats) -> Floats:
 def _fit_to_pulses(
     pulse_pixels: _Pixels, slow_time: Floats, images: Sequence[Complexes], columns: int
 ) -> tuple[Floats, float]:
-    """Fit a polynomial to the phases of single pulses, and measure the share of the aperture that these pulses cover.
+    """Fit a polynomial to the phases of single pulses, and measure the part of the aperture that these pulses cover.
 
-    The polynomial has Legendre coefficients over the aperture. [rad] The share is 0 if the pulses in the middle of
-    the aperture are missing, or too few pulses remain. `images` are the image with errors and the error-free image,
-    at the same pixels, in lines of `columns` pixels.
+    Returns the Legendre coefficients of the polynomial over the aperture [rad] and the fraction. The fraction is 0 if
+    the pulses in the middle of the aperture are missing, or if too few pulses remain. `images` are the image with
+    errors and the error-free image, at the same pixels, in lines of `columns` pixels.
     """
     scaled_time = 2 * slow_time / pulse_pixels.collection.aperture_time
     # A taper over the ends of a line, each half as long as a response without smear.
@@ -244,14 +245,17 @@ def _fit_to_pulses(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Refined:
-    """Polynomial of the phase, and norm of the remainder over the norm of the image."""
+    """A fitted polynomial of the phase.
+
+    `misfit` is the norm of the fit's remainder divided by the norm of the image.
+    """
 
     fit: Floats
     misfit: float
 
 
 class _Fitting:
-    """Fits of the phase's polynomial to a selection of the pixels of an image, which is enough in a large image."""
+    """Fits polynomials of the phase to the pixels of an image, in a large image to a selection of the pixels."""
 
     def __init__(
         self,
@@ -271,7 +275,7 @@ class _Fitting:
         self.gain = complex(np.vdot(at_rest, clean) / np.vdot(at_rest, at_rest))
 
     def refined(self, fit: Floats) -> _Refined:
-        """Refine a polynomial in rounds, each with the range walk of the fit before."""
+        """Refine a polynomial in several rounds. Each round uses the range walk of the previous fit."""
         collection = self.fitted_pixels.collection
         scaled_time = 2 * self.slow_time / collection.aperture_time
         solution = _Refined(np.pad(fit, (0, _POLYNOMIAL_ORDERS[0][1] + 1 - fit.size)), math.inf)
@@ -285,7 +289,7 @@ class _Fitting:
 
 
 def _refined(fit: Floats, scaled_time: Floats, contribution: Complexes, image: Complexes, gain: complex) -> _Refined:
-    """Fit the phase's polynomial to the pixels by Gauss-Newton steps; a step that does not improve is shortened."""
+    """Fit the phase polynomial to the pixels by Gauss-Newton steps. A step that gives no improvement is shortened."""
     legendre = np.polynomial.legendre.legvander(scaled_time, fit.size - 1)
     norm = float(np.linalg.norm(image))
 
@@ -321,7 +325,7 @@ def _refined(fit: Floats, scaled_time: Floats, contribution: Complexes, image: C
 # ---------------------------------------------------------------------- displacement
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """Displacement on the ground (east, north) [m], and azimuth of the line of smear, 0 to π [rad].
+    """Displacement of a response on the ground (east, north) [m], and azimuth of the line of its smear, 0 to π [rad].
 
     `pixels` is the displacement along x′ and y′ of the image.
     """
@@ -332,16 +336,16 @@ class Shift:
 
 
 def measured_shift(chip: Chip, reference: Chip, reading: ApertureReading | None = None) -> Shift:
-    """Displacement of a response against an error-free one on the same grid, and the line of its smear.
+    """Measure the displacement of a response from an error-free response on the same grid, and the line of its smear.
 
-    The displacement is the position of the peak. For a response smeared so much that it has no single peak, it
-    follows from a `reading` of its aperture: along y′ from the slope of the phase, along x′ from the centre of
-    gravity minus its offset by the other parts of the phase.
+    The displacement is the position of the peak. If the response is smeared so much that it has no single peak, the
+    displacement follows from a `reading` of its aperture. Along y′ it follows from the slope of the phase. Along x′
+    it is the centre of gravity minus its offset by the other parts of the phase.
 
     Each part of the aperture displaces the point differently, as in (26) to (28) of Rigling & Moses for three parts.
-    In the spectrum of the image the displacement is the gradient of the phase against an error-free response, and the
-    spread of the displacements is the smear. This also measures a smear far smaller than a resolution cell, which
-    does not yet show in the outline of the response.
+    In the spectrum of the image, the displacement is the gradient of the phase relative to an error-free response,
+    and the spread of the displacements is the smear. This also measures a smear far smaller than a resolution cell,
+    which is not yet visible in the shape of the response.
 
     Raises
     ------
@@ -380,7 +384,7 @@ def _step(product: Complexes, axis: int) -> Floats:
 
 
 def _pixel_vectors(grid: Floats) -> Floats:
-    """One pixel along each axis at the middle of the grid, as columns (east, north), (2, 2). [m]"""
+    """Vectors of one pixel along each axis at the middle of the grid, as columns (east, north), (2, 2). [m]"""
     i, j = grid.shape[0] // 2, grid.shape[1] // 2
     columns = (grid[i + 1, j] - grid[i - 1, j], grid[i, j + 1] - grid[i, j - 1])
     vectors: Floats = np.stack([column[:2] / 2 for column in columns], axis=1)
@@ -396,13 +400,14 @@ def refocused(
     algorithm: Callable[[Complexes], Focused],
     half_lines: int,
 ) -> Chip:
-    """Estimate one phase over the aperture on the middle lines of a chip and take it out of all lines.
+    """Estimate one phase over the aperture from the middle lines of a chip, and remove it from all lines.
 
-    Along a line of equal range, a pulse has a frequency by the measured paths. Over a long aperture, or where range
-    and Doppler gradients are nearly parallel, equal times take up unequal parts of the band: a quadratic phase in
-    time is not quadratic in frequency, and an estimate loses the part of the aperture that lies in a few per cent of
-    the band. The lines' spectra are therefore read at equal times and focused there, and the phase is transferred
-    back to their frequencies. The estimate uses `half_lines` lines on either side of the middle.
+    Along a line of equal range, each pulse has its own frequency by the measured paths. Over a long aperture, or
+    where the range and Doppler gradients are nearly parallel, equal times take up unequal parts of the band. A
+    quadratic phase in time is then not quadratic in frequency, and an estimate loses the part of the aperture that
+    falls into a few per cent of the band. Therefore the spectra of the lines are read at equal times and focused
+    there, and the phase is transferred back to their frequencies. The estimate uses `half_lines` lines on either side
+    of the middle.
     """
     lines, columns = chip.image.shape
     slow_time = cell_centres(collection.aperture_time, max(64, round(columns / OVERSAMPLING_FACTOR)))
@@ -434,7 +439,7 @@ def refocused(
 def _frequency(
     collection: PointCollection, errors: Errors, centre: GroundVector, chip: Chip, slow_time: Floats
 ) -> Floats:
-    """Frequency of each pulse at the middle of the middle line, minus the carrier, (times,). [cycles/pixel]"""
+    """Frequency of each pulse at the middle of the middle line, relative to the carrier, (times,). [cycles/pixel]"""
     line = chip.grid[chip.grid.shape[0] // 2]
     middle = line.shape[0] // 2
     slope = np.zeros(slow_time.size)

@@ -1,4 +1,4 @@
-"""Form images with each error exactly at its limit, and measure whether the limit is true."""
+"""Form images with each error exactly at its limit, and measure whether the limit is correct."""
 
 import math
 import time
@@ -63,11 +63,13 @@ def verify_mission(
     progress: Progress = unseen,
     mapped: MapBlocks | None = None,
 ) -> VerifiedMission:
-    """Verify every limit of a mission whose row id matches a glob. The verdicts do not depend on the processes.
+    """Verify every limit of a mission whose row id matches a glob.
+
+    The verdicts do not depend on the number of processes.
 
     The verdicts are in the order of `check`, including the vibration of both platforms together. After each row
-    `progress` is called with the number of finished rows and of all rows. `mapped` maps the rows to workers elsewhere
-    instead of to processes on this machine.
+    `progress` is called with the number of finished rows and the number of all rows. `mapped` computes the rows on
+    remote workers instead of in processes on this machine.
     """
     mission = mission._replace(places={})  # the parser's marks cannot be sent to a process, and are not needed here
     all_cases = cases(Study(mission), only)
@@ -97,12 +99,15 @@ def rows_to_verify(mission: Mission, only: str = "*") -> list[str]:
 
 
 def cases(study: Study, only: str = "*") -> dict[str, Case]:
-    """Row ids that match a glob, in the order of `check`, with the call that verifies each."""
+    """Functions that verify the rows whose ids match a glob, by row id, in the order of `check`."""
     return {row_id: case for row_id, case in _cases(study) if fnmatchcase(row_id, only)}
 
 
 def _warns_of_the_total(study: Study) -> bool:
-    """Whether the row of the total exists: each error is judged alone, and all together exceed the total."""
+    """Whether the row of the mission's quadratic phase exists.
+
+    It exists if each error is judged alone and all errors together exceed the total.
+    """
     aggregates = Aggregates(Judging(1, study.mission.allocation.warn_above), study.analysis)
     rows = (row for model in study.models for row in aggregates.rows(model.name))
     with np.errstate(all="ignore"):
@@ -114,7 +119,7 @@ def _verify_row(mission: Mission, row_id: str) -> Verdict:
 
 
 def _conditions(mission: Mission) -> Iterator[str]:
-    """Describe the images of the verdicts, and the keys of the file that they ignore."""
+    """Yield texts that describe how the images are formed, and which keys of the file they ignore."""
     settings = mission.simulation or Simulation()
     yield f"one point, exact ranges, {settings.window} window"
     yield "no noise" if settings.noise is None else "no noise (simulation.noise is for `simulate`)"
@@ -123,12 +128,12 @@ def _conditions(mission: Mission) -> Iterator[str]:
 
 
 def _order(vibration: Subject) -> tuple[int, int]:
-    """Sort key of a platform's vibrations, in the order of `check`: lines, lines together, noise."""
+    """Sort key for the vibrations of a platform in the order of `check`: lines, groups of lines, noise."""
     return (("sinusoidal", "sinusoidal.sum", "wideband").index(vibration.axis), vibration.entry or 0)
 
 
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
-    """Cases of sensors and clocks that have a limit, of tones, and of the power that all noise spreads."""
+    """Yield the cases of sensors and clocks with a limit, of tones, and of the total power that noise spreads."""
     for error in study.analysis.random:
         sizes = limits_of(study, error)
         if sizes and error.subject.kind == "other":
@@ -195,11 +200,11 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
 
 # ---------------------------------------------------------------------- how long it will take
 class _NotFormedError(ValueError):
-    """Raised in place of an image, once its size is known."""
+    """Raised instead of forming an image, once the size of the image is known."""
 
 
 class _Sizes(PointCollection):
-    """A collection that notes the size of every requested image and forms no image."""
+    """A collection that records the size of every requested image without forming the image."""
 
     def __init__(self, mission: Mission, study: Study) -> None:
         super().__init__(mission, study.geometry)
@@ -212,27 +217,30 @@ class _Sizes(PointCollection):
         cells: int = CUT_CELLS,
         range_cells: int = RANGE_CELLS,
     ) -> tuple[Chip, Chip]:
-        """Note the size of two images."""
+        """Record the size of two images; raises `_NotFormedError` instead of forming them."""
         self._require_room(cells, range_cells)
         self.asked.append(_size(cells, range_cells))
         raise _NotFormedError("its size is known")
 
     def window(self, count: int) -> Floats:
-        """Refuse weights, so that no noise is drawn: that takes seconds for images of any size."""
+        """Raise `_NotFormedError` instead of returning weights, so that no noise is drawn.
+
+        Drawing noise takes seconds, for images of any size.
+        """
         raise _NotFormedError(f"{count} weights are not needed")
 
     def chip(self, centre: tuple[float, float], errors: Errors, *, cells: int = CUT_CELLS, **_: object) -> Chip:
-        """Note the size of one of two images of a single line."""
+        """Record the size of one of two images of a single line; raises `_NotFormedError` instead of forming it."""
         self._require_room(cells, 0)
         self.asked.append(_size(cells, 1))
         raise _NotFormedError("its size is known")
 
 
 def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float:
-    """Approximate time that `verify_mission` will take; 0 if it is far below a minute. [s]
+    """Estimate the time that `verify_mission` will take; 0 if it is far below a minute. [s]
 
-    The time of a pixel and pulse depends on the machine, on its load, and on whether kernels are compiled. So it is
-    measured on a small and a larger image of the mission, unless the sizes of the images are clearly small.
+    The time per pixel and pulse depends on the machine, on its load, and on whether kernels are compiled. It is
+    therefore measured on a small and a larger image of the mission, unless all images are clearly small.
     """
     mission = mission._replace(places={})
     study = Study(mission)
@@ -261,12 +269,12 @@ def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float
 
 
 def _size(cells: int, range_cells: int) -> float:
-    """Pixels times pulses of an image, over the pixels times pulses of the smallest image."""
+    """Size of an image relative to the smallest image, as a ratio of pixels times pulses."""
     return cells * range_cells * pulses_for(cells) / (CUT_CELLS * RANGE_CELLS * pulses_for(CUT_CELLS))
 
 
 def _seconds(study: Study, cells: int) -> float:
-    """Time to form and read two images without error. [s]"""
+    """Measure the time to form and read two images without error. [s]"""
     errors, start_time = Errors(), time.perf_counter()
     effect = study.collection.effect(errors)
     chips = study.collection.pair(errors, effect.displacement, cells)
@@ -276,9 +284,9 @@ def _seconds(study: Study, cells: int) -> float:
 
 # ---------------------------------------------------------------------- images that a report shows
 def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[ImageEvidence, ...]:
-    """Form the images of the most decisive rows of a verified mission; empty if no row has an image.
+    """Form the images of the rows of a verified mission that decide most; empty if no row has an image.
 
-    The worst row comes first. The findings have the verdicts on the images.
+    The worst row comes first. `findings` must contain the verdicts of the images.
     """
     verdicts = rows_worth_showing(findings)
     if not verdicts:
@@ -306,7 +314,7 @@ def _shown(images: Responses) -> PointImage:
 
 
 def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
-    """Reduce a chip to the pixels that a report shows: the smeared response and its sidelobes."""
+    """Crop a chip to the pixels that a report shows: the smeared response and its sidelobes."""
     spacing, middle = chip.spacing, chip.image.shape[1] // 2
     reach = _MARGIN_AROUND_SMEAR_CELLS + smear_cells / 2
     half = min(math.ceil(reach * OVERSAMPLING_FACTOR), middle - 1)

@@ -1,4 +1,4 @@
-"""Verdicts on the limits of quadratic and cubic phase, with and without autofocus, and of the location."""
+"""Verdicts on the limits of quadratic phase, with and without autofocus, of cubic phase, and of the location."""
 
 import math
 
@@ -28,7 +28,10 @@ _MAX_SMEAR_CELLS = 64  # with a longer smear, no images are formed on both sides
 
 
 def quadratic(study: Study, source: ErrorSource) -> Verdict:
-    """Verdict on the limit of one error."""
+    """Verdict on the limit of one error on its quadratic phase.
+
+    If no quadratic phase limits the error, the verdict is on its limit by the cubic phase or the location.
+    """
     budget, gain = study.allocation.qpe_limit(source.owner), study.allocation.autofocus_gain
     boundary = study.boundary(source, budget)
     if boundary is None:
@@ -42,9 +45,10 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
 
 
 def slow_vibration(study: Study, vibration: Subject) -> Verdict:
-    """Verdict on a vibration below one cycle per aperture: each of its axes alone, in its worst phase.
+    """Verdict on a vibration below one cycle per aperture. Each of its axes vibrates alone, in its worst phase.
 
-    The axes of a vector are scaled until the sum of their phases by exact ranges reaches the limit.
+    For a vibration along several axes, the amplitudes are scaled until the sum of their phases by exact ranges
+    reaches the limit.
     """
     name, entry, budget = vibration.owner, vibration.entry or 0, study.allocation.qpe_limit(vibration.owner)
     mission, tone = study.mission, study.analysis.slow_tones[vibration.id]
@@ -78,7 +82,7 @@ def slow_vibration(study: Study, vibration: Subject) -> Verdict:
 
 
 def _worst_phase(study: Study, name: str, line: PathSinusoid) -> Errors:
-    """The vibration with the phase that loses most of the peak by exact ranges."""
+    """The vibration with the starting phase that lowers the peak most, by exact ranges."""
     lines = (line._replace(phase=2 * math.pi * step / TONE_PHASE_COUNT) for step in range(TONE_PHASE_COUNT))
     candidates = [Errors().of(name, PathError(sinusoids=(shifted,))) for shifted in lines]
     return max(candidates, key=lambda errors: study.collection.effect(errors).equal_loss)
@@ -117,7 +121,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
 
 
 def total(study: Study, row_id: str, owner: str) -> Verdict:
-    """Verdict on all declared errors of an owner together, with the signs that make their phases add."""
+    """Verdict on all declared errors of an owner together, with signs for which their phases add up."""
     budget = study.allocation.qpe_limit(owner)
     blank = study.blank(row_id, budget, "rad", budget_rad=budget)
     if study.mission.allocation.combine != "sum":
@@ -129,32 +133,38 @@ def total(study: Study, row_id: str, owner: str) -> Verdict:
 
 
 def other(study: Study, source: ErrorSource) -> Verdict:
-    """Verdict on an error stated as a phase, which has no image."""
+    """Verdict without an image, on an error that is stated as a phase."""
     budget = study.allocation.qpe_limit(source.owner)
     return study.blank(source.id, budget, source.unit, budget_rad=budget, reason=phrases.note("phase-without-motion"))
 
 
 def stated(study: Study, row_id: str, limit: float, unit: str) -> Verdict:
-    """Verdict on an effect from elsewhere other than a quadratic phase, which has no image."""
+    """Verdict without an image, on an effect from elsewhere that is not a quadratic phase."""
     return study.blank(row_id, limit, unit, reason=phrases.note("stated-by-its-effect"))
 
 
 def dispersion(study: Study) -> Verdict:
-    """Verdict on the phase of free electrons over the band, which images over slow time do not show."""
+    """Verdict on the phase of free electrons over the band, which images over slow time cannot show."""
     budget = study.allocation.qpe_total
     blank = study.blank("propagation.dispersion", budget, "rad", budget_rad=budget)
     return blank._replace(reason=phrases.note("images-are-read-over-slow-time"))
 
 
 def edge(study: Study) -> Verdict:
-    """Verdict on the difference between two points of the scene, which only the tests compare with images."""
+    """Verdict on the difference between two points of the scene, without an image.
+
+    Only the tests compare this difference with images.
+    """
     budget = study.allocation.qpe_total
     blank = study.blank("mission.spatial_variance", budget, "rad", budget_rad=budget)
     return blank._replace(reason=phrases.note("images-are-of-the-centre"))
 
 
 def cubic(study: Study, requirement: float) -> Verdict:
-    """Verdict on all declared errors, scaled until the gating model's cubic phase reaches the requirement."""
+    """Verdict on all declared errors together.
+
+    The errors are scaled until the cubic phase of the gating model reaches the requirement.
+    """
     blank = study.blank("mission.cubic_phase_error", requirement, "rad", budget_rad=requirement)
     sizes = [(s, s.declared or 0.0) for s in study.declared]
     if not sizes:
@@ -176,7 +186,10 @@ def cubic(study: Study, requirement: float) -> Verdict:
 
 
 def pull_in(study: Study, n_pull: float) -> Verdict:
-    """Verdict on autofocus of a clock error of π·N_pull, which leaves the geometry; range walk caps N_pull."""
+    """Verdict on autofocus at the pull-in limit, from the image of a clock error with a phase of π·N_pull.
+
+    A clock error does not change the geometry. Range walk limits N_pull.
+    """
     phase, budget, radar = math.pi * n_pull, study.allocation.qpe_total, study.mission.radar
     walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # λN/2 over c/B
     blank = study.blank("mission.autofocus_pull_in", phase, "rad", budget_rad=budget)
@@ -187,10 +200,10 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
 
 
 def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool = True) -> VerdictFields:
-    """Refocus the image at the limit with autofocus, and compare the remaining phase with the plain budget.
+    """Refocus the image at the limit, and compare the phase that autofocus leaves with the budget without its gain.
 
-    The phase hidden by the band and by turns is included if `holds_hidden`. It is not when only the pull-in range is
-    verified: separate rows judge it.
+    If `holds_hidden`, the phase hidden by the band and by turns is included. It is left out if only the pull-in range
+    is verified, because separate rows judge it.
     """
     try:
         errors = study.together(sizes, study.worse_sign(sizes))
@@ -223,7 +236,10 @@ def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool =
 
 
 def _read_focused(study: Study, focused: Responses) -> ApertureReading:
-    """Remaining phase after autofocus: read from the middle of a large patch if it is small, else from all of it."""
+    """Measure the phase that remains after autofocus.
+
+    If it is small, it is read from the middle of a large patch, otherwise from all of the patch.
+    """
     small, large = (
         focused._replace(chip=focused.chip.within(cells), reference=focused.reference.within(cells))
         for cells in (FOCUSED_CELLS, MAX_CELLS)
@@ -238,7 +254,7 @@ def _read_focused(study: Study, focused: Responses) -> ApertureReading:
 
 
 def predicted(effect: ExactEffect) -> VerdictFields:
-    """Fields of a verdict that exact ranges fill."""
+    """The fields of a verdict that follow from exact ranges."""
     return {
         "predicted_qpe_rad": abs(effect.quadratic),
         "equal_loss_qpe_rad": effect.equal_loss,
@@ -248,21 +264,27 @@ def predicted(effect: ExactEffect) -> VerdictFields:
 
 
 def _without_image(study: Study, blank: Verdict, error: ValueError) -> Verdict:
-    """Verdict without an image. A limit of the published model with no ground point is optimistic."""
+    """Verdict if no image can be formed.
+
+    A limit of the published model for which no ground point exists is optimistic.
+    """
     if isinstance(error, NoGroundPointError) and not study.is_full:
         return blank._replace(verdict="optimistic", reason=phrases.note("no-image-at-the-limit"))
     return blank._replace(reason=phrases.note("no-image-formed", why=str(error)))
 
 
 def compare(excess: float, tolerance: float) -> str:
-    """Verdict on a limit whose phase exceeds the budget by a fraction."""
+    """Verdict on a limit, from the relative amount by which the measured phase exceeds the budget.
+
+    The verdict is `confirmed` if the amount is within the tolerance.
+    """
     if abs(excess) <= tolerance:
         return "confirmed"
     return "optimistic" if excess > 0 else "conservative"
 
 
 def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
-    """Displacement of errors together by (25); None if (25) has no solution."""
+    """Displacement that several errors together cause by (25); None if (25) has no solution."""
     published = study.analysis.published  # (25)
     moves = [published.displacement(source.effect, scale * size) for source, size in sizes]
     if any(move is None for move in moves):
@@ -271,7 +293,7 @@ def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVe
 
 
 def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
-    """Form the images of errors at the limit and on both sides, and compare the equal-loss phase with the budget."""
+    """Form images with errors at the limit and on both sides, and compare the equal-loss phase with the budget."""
     budget = blank.budget_rad or 0.0
     by_table = abs(math.fsum(s.effect.qpe * size for s, size in sizes))
     blank = blank._replace(published_qpe_rad=by_table)
@@ -308,10 +330,11 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
 def _through_the_limit(
     inside: float | None, measured: float, beyond: float | None, budget: float
 ) -> tuple[str, Note | None]:
-    """Verdict on a phase at a limit, with the phases inside and beyond it if images are formed, and a note.
+    """Verdict on the phase at a limit, and a note if the phase does not grow with the error.
 
-    A limit promises that no smaller error has more phase. If the phase falls towards the limit, the larger phase
-    counts, and the limit is not confirmed. Beyond the limit a phase may fall, which the note reports.
+    `inside` and `beyond` are the phases at sizes below and above the limit; None if no image is formed there. A limit
+    promises that no smaller error has more phase. If the phase at the smaller size is larger, the larger phase
+    counts, and the limit is not confirmed. Above the limit the phase may fall, which the note reports.
     """
     verdict = compare(measured / budget - 1, TOLERANCE_FRACTION)
     falls_inside = inside is not None and inside >= measured
@@ -328,7 +351,7 @@ def _through_the_limit(
 
 
 def _of_response(study: Study, images: Responses, reading: ApertureReading) -> VerdictFields:
-    """Measures of the response, without those that a long smear or a bent patch makes undefined."""
+    """Measured quantities of a response, without those that a long smear or a bent patch makes undefined."""
     chip, reference, measures = images.chip, images.reference, VerdictFields()
     try:
         shift = study.shift(images, reading)
@@ -351,7 +374,7 @@ def _of_response(study: Study, images: Responses, reading: ApertureReading) -> V
 
 
 def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
-    """Quadratic phase of equal loss that the image of errors shows; None without an image. [rad]"""
+    """Quadratic phase of equal loss measured in the image of several errors; None without an image. [rad]"""
     try:
         images = study.images(study.together(sizes, scale), READ_CELLS)
         return study.equal_loss(images, study.read(images))
@@ -360,12 +383,12 @@ def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
 
 
 def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float) -> float:
-    """Scale at which exact ranges give the cubic phase, from a first guess.
+    """Find the scale of the errors at which exact ranges give the required cubic phase; `scale` is a first guess.
 
     Raises
     ------
     ValueError
-        No scale found: the phase passes the requirement where the point has no image, or never reaches it.
+        No scale found: the phase exceeds the requirement where the point has no image, or never reaches it.
     """
     low, high = 0.0, math.inf  # scales with less phase, and with more or without a point
     for _ in range(60):
@@ -383,10 +406,11 @@ def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float
 
 # ---------------------------------------------------------------------- location
 def location(study: Study, requirement: float) -> Verdict:
-    """Verdict on all declared errors, scaled until the gating model moves the image by the requirement.
+    """Verdict on all declared errors together, scaled until the gating model moves the image by the requirement.
 
-    Confirmed if the image agrees with the gating model to 5 % of the requirement. For (25), each error alone must
-    also agree with exact ranges. A displacement that is only shorter is conservative; a different direction is not.
+    The limit is confirmed if the image agrees with the gating model to 5 % of the requirement. For (25), each single
+    error must also agree with exact ranges. A displacement that is only shorter than expected is conservative; a
+    displacement in a different direction is not.
     """
     blank = study.blank("mission.location_error", requirement, "m")
     sizes = [(s, s.declared or 0.0) for s in study.declared]
@@ -442,7 +466,7 @@ def location(study: Study, requirement: float) -> Verdict:
 
 
 def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float | None:
-    """Scale at which the gating model moves the image by the requirement; None if errors do not move it."""
+    """Scale of the errors for which the gating model moves the image by the requirement; None if it never moves."""
     if not study.is_full:
         displacement = published_displacement(study, sizes, 1.0)
         length = math.hypot(*displacement) if displacement else 0.0
@@ -462,7 +486,7 @@ def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float 
 
 
 def _along_and_across(study: Study, a: GroundVector, b: GroundVector) -> GroundVector:
-    """Distance of two displacements along x′ and y′. [m]"""
+    """Distance between two displacements along x′ and along y′. [m]"""
     look = study.geometry.look_azimuth
     cosine, sine = math.cos(look), math.sin(look)
     east, north = b[0] - a[0], b[1] - a[1]
@@ -470,10 +494,10 @@ def _along_and_across(study: Study, a: GroundVector, b: GroundVector) -> GroundV
 
 
 def _is_shorter(expected: GroundVector, actual: GroundVector) -> bool:
-    """Whether a displacement is so much shorter than expected that no sum of such errors is longer than expected.
+    """Whether a displacement is short enough that no sum of such errors can be longer than expected.
 
-    The longest sum of several displacements over all signs is at least 2/π of the sum of their lengths. So a missing
-    length along the lines compensates components across them in this ratio.
+    The longest sum of several displacements over all combinations of signs is at least 2/π of the sum of their
+    lengths. So a missing length along the expected direction compensates for components across it in this ratio.
     """
     length = math.hypot(*expected)
     if not length:

@@ -1,10 +1,12 @@
 """Verdicts on the limits of errors that make echoes or spread power: vibration, sensors and clocks.
 
-A sigma is for many flights. It is measured with full time series through exact ranges, and images of a few of them
-show whether a response has the phase by exact ranges. Spread power is measured in images of as many draws as the
-verdict needs: lines across range, each the transform of the aperture under its window. The mainlobe lies within the
-first nulls of the error-free response, and the sidelobes are the rest of one repeat interval, so that by Parseval
-only the mainlobe is transformed. Energies are means over the draws.
+A sigma applies to many flights. It is measured from full time series through exact ranges. Images of a few of the
+series show whether a response has the phase that exact ranges give.
+
+Spread power is measured in images of as many draws as the verdict needs. These are lines across range, each the
+transform of the aperture under its window. The mainlobe lies within the first nulls of the error-free response, and
+the sidelobes are the rest of one repeat interval. By Parseval's theorem, only the mainlobe has to be transformed.
+Energies are means over the draws.
 """
 
 import math
@@ -104,12 +106,13 @@ Case = Callable[[], Verdict]
 
 # ---------------------------------------------------------------------- vibration
 def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
-    """Give the subject of each vibration limit, one platform alone and both together, and the call that verifies it.
+    """Yield the subject of each vibration limit, and the function that verifies the limit.
 
-    With the published limits at equal shares, echoes of a sinusoid of one platform are 9 dB below the requirement,
-    and echoes of both in phase are 3 dB below it; independent noise-like vibration of both exceeds the requirement by
-    0.44 dB with a uniform window. With the full model's limits, both in phase meet the requirement exactly, and so
-    does noise.
+    The limits are those of one platform alone and of both together. With the published limits at equal shares, the
+    echoes of a sinusoid of one platform are 9 dB below the requirement, and the echoes of both in phase are 3 dB
+    below it. Independent noise-like vibration of both platforms exceeds the requirement by 0.44 dB with a uniform
+    window. With the limits of the full model, sinusoids of both in phase meet the requirement exactly, and so does
+    noise.
     """
     mission, T = study.mission, study.collection.aperture_time
     pslr, islr = mission.requirements.pslr, mission.requirements.islr
@@ -162,7 +165,10 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
 
 
 def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], declared: float | None) -> Verdict:
-    """Measure the paired echo on the difference from the error-free image, whose sidelobes would hide it."""
+    """Measure the paired echo of a sinusoid and compare it with the requirement.
+
+    The echo is measured in the difference from the error-free image, whose sidelobes would hide it.
+    """
     frequency = UNDECLARED_CYCLES / study.collection.aperture_time if declared is None else declared
     sinusoids = {name: (PathSinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
     who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
@@ -170,7 +176,10 @@ def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], decla
 
 
 def _near(study: Study, blank: Verdict, name: str, limit: float, lines: Sequence[Line]) -> Verdict:
-    """Verdict on lines near each other, in their declared ratio and worst phases, scaled to their common limit."""
+    """Verdict on a group of neighbouring lines, scaled together to their common limit.
+
+    The lines have the ratio of their declared amplitudes and their worst phases.
+    """
     cycles = [line.frequency * study.collection.aperture_time for line in lines]
     worst = worst_phases([line.amplitude for line in lines], cycles)
     if not worst.amplitude:
@@ -193,7 +202,7 @@ def echo(
     *,
     is_assumed: bool = False,
 ) -> Verdict:
-    """Measure the paired echoes of sinusoids and compare them with the requirement of a blank verdict."""
+    """Measure the paired echoes of sinusoids, and compare them with the requirement that `blank` holds."""
     collection = study.collection
     cycles_of_all = [
         sinusoid.frequency * collection.aperture_time
@@ -263,7 +272,10 @@ def _wideband(study: Study, blank: Verdict, limits: Mapping[str, float]) -> Verd
 def measured_power(
     collection: PointCollection, blank: Verdict, draw: Callable[[int], Floats], basis: Note
 ) -> Verdict:
-    """Verdict on the ISLR that phases (draws, _ISLR_SAMPLES) add, against the requirement of a blank verdict."""
+    """Verdict on the ISLR that drawn phases (draws, _ISLR_SAMPLES) add.
+
+    The ISLR is compared with the requirement that `blank` holds.
+    """
     required = blank.requirement_db or 0.0
     added = added_islr(collection.window(_ISLR_SAMPLES), draw, required)
     verdict, draws, low, high = added.verdict(required), added.draws, added.low, added.high
@@ -282,7 +294,10 @@ def measured_power(
 
 # ---------------------------------------------------------------------- sensors and clocks
 def limits_of(study: Study, error: RandomError) -> dict[str, float]:
-    """Sizes at which an error reaches its requirements, without autofocus; empty if no requirement limits it."""
+    """Size at which an error reaches each of its requirements, by key, without autofocus.
+
+    The result is empty if no requirement limits the error.
+    """
     model = _model(study, error)
     effect = held_effect(study.mission, error.effect(model), error.coverage(study.mission))
     sizes = map(float, sizes_at(effect, limits_for(study.mission, study.allocation, error.owner, model)))
@@ -290,14 +305,14 @@ def limits_of(study: Study, error: RandomError) -> dict[str, float]:
 
 
 def _model(study: Study, error: RandomError) -> str:
-    """The gating model by which an error has the larger effect."""
+    """Name of the gating model that gives the error the larger effect."""
     return max((model.name for model in study.models), key=lambda name: max(error.effect(name)[:2]))
 
 
 def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
-    """Give the subject of each oscillator's tone that has a limit, and the call that verifies it.
+    """Yield the subject of each oscillator tone that has a limit, and the function that verifies the limit.
 
-    In an image the tone is the motion of its platform with the same phase.
+    In an image the tone is represented by a motion of its platform with the same phase.
     """
     mission, wavelength = study.mission, study.collection.wavelength
     metric, limits = tone_limits(mission, study.allocation)
@@ -325,13 +340,16 @@ def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
 
 
 def _spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cycles: float) -> Verdict:
-    """Verdict on a tone at its limit by ISLR: a motion [m] of `cycles` cycles per aperture."""
+    """Verdict on a tone at its limit by ISLR.
+
+    The tone is a motion with an amplitude [m] and a number of `cycles` per aperture.
+    """
     phase = 2 * math.pi * amplitude / study.collection.wavelength
     return _power(study, blank, [], owner, echoes=[(phase / math.sqrt(2), cycles)])
 
 
 def verify_pslr(study: Study) -> Verdict:
-    """Verdict on the tones of the highest echo, in their worst phases, scaled together to the requirement."""
+    """Verdict on the tones of the highest echo, in their worst phases, scaled together to the required PSLR."""
     required = study.mission.requirements.pslr or 0.0
     row_id = subject("mission", "pslr").id
     blank = study.blank(row_id, required, "dB", requirement_db=required)
@@ -350,7 +368,10 @@ def verify_pslr(study: Study) -> Verdict:
 
 
 def verify_random(study: Study, error: RandomError) -> Verdict:
-    """Verdict on the limit of one figure: the smallest allowable by its requirements, without autofocus."""
+    """Verdict on the limit of a random error.
+
+    The limit is its smallest allowable by all requirements, without autofocus.
+    """
     sizes = limits_of(study, error)
     binding = min(sizes, key=lambda name: sizes[name])
     size = sizes[binding]
@@ -365,7 +386,10 @@ def verify_random(study: Study, error: RandomError) -> Verdict:
 
 
 def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: np.random.Generator) -> Verdict:
-    """Verdict on the sigma of quadratic or cubic phase at the limit, times the coverage factor, by the budget."""
+    """Verdict on the quadratic or cubic phase of a random error at its limit.
+
+    The sigma of the phase, times the coverage factor, is compared with the budget.
+    """
     is_cubic = binding == CUBIC
     required = study.mission.requirements.cubic_phase_error
     budget = (required or 0.0) if is_cubic else study.allocation.qpe_limit(error.owner)
@@ -396,7 +420,10 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
 
 
 def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Generator) -> Verdict:
-    """Verdict on the sigma of the displacement at the limit, times the coverage factor, by the requirement."""
+    """Verdict on the displacement that a random error at its limit causes.
+
+    The sigma of the displacement, times the coverage factor, is compared with the requirement.
+    """
     required = study.mission.requirements.location_error or 0.0
     factor, draws = study.mission.allocation.coverage_factor, _SIGMA_DRAWS
     if error.subject.kind in _FOLLOWED:
@@ -434,12 +461,12 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
 
 
 def _stream(study: Study, row_id: str) -> np.random.Generator:
-    """Random numbers of a row, independent of the other verified rows."""
+    """Random number generator for a row, independent of the other rows that are verified."""
     return np.random.default_rng([(study.mission.simulation or Simulation()).seed, *row_id.encode()])
 
 
 def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
-    """Standard deviation of a phase over many time series, and their number. [rad]"""
+    """Standard deviation of a phase over many time series [rad], and the number of time series."""
     if error.subject.kind in _FOLLOWED:
         effects = _effects_of_draws(study, error, rng)
         return float(np.nanstd(effects.cubic if is_cubic else effects.quadratic)), _SIGMA_DRAWS
@@ -448,7 +475,7 @@ def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic:
 
 
 def _effects_of_draws(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
-    """Effects of many histories of a sensor or the air, by exact ranges, (draws,)."""
+    """Effects of many drawn histories of a sensor or of the air, by exact ranges, (draws,)."""
     moments = aperture_nodes(study.collection.aperture_time)
     if error.subject.kind in CORRELATED:  # not smooth between the nodes, unlike integrated noise
         return study.exact_effects(_smooth_noise(study, error, rng))
@@ -460,7 +487,10 @@ def _effects_of_draws(study: Study, error: RandomError, rng: np.random.Generator
 
 
 def _remaining_range_error(study: Study, error: RandomError, times: Floats, group: Floats) -> Floats:
-    """Range error of group delays (draws, times) that remains at the displaced point. [m]"""
+    """Range error due to group delays that remains at the displaced point, (draws, times). [m]
+
+    `group` are the delays, (draws, times).
+    """
     half, geometry = study.collection.aperture_time / 2, study.geometry
     mean = group.mean(axis=1, keepdims=True)
     range_error = seen_course(group, mean, error.subject.axis)
@@ -476,7 +506,7 @@ def _remaining_range_error(study: Study, error: RandomError, times: Floats, grou
 
 
 def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[Floats, int]:
-    """Legendre coefficients of time series of a clock's phase, (4, draws) [rad], and the number of draws."""
+    """Legendre coefficients of drawn time series of a clock's phase, (4, draws) [rad], and the number of draws."""
     mission, T = study.mission, study.collection.aperture_time
     draws, highest, count = _CLOCK_DRAWS, _MAX_TONE_CYCLES / T, 257
     if mission.synchronization is not None and mission.synchronization.interval is not None:
@@ -495,7 +525,7 @@ def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[F
 
 
 def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
-    """Delays at the zenith at the nodes of exact ranges, in declared sigmas, (draws, nodes)."""
+    """Drawn zenith delays at the nodes of exact ranges, in units of the declared sigma, (draws, nodes)."""
     T, correlation_time = study.collection.aperture_time, correlation_time_of(study.mission, error.owner)
     if correlation_time is None:
         return zenith_delays(study.mission, error, aperture_nodes(T), _SIGMA_DRAWS, rng)
@@ -509,7 +539,7 @@ def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator)
 
 
 def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
-    """Smooth part of correlated noise at the nodes of exact ranges, (draws, nodes, 3) for each platform. [m]"""
+    """Smooth part of drawn correlated noise at the nodes of exact ranges, (draws, nodes, 3) for each platform. [m]"""
     T, correlation_time = study.collection.aperture_time, process_of(study.mission, error).correlation_time
     times = _moments(study, _SERIES_SAMPLES)
     at_nodes = _smooth_at_nodes(T, times)
@@ -525,9 +555,9 @@ def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) ->
 
 
 def _smooth_at_nodes(aperture_time: float, times: Floats) -> Floats:
-    """Matrix from courses at times to their smooth parts at the nodes of exact ranges, (nodes, times).
+    """Matrix that converts values at times to their smooth part at the nodes of exact ranges, (nodes, times).
 
-    Samples at the nodes alone would take noise of a short correlation time for a larger phase.
+    If noise with a short correlation time were sampled at the nodes alone, its phase would appear too large.
     """
     legendre = np.polynomial.legendre
     fit = np.linalg.pinv(legendre.legvander(2 * times / aperture_time, SMOOTH_ORDER))
@@ -535,9 +565,10 @@ def _smooth_at_nodes(aperture_time: float, times: Floats) -> Floats:
 
 
 def _power_of_samples(times: Floats, correlation_time: float) -> float:
-    """Power of correlated noise at low frequencies over that of its samples.
+    """Ratio of the power of correlated noise at low frequencies to the power of its samples.
 
-    Samples a step Δ apart have more power than the noise: Δ·coth(Δ/2τ_c) instead of 2τ_c.
+    Samples at steps of Δ have more power than the noise: Δ·coth(Δ/2τ_c) instead of 2τ_c, where τ_c is the correlation
+    time.
     """
     step = float(times[1] - times[0])
     return 2 * correlation_time / step * math.tanh(step / (2 * correlation_time))
@@ -550,7 +581,10 @@ def _moments(study: Study, count: int) -> Floats:
 
 
 def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[Errors]:
-    """A few time series as errors of an image, up to the cubic phase: faster phases spread and would hide it."""
+    """Draw a few time series and convert them to errors of an image, up to the cubic phase.
+
+    Phases of higher order spread power and would hide the response.
+    """
     times = _moments(study, _SERIES_SAMPLES)
     if error.subject.kind in MOVING:
         errors_of_images = [Errors()] * _IMAGE_DRAWS
@@ -575,7 +609,7 @@ def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[
 
 # ---------------------------------------------------------------------- what spreads
 def verify_islr(study: Study, row_subject: Subject) -> Verdict:
-    """Verdict on all errors that spread power, scaled together to the limit of a row's owner."""
+    """Verdict on all errors that spread power, scaled together until they reach the limit of the row's owner."""
     mission, model = study.mission, study.models[-1].name
     limit = spread_limit(mission, study.allocation, row_subject.owner, model) or 0.0
     level = islr_db(limit**2, model, mainlobe_energy(mission))
@@ -608,10 +642,10 @@ def _power(
     cubic: float = 0.0,
     order: int = _CUBIC_ORDER,
 ) -> Verdict:
-    """Verdict on the ISLR that time series at a limit add to an image, against the ISLR that an owner may add.
+    """Verdict on the ISLR that time series at a limit add to an image, compared with the ISLR that an owner may add.
 
     `members` are errors of sensors and clocks. `white` noise, `echoes` (tones with their cycles per aperture) and a
-    `cubic` phase are added, each by its RMS over the aperture [rad]. Phases up to `order` are taken out of the time
+    `cubic` phase are added, each with its rms over the aperture [rad]. Phases up to `order` are removed from the time
     series.
     """
     mission, collection = study.mission, study.collection
@@ -623,7 +657,7 @@ def _power(
     fitted = legendre[:, : order + 1] @ np.linalg.pinv(legendre[:, : order + 1])
 
     def draw_phases(draws: int) -> Floats:
-        """Draw phases without the orders that move and defocus the response."""
+        """Draw phases, and remove the orders that displace and defocus the response."""
         phases = white * rng.standard_normal((draws, times.size))
         for error in members:
             if error.subject.kind in MOVING:
@@ -652,7 +686,7 @@ def _power(
 # ---------------------------------------------------------------------- ISLR that noise adds
 @dataclass(frozen=True, slots=True)
 class AddedIslr:
-    """ISLR that noise adds, the ends of its interval at 95 % [dB], and the number of draws of the mean."""
+    """ISLR that noise adds, the ends of its 95 % interval [dB], and the number of draws of the mean."""
 
     level: float
     low: float
@@ -661,14 +695,14 @@ class AddedIslr:
 
     @property
     def error(self) -> float:
-        """Standard error. [dB]"""
+        """Standard error of the ISLR. [dB]"""
         return (self.high - self.low) / (2 * _INTERVAL_95_SIGMA)
 
     def verdict(self, required_db: float) -> str:
-        """Verdict on a limit with a required ISLR; `not_evaluated` if more draws may change the verdict.
+        """Verdict on a limit, given the required ISLR; `not_evaluated` if more draws may change the verdict.
 
-        On the border of confirmed and conservative, the verdict after all draws is `conservative`: such a limit does
-        not add too much.
+        If the value is on the border of confirmed and conservative after all draws, the verdict is `conservative`,
+        because such a limit does not add too much.
         """
         excess, doubt = self.level - required_db, _DECISION_SIGMA * self.error
         low, high = excess - doubt, excess + doubt
@@ -682,7 +716,7 @@ class AddedIslr:
 
 
 class Mainlobe:
-    """The part of an error-free response that lies within its first nulls.
+    """The mainlobe of an error-free response, which lies within its first nulls.
 
     Parameters
     ----------
@@ -702,20 +736,22 @@ class Mainlobe:
         self.energy = float(self._clean**2 @ self._steps)
 
     def lost(self, phases: Floats) -> Floats:
-        """Energy that phases (draws, moments) take from the mainlobe, over the energy of the image, (draws,)."""
+        """Energy that phases (draws, moments) take from the mainlobe, divided by the image's energy, (draws,)."""
         # exp(jφ) - 1 without rounding: a limit of -100 dB is an energy of 1e-10.
         change = (-2 * np.sin(phases / 2) ** 2 + 1j * np.sin(phases)) @ self._waves
         energy_loss: Floats = -(2 * self._clean * change.real + np.abs(change) ** 2) @ self._steps
         return energy_loss
 
     def added_db(self, lost: float) -> float:
-        """ISLR of a mean energy lost from the mainlobe. [dB]"""
+        """Convert the mean energy lost from the mainlobe to an added ISLR. [dB]"""
         remaining_energy = max(self.energy - lost, _MIN_ENERGY_FRACTION)
         return 10 * math.log10(max(lost, _MIN_ENERGY_FRACTION) / (self.energy * remaining_energy))
 
 
 def added_islr(weights: Floats, draw: Callable[[int], Floats], required_db: float) -> AddedIslr:
-    """Draw phases until their interval allows only one verdict on the required ISLR, or up to the limit of draws.
+    """Draw phases until the interval of the added ISLR permits only one verdict.
+
+    Drawing also ends at the maximum number of draws.
 
     Parameters
     ----------

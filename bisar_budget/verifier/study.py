@@ -1,4 +1,4 @@
-"""One mission as `verify` examines it: images of its errors, at a limit or at any size."""
+"""A mission as `verify` examines it: images of its errors, either at a limit or at any size."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -53,10 +53,10 @@ _MIN_DOPPLER_RATE_FRACTION = 0.02  # of the highest rate of Doppler; slower part
 
 
 class Spread(NamedTuple):
-    """Resolution cells over which a response is smeared along its line, and over which it walks in range.
+    """Number of resolution cells over which a response is smeared along its line, and over which it walks in range.
 
-    Where Doppler turns back (`is_round`), it spreads in all directions, and both numbers are equal. A range cell has
-    `finer` times as many pixels as a cross-range cell.
+    If Doppler turns back within the aperture (`is_round`), the response spreads in all directions, and both numbers
+    are equal. A range cell has `finer` times as many pixels as a cross-range cell.
     """
 
     smear: int
@@ -66,7 +66,7 @@ class Spread(NamedTuple):
 
 
 class Responses(NamedTuple):
-    """Image of a point with errors, around its displaced position, and of a point without error at that position."""
+    """Image of a point with errors around its displaced position, and of an error-free point at that position."""
 
     errors: Errors
     effect: ExactEffect
@@ -80,7 +80,7 @@ VerdictFields = dict[str, Any]
 
 
 class Study:
-    """One mission, with the analysis and the collection that its rows share."""
+    """One mission, with the analysis and the collection that all its rows share."""
 
     def __init__(self, mission: Mission, analysis: Analysis | None = None) -> None:
         self.mission, self.analysis = mission, analysis or Analysis(mission)
@@ -90,12 +90,12 @@ class Study:
         self.collection = PointCollection(mission, self.geometry)
 
     def blank(self, row_id: str, limit: float, unit: str, **fields: Any) -> Verdict:
-        """Verdict on a limit of the gating model before its image is formed."""
+        """Verdict on a limit of the gating model, before its image is formed."""
         return Verdict(id=row_id, model=self.model, boundary_error=limit, unit=unit, **fields)
 
     @property
     def is_full(self) -> bool:
-        """Whether displacement and cubic phase are by exact ranges; else they are by Table I and (25)."""
+        """Whether displacement and cubic phase follow from exact ranges; else they follow from Table I and (25)."""
         return self.model != "published"
 
     @property
@@ -105,7 +105,10 @@ class Study:
 
     @property
     def declared(self) -> list[ErrorSource]:
-        """Declared errors that an image can show; `other` errors are phases without a motion."""
+        """Declared errors that an image can show.
+
+        `other` errors are phases without a motion and are not included.
+        """
         return [s for s in self.analysis.stated if s.declared and s.displaces]
 
     def members(self, owner: str) -> list[ErrorSource]:
@@ -114,7 +117,7 @@ class Study:
 
     @cached_property
     def unfocused_models(self) -> tuple[Model, ...]:
-        """The gating models for the same mission without autofocus, so that no phase includes the autofocus gain."""
+        """The gating models for the same mission without autofocus, so that no phase includes autofocus gain."""
         if self.allocation.autofocus_gain == 1:
             return self.models
         unfocused = self.mission._replace(autofocus=self.mission.autofocus._replace(n_pull=None))
@@ -122,16 +125,16 @@ class Study:
         return tuple(getattr(analysis, name) for name in analysis.gates)
 
     def boundary(self, source: ErrorSource, limit: float, *, is_focused: bool = False) -> float | None:
-        """Smallest size at which an error reaches a quadratic phase [rad] by a gating model; None if it never does.
+        """Smallest size at which an error reaches a quadratic phase by a gating model; None if it never does.
 
-        If `is_focused`, the limit includes the gain of autofocus.
+        `limit` is this phase [rad]. If `is_focused`, it includes the gain of autofocus.
         """
         models = self.models if is_focused else self.unfocused_models
         sizes = (model.allowable(source, QUADRATIC, limit) for model in models)
         return min((size for size in sizes if size is not None), default=None)
 
     def allowed(self, source: ErrorSource) -> tuple[float | None, str | None]:
-        """Allowable of an error's row by all requirements, autofocus included, and the requirement that binds."""
+        """Allowable of an error by all requirements, autofocus included, and the requirement that sets it."""
         limit = self.allocation.qpe_allowed(source.owner)
         needs = self.mission.requirements
         limits = (limit, needs.cubic_phase_error, needs.location_error)
@@ -139,7 +142,7 @@ class Study:
         return min(allowables, key=lambda allowable: math.inf if allowable[0] is None else allowable[0])
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
-        """Return the errors of an image with one error of a size."""
+        """The errors of an image with a single error of a given size."""
         if source.clock is not None:
             return Errors(clock=tuple(size * float(term) for term in source.clock))
         errors = Errors()
@@ -157,18 +160,18 @@ class Study:
         return errors
 
     def together(self, sizes: Sizes, scale: float = 1.0) -> Errors:
-        """Sum of several errors, each `scale` times its size."""
+        """Superpose several errors, each with `scale` times its size."""
         return superposed(self.errors(source, scale * size) for source, size in sizes)
 
     def effect(self, sizes: Sizes, scale: float = 1.0) -> ExactEffect:
-        """Effect of several errors by exact ranges."""
+        """Effect of several errors together, by exact ranges."""
         return self.collection.effect(self.together(sizes, scale))
 
     def exact_effects(self, courses: Mapping[str, Floats]) -> ImagePoints:
-        """Effects of many error histories: of platforms, (draws, nodes, 3), or of the clock, (draws, nodes). [m]
+        """Effects of many error histories, by exact ranges.
 
-        Histories are by the name of the platform, or "clock", whose history is a range error. The nodes are
-        `aperture_nodes`.
+        `courses` maps the name of a platform to its motion errors, (draws, nodes, 3) [m], and "clock" to range
+        errors, (draws, nodes) [m]. The nodes are `aperture_nodes`.
         """
         exact = exact_ranges(self.mission, self.geometry, FINE_NODE_COUNT)
         courses_by_draw = {name: np.ascontiguousarray(course.T) for name, course in courses.items()}
@@ -178,7 +181,7 @@ class Study:
         return followed(exact, clock, shifts, np.zeros(draws, dtype=int))
 
     def worse_sign(self, sizes: Sizes) -> float:
-        """The sign of the errors with the larger quadratic phase of equal loss, 1 or -1.
+        """Sign of the errors, 1 or -1, that gives the larger equal-loss quadratic phase.
 
         Raises
         ------
@@ -196,9 +199,10 @@ class Study:
         return max(phases, key=lambda sign: phases[sign])
 
     def summed(self, members: Sequence[ErrorSource], budget: float) -> list[tuple[ErrorSource, float]]:
-        """Declared errors scaled until their phases by the gating model, each of its worse sign, sum to a budget.
+        """Scale the declared errors until the sum of their phases by the gating model equals a budget.
 
-        The signs make the phases add. Empty if there is no phase.
+        Each error has its worse sign. In the result the signs make the phases add. The list is empty if there is no
+        phase.
         """
         model = self.models[-1]
 
@@ -224,20 +228,24 @@ class Study:
         ]
 
     def _worst(self, model: Model, source: ErrorSource, size: float) -> float:
-        """Quadratic phase of equal loss of an error of its worse sign, with the sign of a small error's. [rad]"""
+        """Equal-loss quadratic phase of an error with its worse sign. [rad]
+
+        The result has the sign of the phase of a small error.
+        """
         effect = model.does(source, size)
         return math.copysign(effect.equal_loss, effect.qpe) if math.isfinite(effect.qpe) else math.inf
 
     def at_limit(self, subject: Subject, limit: float, room: float = 1.0) -> Responses:
-        """Images at a limit of a row of quadratic phase, as read for its verdict."""
+        """Form the images at the limit of a row of quadratic phase, as they are read for its verdict."""
         source = next((s for s in self.sources if s.subject == subject), None)
         sizes = [(source, limit)] if source is not None else self.summed(self.members(subject.owner), limit)
         return self.images(self.together(sizes, self.worse_sign(sizes)), room=room)
 
     def images(self, errors: Errors, range_cells: int = RANGE_CELLS, room: float = 1.0) -> Responses:
-        """Images of errors, large enough for the smear.
+        """Form images of errors that are large enough for the smear.
 
-        `room` is the least width of the patch over the smear: in a narrower patch autofocus fails.
+        `room` is the smallest permitted ratio of the width of the patch to the smear. Autofocus fails in a narrower
+        patch.
 
         Raises
         ------
@@ -252,7 +260,7 @@ class Study:
         return Responses(errors, effect, spread, *chips)
 
     def read(self, images: Responses, *, is_focused: bool = False) -> ApertureReading:
-        """Quadratic and cubic phase of a response, measured."""
+        """Measure the quadratic and cubic phase of a response."""
         spread = images.spread
         cells = spread.walk + (_ROUND_CELLS if spread.is_round else READ_CELLS if spread.walk else 0)
         return read_aperture(
@@ -266,12 +274,15 @@ class Study:
         )
 
     def equal_loss(self, images: Responses, reading: ApertureReading) -> float:
-        """Quadratic phase with the loss of the peak that an image shows, without its cubic phase and rest. [rad]
+        """Equal-loss quadratic phase that an image shows: its peak loss as a purely quadratic phase. [rad]
 
-        If little is hidden, the phase over the aperture is the best measure, else the loss of the peak is. The loss
-        is compared with the loss of a direct sum by exact ranges under the same window, because a loss is the
-        variance of the phase only to second order, and depends on the window. Beyond some 3 dB an image has no single
-        peak: then the hidden phase by exact ranges is added to the measured phase.
+        The part of the loss due to the cubic phase and higher orders is taken out first.
+
+        If only a small phase is hidden, the phase over the aperture is the best measure, otherwise the loss of the
+        peak is. The loss is compared with the loss of a direct sum by exact ranges under the same window, because a
+        loss equals the variance of the phase only to second order and depends on the window. Beyond about 3 dB of
+        loss an image has no single peak. In that case the hidden phase by exact ranges is added to the measured phase
+        as a root-sum-square.
         """
         effect = images.effect
         variance, other_variance = _phase_variances(effect)
@@ -285,15 +296,15 @@ class Study:
     def shift(self, images: Responses, reading: ApertureReading) -> Shift:
         """Displacement of a response from its position by exact ranges, and the line of its smear.
 
-        The response lies at the peak of the image up to some 3 dB of loss, and always if Doppler turns back: then no
-        slope over the aperture locates a response along a line.
+        Up to a loss of about 3 dB, the response lies at the peak of the image. It also does so whenever Doppler turns
+        back, because then no slope over the aperture locates a response along a line.
         """
         variance, other_variance = _phase_variances(images.effect)
         has_line = variance + other_variance > _SINGLE_PEAK_RAD2 and not images.spread.is_round
         return measured_shift(images.chip, images.reference, reading if has_line else None)
 
     def _expected_loss(self, images: Responses) -> float:
-        """Minus the logarithm of the peak's power under the window, by a direct sum of exact ranges over pulses."""
+        """Minus the logarithm of the peak power under the window, from a direct sum over pulses by exact ranges."""
         collection = self.collection
         times = cell_centres(collection.aperture_time, _DIRECT_SUM_SAMPLES)
         remaining_range = collection.flight(images.errors.slow(), times).range_error(
@@ -305,9 +316,9 @@ class Study:
         return -2 * math.log(abs(weights @ phases @ weights) / weights.sum() ** 2)
 
     def focused(self, images: Responses) -> Responses:
-        """Refocus a response by the mission's algorithm, with the phase estimated on lines that share it.
+        """Refocus a response by the mission's algorithm. The phase is estimated on the lines that share it.
 
-        Where range cells are long, lines beside the response show it with a different quadratic phase.
+        If range cells are long, the lines beside the response show it with a different quadratic phase.
         """
         algorithm = ALGORITHMS[self.mission.autofocus.algorithm]
         lines = images.chip.image.shape[0]
@@ -316,7 +327,7 @@ class Study:
         return images._replace(chip=refocused(self.collection, images.errors, centre, images.chip, algorithm, half))
 
     def shared_lines(self, spread: Spread) -> int:
-        """Number of lines on either side of the middle that share its quadratic phase or hold the response."""
+        """Number of lines on either side of the middle that share its quadratic phase or contain the response."""
         exact = self.analysis.exact
         (a, c, east, _), (b, d, north, _) = (gradient[:, 0] for gradient in exact.gradient)
         # A metre of range along equal Doppler leads by (d, −c) over the determinant.
@@ -326,11 +337,11 @@ class Study:
         return max(shared, round(spread.walk * OVERSAMPLING_FACTOR * spread.finer / 2))
 
     def spread(self, errors: Errors, effect: ExactEffect) -> Spread:
-        """Spread of a response by an error, from the range error that remains over the aperture.
+        """Spread of a response due to an error, from the range error that remains over the aperture.
 
-        A part of the aperture puts the response at the point of the line of equal range that has the remaining
+        Each part of the aperture places the response at the point on the line of equal range that has the remaining
         Doppler. Where Doppler changes slowly, in part of a long aperture or with nearly parallel gradients, a small
-        slope is a long distance.
+        slope corresponds to a long distance.
         """
         half = self.collection.aperture_time / 2
         time = np.linspace(-half, half, 257)
@@ -362,5 +373,5 @@ class Study:
 
 
 def _phase_variances(effect: ExactEffect) -> tuple[float, float]:
-    """Variance of the quadratic phase of equal loss, and variance of the cubic phase and the rest. [rad²]"""
+    """Variance of the equal-loss quadratic phase, and variance of the cubic phase and all higher orders. [rad²]"""
     return (effect.equal_loss / QUADRATIC_OF_VARIANCE) ** 2, 4 / 175 * effect.cubic**2 + effect.rest**2

@@ -32,6 +32,7 @@ from bisar_budget.report import FORMATS
 from bisar_budget.units import DIMENSIONS
 
 MISSIONS = ROOT / "specs" / "missions"
+_SUBJECT = re.compile("^(Sentence for|Text after) ")  # of a docstring, before what the sentence is about
 _QUANTITY = re.compile(r"\{(\w+)(?:[^{}]|\{\w+\})*\}")  # a field of a sentence, with its format
 
 
@@ -433,10 +434,7 @@ def note_codes(_: Generated) -> str:
     """Codes of the sentences of findings, warnings and verdicts, with the sentence or its subject."""
     return table(
         ("code", "sentence, or what it is about"),
-        [
-            (f"`{code}`", _QUANTITY.sub(r"{\1}", about.removeprefix("Said of ")))
-            for code, about in sorted(CODES.items())
-        ],
+        [(f"`{code}`", _QUANTITY.sub(r"{\1}", _SUBJECT.sub("", about))) for code, about in sorted(CODES.items())],
     )
 
 

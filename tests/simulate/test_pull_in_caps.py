@@ -56,7 +56,7 @@ class TestWarnings:
         found = warnings(autofocus={"n_pull": n_pull})
         assert bool(found) == warns
         if warns:
-            assert "33.4 counts as 33.3, f0/B" in found[0]
+            assert "33.4 is limited to 33.3, f0/B" in found[0]
 
     @pytest.mark.parametrize(("algorithm", "room"), [("pga", 3.0), ("map_drift", 1.5)])
     def test_smear_against_the_scene(self, algorithm: str, room: float) -> None:

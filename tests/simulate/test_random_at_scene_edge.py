@@ -362,7 +362,7 @@ def test_the_coverage_factor_counts_and_the_radius_holds_for_all() -> None:
 def test_what_free_oscillators_drift_is_said_not_to_count() -> None:
     free = {"oscillator": {"power_law": {"h0": 1e-24}}}
     bias = {"motion_error": {"imu": {"accelerometer_bias": 18e-3}}}
-    said = "receiver.oscillator: what free oscillators drift"
+    said = "receiver.oscillator: the drift of free-running oscillators"
     (note,) = (one for one in row(checked(of_receiver=free | bias), ROW).notes if "drift" in one)
     assert note.startswith(said)
     assert declared(checked(of_receiver=free | bias)) == pytest.approx(declared(checked(of_receiver=bias)), rel=1e-9)

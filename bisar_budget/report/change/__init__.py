@@ -1,1 +1,1 @@
-"""Changes between two missions."""
+"""Comparison of two versions of a mission."""

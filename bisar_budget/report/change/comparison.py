@@ -1,4 +1,4 @@
-"""Effects of a change on missions: changed inputs, loosened rules, erosion of each margin, and a gate."""
+"""Compare missions before and after a change: inputs, loosened rules, loss of margins, and a gate for them."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,7 +25,7 @@ from bisar_budget.settings import TABLE
 
 # ---------------------------------------------------------------------- inputs
 class Moved(NamedTuple):
-    """A value before and after: text of a key in the file, or a number of the geometry; None for a missing value."""
+    """A changed value: the text of a key in the file or a number of the geometry; None if the value is missing."""
 
     name: str
     unit: str  # of a number; empty for a text
@@ -34,7 +34,7 @@ class Moved(NamedTuple):
 
 
 def moved_inputs(before: Mission, after: Mission) -> Iterator[Moved]:
-    """Keys whose values differ. Different spellings of one value, such as `31 km` and `31000 m`, are equal."""
+    """Yield the keys whose values differ. Spellings of the same value, such as `31 km` and `31000 m`, are equal."""
     old, new = texts_of_file(before), texts_of_file(after)
     for path in {**old, **new}:
         if old.get(path) == new.get(path):
@@ -57,9 +57,9 @@ def moved_inputs(before: Mission, after: Mission) -> Iterator[Moved]:
 
 
 def texts_of_file(mission: Mission) -> dict[KeyPath, str]:
-    """Texts of the values of a mission file by path. A list of plain values is one text.
+    """Texts of the values of a mission file by key path. A list of plain values is one text.
 
-    Values that the file takes from a part of the catalogue have the name of the part.
+    The text of a value from a part of the catalogue also has the name of the part.
     """
     texts = {
         path: event.value for path, event in mission.places.items() if isinstance(getattr(event, "value", None), str)
@@ -75,7 +75,7 @@ def texts_of_file(mission: Mission) -> dict[KeyPath, str]:
 
 
 def _set_values(mission: Mission) -> Iterator[tuple[KeyPath, str]]:
-    """Values that options put into a mission, by path. Below a new key the path is that of the option."""
+    """Yield the key paths and texts of the values that options set; a key that is not in the file has its option."""
     changed = {".".join(map(str, path)): path for path, event in mission.places.items() if isinstance(event, Changed)}
     for change in mission.changes:
         parts = parts_of(change.key)
@@ -83,7 +83,7 @@ def _set_values(mission: Mission) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _value(mission: Mission, path: KeyPath) -> SectionValue:
-    """The value at a path; None if the mission has no such attribute."""
+    """Value of a mission at a key path; None if the mission has no such attribute."""
     value: SectionValue = mission
     for key in path:
         if isinstance(value, Mapping):
@@ -96,7 +96,7 @@ def _value(mission: Mission, path: KeyPath) -> SectionValue:
 
 
 def moved_geometry(before: MissionFindings, after: MissionFindings) -> Iterator[Moved]:
-    """Numbers of the collection geometry that differ by more than rounding."""
+    """Yield the numbers of the collection geometry that differ by more than rounding."""
     for (name, unit, old), (_, _, new) in zip(_numbers(before), _numbers(after), strict=True):
         is_unchanged = old == new or (old is not None and new is not None and math.isclose(old, new, rel_tol=1e-9))
         if not is_unchanged:
@@ -136,9 +136,9 @@ _LIMITING_NUMBERS = (
 
 
 class Loosened(NamedTuple):
-    """A rule or declaration that is looser than before, in words before and after.
+    """A rule or declaration that became looser, with texts for before and after.
 
-    The id, for `--allow`, is a key of the mission file, the id of a row, or the kind of an error.
+    `id` is the name for `--allow`: a key of the mission file, the id of a row, or the kind of an error.
     """
 
     id: str
@@ -147,12 +147,12 @@ class Loosened(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Before and after in one sentence, for a gate that refuses the change."""
+        """Text `before -> after` for the message of a gate."""
         return f"{self.before} -> {self.after}"
 
 
 def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Rules and declarations that are looser in the later findings. Both findings carry their mission."""
+    """Yield the rules and declarations that became looser. Both findings must contain their analysed mission."""
     missions = (before.analysed().mission, after.analysed().mission)
     yield from _looser_requirements(*missions)
     yield from _looser_specifications(*missions)
@@ -169,7 +169,7 @@ def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loos
 
 
 def loosened_settings(before: Mapping[str, object], after: Mapping[str, object]) -> Iterator[Loosened]:
-    """Settings of a project that are looser than before: `strict` removed, or `exit-zero` added."""
+    """Yield the settings of a project that became looser: `strict` was removed, or `exit-zero` was added."""
     for key, strict_value in (("strict", True), ("exit-zero", False)):
         old, new = (values.get(key, False) for values in (before, after))
         if old is strict_value and new is not strict_value:
@@ -177,7 +177,7 @@ def loosened_settings(before: Mapping[str, object], after: Mapping[str, object])
 
 
 def _looser_requirements(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Requirements that were removed or have a larger value."""
+    """Yield the requirements that were removed or now have a larger value."""
     for key in Requirements._fields:
         old, new = (getattr(mission.requirements, key) for mission in (before, after))
         if key != "declare" and old is not None and (new is None or _is_above(new, old)):
@@ -186,7 +186,7 @@ def _looser_requirements(before: Mission, after: Mission) -> Iterator[Loosened]:
 
 
 def _looser_specifications(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Specifications that were removed or have a larger value."""
+    """Yield the specifications that were removed or now have a larger value."""
     for key, old in before.specifications.items():
         path, new = ("specifications", key), after.specifications.get(key)
         if old.value is not None and (new is None or new.value is None or _is_above(new.value, old.value)):
@@ -196,7 +196,7 @@ def _looser_specifications(before: Mission, after: Mission) -> Iterator[Loosened
 
 
 def _declarations(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Words of `requirements.declare` whose errors need no longer be declared, or not all of them."""
+    """Yield the words of `requirements.declare` that no longer require all the errors that they required before."""
     later_kinds = {kind for word in after.requirements.declare for kind in _owned(word)}
     for word in before.requirements.declare:
         kept = later_kinds.intersection(_owned(word))
@@ -205,12 +205,12 @@ def _declarations(before: Mission, after: Mission) -> Iterator[Loosened]:
 
 
 def _owned(word: str) -> list[str]:
-    """Kinds of error that a word of `declare` requires, with their platform."""
+    """Kinds of error, with their platform, that a word of `requirements.declare` requires."""
     return [word] if "." in word or word == "timing" else [f"{name}.{word}" for name in PLATFORMS]
 
 
 def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Looser values of autofocus, coverage factor, warning threshold, shares, model and combination."""
+    """Yield looser values of autofocus, coverage factor, warning threshold, shares, model and rule of combination."""
     missions = (before.analysed().mission, after.analysed().mission)
     for section, key, sign in _LIMITING_NUMBERS:
         old, new = (getattr(getattr(mission, section), key) for mission in missions)
@@ -226,7 +226,7 @@ def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened
 
 
 def _shares(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Smaller reserves, and shares that grow by more than the decrease of the reserve."""
+    """Yield the reserves that became smaller, and the shares that grew by more than the reserve shrank."""
     for metric, key in (("qpe", "quadratic_phase_error"), ("pslr", "pslr"), ("islr", "islr")):
         old, new = (getattr(findings.allocation, metric) for findings in (before, after))
         if _is_above(old.reserve, new.reserve):
@@ -238,7 +238,7 @@ def _shares(before: MissionFindings, after: MissionFindings) -> Iterator[Loosene
 
 
 def _waivers(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Waivers that are new, last longer, or cover more rows."""
+    """Yield the waivers that are new, expire later than before, or cover more rows."""
     for waiver in after.waivers:
         covering = [earlier for earlier in before.waivers if _names_as_much(earlier, waiver)]
         if not any(earlier.until >= waiver.until for earlier in covering):
@@ -248,7 +248,10 @@ def _waivers(before: Mission, after: Mission) -> Iterator[Loosened]:
 
 
 def _names_as_much(old: Waiver, new: Waiver) -> bool:
-    """Whether an earlier waiver covers every row of a new waiver; False for different patterns in brackets."""
+    """Whether an earlier waiver covers every row of a new waiver.
+
+    False if the patterns differ and the new one has brackets, because this is not decided.
+    """
     is_one_row = not any(char in new.id for char in "*?[")
     # A star of the old pattern also matches wildcards of the new pattern; the text beside the star is in both.
     is_narrower = "[" not in new.id and not any(char in old.id for char in "?[")
@@ -256,7 +259,7 @@ def _names_as_much(old: Waiver, new: Waiver) -> bool:
 
 
 def _waived_rows(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Rows and requirements that are waived and were not."""
+    """Yield the rows and requirements that are waived now but were not waived before."""
     named_ids = {waiver.id for waiver in _waivers(before.analysed().mission, after.analysed().mission)}
     for collection in ("rows", "requirements"):
         old: Mapping[str, Row | JudgedRequirement] = {item.id: item for item in getattr(before, collection)}
@@ -267,7 +270,7 @@ def _waived_rows(before: MissionFindings, after: MissionFindings) -> Iterator[Lo
 
 
 def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Errors that are no longer declared, or declared as zero. Axes of a motion error count together."""
+    """Yield the errors that are no longer declared, or are now zero; the axes of a motion error are one error."""
     old, new = _declared(before), _declared(after)
     stated = (row for row in before.rows if row.declared is not None and row.is_independent)
     for name in dict.fromkeys(_error(row) for row in stated if row.subject.kind not in SUMS):
@@ -278,14 +281,17 @@ def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosene
 
 
 def _fallen(before: MissionFindings, after: MissionFindings, gone_errors: Sequence[str]) -> Iterator[Loosened]:
-    """Rows whose declared effect fell, except those of `gone_errors`, which are listed already."""
+    """Yield the rows whose declared effect decreased, without rows of `gone_errors`, which are already listed."""
     for fall in fallen_effects(before, after):
         if not any(fall.id == name or fall.id.startswith(f"{name}.") for name in gone_errors):
             yield Loosened(fall.id, *fall.words)
 
 
 def _distributions(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Narrower distributions. For the same value a normal distribution is the widest, a uniform the narrowest."""
+    """Yield the distributions that became narrower.
+
+    For the same declared value a normal distribution is the widest and a uniform distribution the narrowest.
+    """
     sections = [
         (f"platforms.{name}.motion_error", attrgetter(f"platforms.{name}.motion_error")) for name in PLATFORMS
     ]
@@ -296,7 +302,7 @@ def _distributions(before: Mission, after: Mission) -> Iterator[Loosened]:
 
 
 def _declared(findings: MissionFindings) -> dict[str, bool]:
-    """Errors that a file declares, each with whether it is larger than zero along any axis."""
+    """Map each declared error to True if it is larger than zero along any axis."""
     is_declared: dict[str, bool] = {}
     for row in findings.rows:
         if row.declared is not None:
@@ -312,7 +318,7 @@ def _error(row: Row) -> str:
 
 
 def _sources(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Kinds of error without a source that had one. Errors with a name are listed each by its name."""
+    """Yield the kinds of error that lost their source. Named errors are listed one by one."""
     had_source = set(before.kinds.declared) - set(before.kinds.without_source)
     lost = [
         kind
@@ -355,7 +361,7 @@ SMALL_FRACTION = 0.01  # changes of a row below this fraction are not shown
 
 
 class Change(NamedTuple):
-    """One row before and after; None if the mission has no such row."""
+    """A row before and after; None if that version of the mission has no such row."""
 
     id: str
     before: Row | None
@@ -363,15 +369,16 @@ class Change(NamedTuple):
 
     @property
     def use(self) -> tuple[float, float]:
-        """Utilization before and after; 0 for a row that is not declared."""
+        """Utilizations before and after; 0 if a row is missing or has no utilization."""
         before, after = (row.utilization or 0.0 if row else 0.0 for row in (self.before, self.after))
         return before, after
 
     @property
     def erosion(self) -> float:
-        """Fraction of the margin that the change uses up, (u₂ − u₁)/(1 − u₁); negative for a gain.
+        """Fraction of the margin that the change uses up, (u₂ − u₁)/(1 − u₁), from the utilizations u₁ and u₂.
 
-        At 1 the margin is used up. For a row without a margin, the relative growth of its use, u₂/u₁ − 1.
+        It is 1 if the whole margin is used up, and negative if the margin grows. For a row that had no margin, it is
+        the relative growth of the utilization, u₂/u₁ − 1.
         """
         before, after = self.use
         if before == after:
@@ -386,7 +393,7 @@ class Change(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The effect on the margin in words, for a gate that refuses it."""
+        """Text about the lost margin or the new status, for the message of a gate."""
         if self.is_newly_failing:
             return _worse(_status(self.after))
         before, after = self.use
@@ -396,21 +403,21 @@ class Change(NamedTuple):
 
     @property
     def is_change(self) -> bool:
-        """Whether a reported value differs. The line in the file does not count."""
+        """Whether a reported value of the row differs. A moved line in the file does not count as a difference."""
         return _reported(self.before) != _reported(self.after)
 
     @property
     def is_small(self) -> bool:
-        """Whether the status stays, and declared value, allowable and margin change by less than 1 %."""
+        """Whether the status is the same, and declared value, allowable and margin change by less than 1 %."""
         before, after = self.before, self.after
         if before is None or after is None or before.status != after.status or abs(self.erosion) >= SMALL_FRACTION:
             return False
         return _is_near(before.declared, after.declared) and _is_near(before.allowable, after.allowable)
 
     def breaks(self, tolerated: float) -> bool:
-        """Whether the row newly fails, or a judged row loses more than the tolerated fraction of its margin.
+        """Whether the row newly fails, or is judged and loses more than the tolerated fraction of its margin.
 
-        A row that is waived before and after counts as judged: the waiver was granted for its earlier value.
+        A row that is waived before and after counts as judged, because the waiver was granted for its earlier value.
         """
         is_judged = self.after is not None and STATUS[self.after.status].is_held
         is_judged = is_judged or _status(self.before) == _status(self.after) == "waived"
@@ -418,7 +425,7 @@ class Change(NamedTuple):
 
 
 class RequirementMove(NamedTuple):
-    """Statuses of a requirement before and after; None if the mission has no such requirement."""
+    """A requirement with its status before and after; None if that version has no such requirement."""
 
     key: str
     name: str
@@ -437,7 +444,7 @@ class RequirementMove(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """A change that a gate refuses: its id, its effect in words, and whether `--allow` lets it through."""
+    """A change that a gate refuses: its id, a text about its effect, and whether `--allow` lets it through."""
 
     id: str
     words: str
@@ -445,17 +452,17 @@ class Refusal(NamedTuple):
 
 
 class Gate(NamedTuple):
-    """A gate: the fraction of a margin that a change may use up, and the ids that it lets through."""
+    """A gate for changes: the fraction of a margin that a change may use up, and the ids that it lets through."""
 
     tolerated: float
     allowed: tuple[str, ...] = ()
 
     def only(self, allowed: str) -> "Gate":
-        """The gate with only one id let through."""
+        """Return this gate with `allowed` as the only id that it lets through."""
         return self._replace(allowed=(allowed,))
 
     def refusal(self, id: str, words: str, file: str) -> Refusal:
-        """Refusal of a change, let through if `id` or `file:id` is named or matches a pattern of `allowed`."""
+        """Refusal of a change; it is let through if `id` or `file:id` equals or matches an item of `allowed`."""
         names = (id, f"{file}:{id}")
         return Refusal(
             id,
@@ -465,10 +472,11 @@ class Gate(NamedTuple):
 
 
 class MissionChange(NamedTuple):
-    """A mission before and after.
+    """A mission before and after a change, and the differences.
 
-    `changes` are sorted by erosion, the largest first. `inputs` are changed keys of the mission file, `requirements`
-    those with another status, `loosened` the looser rules and declarations.
+    `changes` are the changed rows: first the newly failing rows, then by erosion, the largest first. `unchanged` is
+    the number of other rows. `inputs` are the changed keys of the mission file, `requirements` the requirements whose
+    status changed, and `loosened` the rules and declarations that became looser.
     """
 
     before: MissionFindings
@@ -481,11 +489,11 @@ class MissionChange(NamedTuple):
     loosened: tuple[Loosened, ...] = ()
 
     def broken(self, tolerated: float) -> list[Change]:
-        """Changes of rows that a gate refuses."""
+        """Changes of rows that a gate refuses if it tolerates the loss of a fraction `tolerated` of a margin."""
         return [change for change in self.changes if change.breaks(tolerated)]
 
     def refusals(self, gate: Gate) -> list[Refusal]:
-        """Refused rows, requirements and loosened rules, including those that the gate lets through."""
+        """Refusals of rows, requirements and loosened rules, including the ones that the gate lets through."""
         return [gate.refusal(id, words, self.after.file) for id, words in self._refused(gate.tolerated)]
 
     def _refused(self, tolerated: float) -> Iterator[tuple[str, str]]:
@@ -502,8 +510,8 @@ class MissionChange(NamedTuple):
 class ChangeSet(NamedTuple):
     """The effects of a change on all missions of a run.
 
-    `gone` are mission files that the change removes, `new` those that it adds, `settings` loosened settings of the
-    project, and `outside` files outside of the repository, which have only one version.
+    `gone` are the mission files that the change removes, `new` the mission files that it adds, and `settings` the
+    loosened settings of the project. `outside` are files outside of the repository, which have only one version.
     """
 
     missions: tuple[MissionChange, ...]
@@ -513,12 +521,12 @@ class ChangeSet(NamedTuple):
     outside: tuple[str, ...] = ()
 
     def refusals(self, gate: Gate) -> list[Refusal]:
-        """Refusals that belong to no compared mission: removed mission files and loosened settings."""
+        """Refusals that concern no compared mission: removed mission files and loosened settings."""
         refusals = [gate.refusal(file, "the mission file is gone", file) for file in self.gone]
         return refusals + [gate.refusal(loosened.id, loosened.words, "pyproject.toml") for loosened in self.settings]
 
     def is_refused(self, gate: Gate) -> bool:
-        """Whether a gate refuses a change that it does not let through."""
+        """Whether the gate refuses at least one change that `--allow` does not let through."""
         return not all(refusal.is_allowed for refusal in self._all(gate))
 
     def unused(self, gate: Gate) -> list[str]:
@@ -534,7 +542,7 @@ class ChangeSet(NamedTuple):
 
 
 def compare(before: MissionFindings, after: MissionFindings) -> MissionChange:
-    """Compare two findings of a mission. Rows are paired by id."""
+    """Compare the findings of a mission before and after a change. Rows are paired by id."""
     old, new = ({row.id: row for row in findings.rows} for findings in (before, after))
     changes = [Change(row_id, old.get(row_id), new.get(row_id)) for row_id in {**old, **new}]
     changed = [change for change in changes if change.is_change]
@@ -553,7 +561,7 @@ def compare(before: MissionFindings, after: MissionFindings) -> MissionChange:
 
 
 def _requirements(before: MissionFindings, after: MissionFindings) -> Iterator[RequirementMove]:
-    """Requirements with another status than before."""
+    """Yield the requirements whose status changed."""
     old, new = ({each.key: each for each in findings.requirements} for findings in (before, after))
     for key, requirement in {**old, **new}.items():
         statuses = [judged[key].status if key in judged else None for judged in (old, new)]
@@ -562,7 +570,7 @@ def _requirements(before: MissionFindings, after: MissionFindings) -> Iterator[R
 
 
 def _is_newly_broken(before: str | None, after: str | None) -> bool:
-    """Whether a status became worse: from any other status to fail, or from a judged status to not evaluated."""
+    """Whether a status became worse: from another status to fail, or from any status except fail to not evaluated."""
     return (after == "fail" != before) or (after == "not_evaluated" and before not in ("fail", "not_evaluated"))
 
 

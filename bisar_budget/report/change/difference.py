@@ -1,4 +1,4 @@
-"""Effects of a change on missions, as text, Markdown or JSON `bisar-budget/diff/1`."""
+"""Write the effects of a change on missions as text, Markdown or JSON `bisar-budget/diff/1`."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -39,7 +39,7 @@ def as_text(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False) ->
 
 
 def _run_sentences(comparison: ChangeSet, gate: Gate | None) -> list[str]:
-    """Sentences on new and removed missions, settings, files outside the repository, and unused `--allow`."""
+    """Sentences about new and removed missions, settings, files outside the repository, and unused `--allow`."""
     sentences = [f"{file}: new, there is nothing to compare it with" for file in comparison.new]
     if gate is None:
         sentences += [f"{file}: the mission file is gone" for file in comparison.gone]
@@ -55,7 +55,7 @@ def _refusals(change: MissionChange | ChangeSet, gate: Gate | None) -> list[Refu
 
 
 class _ChangeInWords(NamedTuple):
-    """A change in words: its kind, such as `input`, its name, and "before -> after" or the reason of a refusal."""
+    """A change as text: its kind, such as `input`, its name, and "before -> after" or the reason of a refusal."""
 
     kind: str
     name: str
@@ -73,7 +73,7 @@ _TITLE_OF_KIND = {
 
 
 def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_ChangeInWords]:
-    """Changes of inputs, geometry and requirements. Loosened rules follow if no gate lists them as refusals."""
+    """Yield the changes of inputs, geometry and requirements; without a gate, also the loosened rules."""
     for kind, moves in (("input", mission.inputs), ("geometry", mission.geometry)):
         for move in moves:
             values = f"{_value_text(move.before, move)} -> {_value_text(move.after, move)}"
@@ -87,7 +87,7 @@ def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_ChangeInWor
 
 
 def _refused(change: MissionChange | ChangeSet, gate: Gate | None) -> list[_ChangeInWords]:
-    """Refusals of a gate, those that it lets through included."""
+    """Refusals of a gate, including the ones that `--allow` lets through."""
     kinds = {False: "**refused**", True: "let through by --allow:"}
     return [
         _ChangeInWords(kinds[refusal.is_allowed], refusal.id, refusal.words) for refusal in _refusals(change, gate)
@@ -95,7 +95,7 @@ def _refused(change: MissionChange | ChangeSet, gate: Gate | None) -> list[_Chan
 
 
 def _blocks(changes: Iterable[_ChangeInWords]) -> Iterator[list[str]]:
-    """Blocks of lines, one for each kind of change, below a title."""
+    """Yield a block of lines for each kind of change; the first line is a title."""
     changes = list(changes)
     for kind, title in _TITLE_OF_KIND.items():
         texts = [printable(f"  {change.name}: {change.words}") for change in changes if change.kind == kind]
@@ -133,7 +133,7 @@ def _text(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[str
 
 
 def _shown(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[Change]:
-    """Changes of rows to show: changes of 1 % or more, and those that a gate refuses; or all of them."""
+    """Changes of rows to show: changes of 1 % or more and refused changes; all changes with `all_rows`."""
     refused = mission.broken(gate.tolerated) if gate is not None else []
     return [change for change in mission.changes if all_rows or not change.is_small or change in refused]
 
@@ -229,7 +229,7 @@ def _values(change: Change, field: str, mission: MissionChange) -> str:
 
 
 def as_json(comparison: ChangeSet, gate: Gate | None) -> str:
-    """Write `diff/1`. Keys may be added, never changed or removed."""
+    """Write the JSON document `diff/1`. Later versions may add keys, but never change or remove them."""
     content = {
         "tolerated_erosion": None if gate is None else gate.tolerated,
         "allow": [] if gate is None else list(gate.allowed),

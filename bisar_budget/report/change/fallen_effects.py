@@ -1,6 +1,7 @@
-"""Declared errors that do less to the image than before although neither part nor source changed by name.
+"""Find declared errors whose effect on the image decreased although their part and source have the same names.
 
-Both versions are held to the earlier geometry, waveform, aperture and requirements: what these change is no fall.
+Both versions are checked with the earlier geometry, waveform, aperture and requirements, so that a change of these
+does not count as a decrease.
 """
 
 import math
@@ -34,7 +35,7 @@ _ANY_DAY = date(2000, 1, 1)  # waivers decide no use of a limit
 
 @dataclass(frozen=True)
 class FallenEffect:
-    """A row that declares less than before, or uses less of its limit; `after` is None where it is gone."""
+    """A row with a smaller declared value or utilization than before; `after` is None if the row is gone."""
 
     before: Row
     after: Row | None
@@ -46,7 +47,7 @@ class FallenEffect:
 
     @property
     def words(self) -> tuple[str, str]:
-        """Use before and after; where a limit tells nothing, the declared sizes."""
+        """Text of the utilization before and after, or of the declared values if they cannot be compared."""
         if _tells(self.before, self.after):
             uses = [100 * (row.utilization or 0.0) if row else 0.0 for row in (self.before, self.after)]
             old, new = (percent(use / 100) for use in uses)
@@ -62,22 +63,25 @@ class FallenEffect:
 
 
 class NotComparable(NamedTuple):
-    """A key of the later errors that the earlier collection does not allow, and why: no effect can be compared."""
+    """A key of the later errors that is invalid in the earlier collection, and the reason.
+
+    With such a key no effect can be compared.
+    """
 
     id: str
     problem: str
 
     @property
     def words(self) -> tuple[str, str]:
-        """How effects are compared, and why these cannot be."""
+        """Two texts: how effects are compared, and why this effect cannot be compared."""
         return "effects compared in the earlier collection", f"not comparable, since there it {self.problem}"
 
 
 def fallen_effects(before: MissionFindings, after: MissionFindings) -> Sequence[FallenEffect | NotComparable]:
-    """List the rows whose declared effect fell while their part and their source kept their names.
+    """List the rows whose declared effect decreased although their part and source have the same names.
 
-    A sum counts only where no error fell that could explain it. Where the earlier collection does not allow the later
-    errors, their keys are listed instead: a gate passes nothing that it cannot compare.
+    Sums are listed only if the effect of no single error decreased. If the later errors are invalid in the earlier
+    collection, the invalid keys are listed instead, because a gate must not pass what it cannot compare.
     """
     mission = _held_alike(before, after)
     if mission is None:
@@ -96,7 +100,7 @@ def fallen_effects(before: MissionFindings, after: MissionFindings) -> Sequence[
 
 
 def _held_alike(before: MissionFindings, after: MissionFindings) -> Mission | None:
-    """The later errors in the earlier collection; None where that is the later mission."""
+    """Return the earlier mission with the errors of the later one; None if this equals the later mission."""
     old, new = (findings.analysed().mission for findings in (before, after))
     split = MetricSplits(before.allocation.qpe, before.allocation.pslr, before.allocation.islr)
     mission = new._replace(
@@ -121,9 +125,10 @@ def _held_alike(before: MissionFindings, after: MissionFindings) -> Mission | No
 
 
 def _flown_before(old: Platform, new: Platform, axes: SceneAxes | None) -> Platform:
-    """The later errors of a platform on its earlier path, whichever way the two files state paths.
+    """Return a platform with its earlier path and its later errors. The two files may state paths differently.
 
-    Errors along `ric` axes need the Earth's centre. Where the earlier file does not say it, it is that of the later.
+    Errors along `ric` axes need the direction from the Earth's centre. If the earlier file does not define this
+    direction, it is derived from the scene `axes` of the later file.
     """
     path = old.path or FlownPath(old.state)
     if path.state.radial is None and axes is not None:
@@ -132,7 +137,7 @@ def _flown_before(old: Platform, new: Platform, axes: SceneAxes | None) -> Platf
 
 
 def _misfits(mission: Mission) -> dict[KeyPath, str]:
-    """Keys of errors that do not go with the collection that they are held to, and why."""
+    """Return the keys of errors that are invalid in the collection of a mission, each with the reason."""
     problems = [(problem.at, problem.problem) for problem in Mission.problems(mission._asdict())]
     for name, platform in mission.platforms._asdict().items():
         problems += [
@@ -147,7 +152,11 @@ def _misfits(mission: Mission) -> dict[KeyPath, str]:
 
 
 def _errors(findings: MissionFindings, other: MissionFindings) -> list[Row]:
-    """Rows of declared errors; motion along other axes than before by the axes of the scene, which both have."""
+    """Return the rows of declared errors.
+
+    If the other findings state a motion error along different axes, only its rows along the axes of the scene are
+    returned, because both findings have these.
+    """
     ids = {row.id for row in other.rows}
     elsewhere = {(row.owner, row.subject.kind) for row in findings.rows if row.is_independent and row.id not in ids}
     rows = []
@@ -167,7 +176,7 @@ def _sums(findings: MissionFindings) -> list[Row]:
 
 
 def _falls(before: Sequence[Row], after: Sequence[Row]) -> Iterator[FallenEffect]:
-    """Rows that fell; numbered entries of one list are compared in the order of their effect, not of their number."""
+    """Yield the rows whose effect decreased. Numbered entries of a list are paired by effect, not by number."""
     now, then = defaultdict[tuple[str, ...], list[Row]](list), defaultdict[tuple[str, ...], list[Row]](list)
     for families, rows in ((then, before), (now, after)):
         for row in sorted(rows, key=_size, reverse=True):
@@ -183,12 +192,12 @@ def _size(row: Row) -> tuple[float, float]:
 
 
 def _tells(before: Row, after: Row | None) -> bool:
-    """Whether the use of a limit tells how the effect changed: neither row lacks it."""
+    """Whether the utilizations show how the effect changed: the earlier one is positive, the later one is known."""
     return bool(before.utilization) and (after is None or after.utilization is not None)
 
 
 def _is_less(before: Row, after: Row | None) -> bool:
-    """Whether a row is gone, uses less, or declares less where its use tells nothing."""
+    """Whether a row is gone or has a smaller utilization, or a smaller declared value if `_tells` is false."""
     if after is None:
         return before.declared != 0 or before.unit == "dB"
     sizes = (before.declared or 0.0, after.declared or 0.0)
@@ -200,7 +209,7 @@ def _is_less(before: Row, after: Row | None) -> bool:
 
 
 def _family(row: Row) -> tuple[str, ...]:
-    """Rows among which an error may move: entries of one list, which have a number each."""
+    """Key of the rows that are compared as a group: the numbered entries of one list, else the row alone."""
     subject = row.subject
     if subject.entry is None or subject.kind == "other":
         return (row.id,)
@@ -208,9 +217,10 @@ def _family(row: Row) -> tuple[str, ...]:
 
 
 def _named_anew(before: MissionFindings, after: MissionFindings) -> set[str]:
-    """Ids of rows that a source or a part stands behind which the earlier file does not name for them.
+    """Ids of rows whose later source or part is one that the earlier file does not name for them.
 
-    A key that is gone, or that overrides a part, names nothing: what its section names already stands behind the row.
+    A key that was removed, or that overrides a part, does not name a new source: the source or part that its section
+    names already applied to the row.
     """
     old = {row.id: row for row in before.rows}
     old_mission, mission = before.analysed().mission, after.analysed().mission
@@ -226,7 +236,7 @@ def _named_anew(before: MissionFindings, after: MissionFindings) -> set[str]:
 
 
 def _source(mission: Mission, row: Row) -> str:
-    """Plain name of what a row's figures are taken from; of the fixes of a log, its file."""
+    """Plain name of the source of a row's values; for a row about the fixes of a log, the name of the log file."""
     if row.subject.kind != "trajectory":
         return plain(row.evidence)
     path: FlownPath | None = getattr(mission.platforms, row.owner).path
@@ -234,7 +244,7 @@ def _source(mission: Mission, row: Row) -> str:
 
 
 def _is_named(source: str, mission: Mission, row: Row) -> bool:
-    """Whether a mission names a source for a row, or for the whole of its section, or a part of that name."""
+    """Whether a mission names `source` for a row or its whole section, or has overridden a part of that name."""
     if source in ("", _source(mission, row)):
         return True
     if row.owner not in PLATFORMS:
@@ -248,7 +258,7 @@ def _is_named(source: str, mission: Mission, row: Row) -> bool:
 
 
 def _parts(mission: Mission, row: Row) -> set[str]:
-    """Plain names of the parts that a row's figures are taken from."""
+    """Plain names of the catalogue parts that provide a row's values."""
     start = f"platforms.{row.owner}."
     keys = {taken.key: set(taken.key.split(".")) for taken in mission.taken if taken.key.startswith(start)}
     word = next(
@@ -258,7 +268,7 @@ def _parts(mission: Mission, row: Row) -> set[str]:
 
 
 def _sensors(mission: Mission, row: Row) -> set[str]:
-    """Plain names of the parts of a platform, whether a figure is taken from them or all are overridden."""
+    """Plain names of the catalogue parts of a row's platform, even if the file overrides all their values."""
     if row.owner not in PLATFORMS:
         return set()
     platform: Platform = getattr(mission.platforms, row.owner)

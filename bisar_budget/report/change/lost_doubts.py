@@ -1,8 +1,9 @@
-"""Doubts about paths that a change takes away although the declared errors stay.
+"""Find doubts about paths that a change removes although the declared errors stay the same.
 
-A path is in doubt by what its source states of itself, by the age and the interpolation of an orbit, by the noise of
-a log. Newer elements and better logs end such a doubt; a key that takes it away does not, nor does a source that
-states less of itself under the same name.
+A path is in doubt if its source may have a larger error than the file declares: because of the accuracy that the
+source states, the age and interpolation of an orbit, or the noise of a log. Newer orbital elements or a better log
+resolve a doubt. A changed key that only suppresses the doubt does not resolve it, and neither does a source with the
+same name that now states a smaller error.
 """
 
 from collections.abc import Iterator
@@ -20,7 +21,7 @@ _NOT_OF_FORM = ("object", "planned")  # keys of an orbit beside its source
 
 
 class LostDoubt(NamedTuple):
-    """A doubt of the earlier mission that the later one has no more: the key that took it away, before and after."""
+    """A doubt that only the earlier mission has: the key that removed it, and texts for before and after."""
 
     key: str
     before: str
@@ -28,7 +29,7 @@ class LostDoubt(NamedTuple):
 
 
 def lost_doubts(before: Mission, after: Mission) -> Iterator[LostDoubt]:
-    """List doubts of the earlier paths that the later declared errors do not cover, and that are gone."""
+    """Yield the doubts about the earlier paths that the later mission lacks although its errors do not cover them."""
     doubts = {_name(doubt) for doubt in input_doubts(before)}
     if not doubts:
         return
@@ -55,7 +56,7 @@ def _words(doubt: InputDoubt) -> str:
 
 
 def _takes(doubt: InputDoubt, old: Platform, new: Platform) -> Iterator[tuple[str, str]]:
-    """Keys that take a doubt away, and how; none where it is another source, or a better one."""
+    """Yield the keys that suppress a doubt, each with the reason; nothing if the path has another or better source."""
     was, now = old.path, new.path
     if was is None:
         return
@@ -73,9 +74,9 @@ def _takes(doubt: InputDoubt, old: Platform, new: Platform) -> Iterator[tuple[st
 
 
 def _is_same_source(old: Platform, new: Platform) -> bool:
-    """Whether a path is taken from what had the same name; a format, a folder or an ending is no name.
+    """Whether a path has a source with the same name as before. Format, folder and file ending are ignored.
 
-    A choice within a file that only one version makes is no other source: the other version has no choice to make.
+    A choice within the file, such as its object or track, counts only if both versions make it.
     """
     return _files(old) == _files(new) and all(
         plain(was) == plain(now) for was, now in zip(_chosen(old), _chosen(new), strict=True) if was and now
@@ -83,33 +84,33 @@ def _is_same_source(old: Platform, new: Platform) -> bool:
 
 
 def _files(platform: Platform) -> tuple[str, ...]:
-    """Plain names of the file of a path, and of the one that states its accuracy."""
+    """Plain names of two files: the file of a path, and the file that states its accuracy."""
     path = platform.path
     return () if path is None else (plain_file(path.file), plain_file(path.accuracy and path.accuracy[0]))
 
 
 def _chosen(platform: Platform) -> list[str]:
-    """Choices of a path within its file; empty texts for choices that it does not make."""
+    """Values of the keys that select a source within a file, such as `track`; empty texts for missing keys."""
     choices = [getattr(getattr(platform, platform.way), choice, None) for choice in _CHOICES]
     return ["" if choice is None else str(choice) for choice in choices]
 
 
 def _key(platform: Platform) -> str:
-    """Key that names the file of a path."""
+    """Key that states the source of a path, within the section of its platform: the kind of path and the format."""
     stated = getattr(platform, platform.way)
     form = next(key for key in stated._fields if key not in _NOT_OF_FORM and getattr(stated, key) is not None)
     return f"{platform.way}.{form}"
 
 
 def _is_sourced_anew(doubt: InputDoubt, old: Platform, new: Platform) -> bool:
-    """Whether the declared error has another source, by its name."""
+    """Whether the declared error now names a source that it did not name before."""
     named = plain(new.motion_error.evidence(doubt.kind))
     error = old.motion_error
     return named not in ("", plain(error.source), plain(error.evidence(doubt.kind)))
 
 
 def _changed(was: FlownPath, now: FlownPath) -> Iterator[str]:
-    """Files with other contents than before."""
+    """Yield the files of a path whose contents changed."""
     if now.file is not None and was.sha256 != now.sha256:
         yield now.file
     if now.accuracy is not None and was.accuracy is not None and was.accuracy[1] != now.accuracy[1]:

@@ -1,4 +1,4 @@
-"""Names of sources, parts and files as two versions of a mission write them, without what only looks different."""
+"""Normalize names of sources, parts and files, so that different spellings in two versions compare equal."""
 
 import os
 import re
@@ -9,9 +9,9 @@ _NO_LETTER = re.compile(r"[\W_]+")
 
 
 def plain(name: str | None) -> str:
-    """Letters and digits of a name, alike where blanks, case, accents or punctuation differ; empty for none.
+    """Reduce a name to its letters and digits in lower case, without accents; None gives an empty text.
 
-    What stands between digits stays, as a point: revision 1.1 is not revision 11.
+    Blanks or punctuation between two digits become a point, so that revision 1.1 differs from revision 11.
     """
     letters = "".join(one for one in unicodedata.normalize("NFKD", name or "") if not unicodedata.combining(one))
     visible = "".join(one for one in letters.casefold() if unicodedata.category(one) != "Cf")
@@ -19,5 +19,5 @@ def plain(name: str | None) -> str:
 
 
 def plain_file(name: str | None) -> str:
-    """The same of a file, without its folder and its ending: a copy elsewhere is no other source."""
+    """Reduce the name of a file as `plain` does, without folder and ending, so that a moved copy keeps its name."""
     return plain(os.path.splitext(os.path.basename(name or ""))[0])

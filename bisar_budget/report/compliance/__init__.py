@@ -1,1 +1,1 @@
-"""The compliance report: its content as blocks, which are written as a page and as Markdown."""
+"""The compliance report. Its content is a list of blocks, which are written as an HTML page or as Markdown."""

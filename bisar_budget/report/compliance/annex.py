@@ -1,4 +1,4 @@
-"""The annex of a compliance report: sweep, images and draws as requested, and all rows with `--detail full`."""
+"""The annex of a compliance report: sweep, images and Monte Carlo if requested; all rows with `--detail full`."""
 
 import math
 from collections import Counter
@@ -52,7 +52,7 @@ _SOURCED = (
 
 
 def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
-    """The annex of a mission as one chapter; no chapter if there is nothing beyond the summary."""
+    """Return the annex of a mission as a list with one chapter; an empty list if the summary shows everything."""
     findings = page.findings
     sections = [] if findings.study is None else [_studied(page, findings.study)]
     if findings.sheet is not None:
@@ -77,7 +77,7 @@ def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
 
 # ---------------------------------------------------------------------- specifications
 def _specified(page: Page, sheet: SpecificationSheet) -> Iterator[doc.Block]:
-    """The sheet of the specified errors, with the number of declared sizes that exceed it."""
+    """Yield the specification sheet of a mission, with the number of declared sizes above their specification."""
     outside = sum(spec.declared is not None and not spec.holds(spec.declared) for spec in sheet.specifications)
     silent = sum(spec.declared is None and spec.ordered is not None for spec in sheet.specifications)
     clauses = list[str]()
@@ -93,7 +93,7 @@ def _specified(page: Page, sheet: SpecificationSheet) -> Iterator[doc.Block]:
 
 # ---------------------------------------------------------------------- a sweep
 def _studied(page: Page, study: TradeStudy) -> doc.Chapter:
-    """The question of a sweep, the command that reproduces its cases, and the result as a drawing and a table."""
+    """Return the chapter of a sweep: its question, the command that reproduces it, a drawing and a table."""
     findings, trade = page.findings, study.trade
     by_word = per_word(trade)
     counts, question = _counts(study), _question(trade)
@@ -139,7 +139,7 @@ def _question(trade: Trade) -> str:
 
 
 def _values(axis: Axis) -> str:
-    """Values of an axis in words."""
+    """Describe the values of an axis: the words, or the number of values with the first and the last."""
     count = len(axis.values)
     if axis.words:
         word_list = ", ".join(map(printable, axis.words[:_MAX_LISTED_WORDS]))
@@ -167,7 +167,7 @@ def _counts(study: TradeStudy) -> str:
 
 
 def _command(findings: MissionFindings, study: TradeStudy, file: str) -> str:
-    """The command that writes the cases as a table and a plot."""
+    """Write the command line that repeats the sweep and writes its cases as a table and a plot."""
     analysed = findings.analysed().mission
     words = ["bisar-budget sweep", quote(printable(file))]
     words += [f"--vary {quote(printable(text))}" for text in study.asked]
@@ -178,10 +178,10 @@ def _command(findings: MissionFindings, study: TradeStudy, file: str) -> str:
 
 
 def _stretches(trade: Trade) -> Iterator[tuple[doc.Line, str]]:
-    """Lines of a sweep along one axis, each with its sentence.
+    """Yield the table lines of a sweep over one axis, each with a sentence about it.
 
-    Neighbouring values with the same status and the same worst row share a line; words have a line each. The binding
-    requirement follows the name of the row, unless the name ends with it.
+    Neighbouring values with the same status and the same worst row share a line; each word has its own line. The
+    binding requirement follows the name of the row, unless the name ends with it.
     """
     (axis,) = trade.axes
     status, rows, uses = (trade.values[name] for name in ("status", "worst_row", "utilization"))
@@ -198,7 +198,7 @@ def _stretches(trade: Trade) -> Iterator[tuple[doc.Line, str]]:
 
 
 def _uses(uses: NumbersOrWords) -> str:
-    """Range of the finite utilizations, from the lowest to the highest."""
+    """Text of the range of the finite utilizations, from the lowest to the highest; a dash if there is none."""
     finite_uses = sorted(float(use) for use in uses if math.isfinite(use))
     if not finite_uses:
         return "–"
@@ -207,7 +207,11 @@ def _uses(uses: NumbersOrWords) -> str:
 
 
 def _binding_lines(trade: Trade, by_word: Mapping[str, Trade]) -> Iterator[tuple[doc.Line, str]]:
-    """Lines of a sweep along two axes, each with its sentence: cases by word, or by worst row, most cases first."""
+    """Yield the table lines of a sweep over two axes, each with a sentence about it.
+
+    Each line counts the cases of a word. Without words, it counts the cases of a worst row; the line with the most
+    cases comes first.
+    """
     cases: dict[str, Mapping[str, NumbersOrWords]] = {printable(word): each.values for word, each in by_word.items()}
     if not by_word:
         values = {name: trade.values[name].ravel() for name in ("status", "worst_row", "utilization")}
@@ -227,7 +231,7 @@ def _binding_lines(trade: Trade, by_word: Mapping[str, Trade]) -> Iterator[tuple
 
 # ---------------------------------------------------------------------- images
 def _evidence(page: Page) -> Iterator[doc.Block]:
-    """Measurements in images at the limits, beside the predictions."""
+    """Yield the chapter blocks that compare image measurements at the limits with the predictions."""
     verdicts = page.findings.verdicts or ()
     yield doc.Paragraph(
         "Each error was set to its limit in data simulated from exact ranges, and the phase was measured in the "
@@ -276,7 +280,7 @@ def _heads(*heads: str) -> list[doc.Head]:
 
 
 def _images(page: Page, evidence: ImageEvidence, number: int) -> doc.Group:
-    """Images at a limit, and cuts through them."""
+    """Return the images of a row at its limit, with the cuts through them."""
     row_id = evidence.verdict.id
     subject = f"{row_id} at the limit with autofocus"
     point_images = [("limit", f"{row_id} at the limit", "At the limit", evidence.at_limit)]
@@ -300,7 +304,7 @@ def _images(page: Page, evidence: ImageEvidence, number: int) -> doc.Group:
 
 
 def _page_size(image: PointImage) -> tuple[int, int]:
-    """Width and height on a page, at most 240 px each. [px]"""
+    """Width and height of an image on a page, at most 240 px each. [px]"""
     width, height = chip_size(image)
     shrink = max(1.0, width / 240, height / 240)
     return max(1, round(width / shrink)), max(1, round(height / shrink))
@@ -308,7 +312,10 @@ def _page_size(image: PointImage) -> tuple[int, int]:
 
 # ---------------------------------------------------------------------- draws
 def _draws(page: Page, drawn: MonteCarlo) -> Iterator[doc.Block]:
-    """Table of the probability of each requirement, beside sums that need no draws."""
+    """Yield the Monte Carlo table: the probability of each requirement, and sums for comparison.
+
+    Remarks follow the table.
+    """
     lines: list[doc.Line] = []
     for requirement in drawn.requirements:
         sizes = (
@@ -343,7 +350,7 @@ def _draws(page: Page, drawn: MonteCarlo) -> Iterator[doc.Block]:
 
 # ---------------------------------------------------------------------- all rows
 def _rows(page: Page) -> Iterator[doc.Block]:
-    """Rows and contributions beyond the summary, with the remarks of all rows."""
+    """Yield the rows and contributions that the summary leaves out, and the remarks of all rows."""
     if page.hidden:
         yield matrix_table(page, page.hidden, f"Other rows of {page.name}", "Rows that are not in the summary")
     if page.undeclared and page.matrix:
@@ -354,7 +361,7 @@ def _rows(page: Page) -> Iterator[doc.Block]:
 
 
 def sources(findings: MissionFindings) -> tuple[dict[str, list[str]], list[str]]:
-    """Ids of rows by the source of their error in the file, and ids of rows that lack a source."""
+    """Map each source in the file to the ids of its rows, and list the ids of rows that lack a source."""
     by_source: dict[str, list[str]] = {}
     unsourced = []
     for row in findings.rows:
@@ -381,7 +388,7 @@ def _sources(page: Page) -> Iterator[doc.Block]:
 
 
 def _formulas(page: Page) -> Iterator[doc.Block]:
-    """Derivations of all rows with their numbers, then the general formulas."""
+    """Yield the derivations of all rows with their numbers, and then the general formulas."""
     findings = page.findings
     mission = page.mission._replace(file=page.file)  # every section writes the same path
     yield doc.Paragraph(

@@ -21,7 +21,7 @@ class Name:
 
 @dataclass(frozen=True, slots=True)
 class Styled:
-    """Text with a class of the style sheet. If it fills a cell, the cell has the class.
+    """Text with a class of the style sheet. If the text fills a table cell, the cell gets the class.
 
     Markdown puts text of the classes `own-id` and `origin` in brackets.
     """
@@ -32,7 +32,7 @@ class Styled:
 
 @dataclass(frozen=True, slots=True)
 class Badge:
-    """The word of a status, or of the verdict of an image, with its mark and colour."""
+    """A status, or a verdict from an image, shown as a word with a mark and a colour."""
 
     status: str
 
@@ -44,7 +44,7 @@ class Badge:
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """A bar of a utilization with a mark at the limit; without a utilization it is empty."""
+    """A bar that shows a utilization, with a mark at the limit; without a utilization the bar is empty."""
 
     fraction: float | None
     status: str
@@ -52,7 +52,7 @@ class Use:
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """A bar of a fraction of the whole, in the colour of its owner."""
+    """A bar that shows a fraction of the whole, in the colour of its owner."""
 
     fraction: float
     owner: str
@@ -60,7 +60,7 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class Swatch:
-    """Colour key of an owner's share in a `Stack`. Markdown has no stack and shows a bar."""
+    """Colour key for an owner's share in a `Stack`. Markdown cannot show a stack, so it shows a bar instead."""
 
     owner: str
     fraction: float
@@ -78,7 +78,7 @@ Line = Sequence[Text]
 
 
 def listed(names: Sequence[str]) -> Text:
-    """Names with commas between them."""
+    """Join names with commas."""
     texts: list[Text] = []
     for name in names:
         texts += [", ", Name(name)] if texts else [Name(name)]
@@ -88,7 +88,7 @@ def listed(names: Sequence[str]) -> Text:
 # ---------------------------------------------------------------------- blocks
 @dataclass(frozen=True, slots=True)
 class Paragraph:
-    """Sentences. A paragraph that ends with a colon introduces the table below it.
+    """A paragraph of sentences. If it ends with a colon, it introduces the table below it.
 
     `style` is a class of the style sheet: classes that begin with `verdict` mark verdicts, `command` marks a command
     to copy.
@@ -100,7 +100,7 @@ class Paragraph:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """Pairs of a name and a value. A pair without a name has the name of the pair before it."""
+    """A list of names with values. A pair without a name belongs to the name before it."""
 
     pairs: Sequence[tuple[Text, Text]]
     style: str = "facts"
@@ -108,7 +108,7 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Items:
-    """A list, with the paragraphs of each item; numbered if the order matters."""
+    """A list whose items have one or more paragraphs; numbered if the order matters."""
 
     items: Sequence[Sequence[Text]]
     style: str = "remarks"
@@ -124,18 +124,18 @@ class Head:
 
 
 def heads(*heads: Head | str) -> list[Head]:
-    """Heads of columns. A plain text is the head of a column of text."""
+    """Make a list of column heads. A plain text becomes the head of a column of text."""
     return [Head(head) if isinstance(head, str) else head for head in heads]
 
 
 def numbers(*heads: str) -> list[Head]:
-    """Heads of columns of numbers."""
+    """Make the heads of columns of numbers."""
     return [Head(head, "number") for head in heads]
 
 
 @dataclass(frozen=True, slots=True)
 class TextTable:
-    """A table of text, whose first cell in each row is the name of the row.
+    """A table of text. The first cell of each row is the name of the row.
 
     `label` is the accessible name of the scrolling region around the table. A narrow table has no label.
     """
@@ -149,7 +149,7 @@ class TextTable:
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """A bar of the whole budget, divided into shares: owner, fraction and words of each. Markdown leaves it out."""
+    """A bar of the whole budget, divided into shares with owner, fraction and text. Markdown leaves it out."""
 
     label: str
     shares: Sequence[tuple[str, float, str]]
@@ -159,7 +159,7 @@ class Stack:
 class Figure:
     """A drawing: `name` of its file, `anchor` of its mission, title, accessible label and SVG.
 
-    `is_told` is whether the text beside the drawing describes it.
+    `is_told` is True if the text beside the drawing describes it.
     """
 
     name: str
@@ -191,7 +191,7 @@ class Images:
 
 @dataclass(frozen=True, slots=True)
 class Equality:
-    """A general formula that belongs to no row: both sides, by their names in the catalogue."""
+    """A general formula that belongs to no row. Both sides are names in the catalogue."""
 
     left: str
     right: str
@@ -199,7 +199,7 @@ class Equality:
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """Steps of a derivation, or other formulas with their titles."""
+    """The steps of a derivation, or other formulas with titles."""
 
     label: str
     steps: Sequence[tuple[str, Sequence[WorkedEquation | str | Equality]]]
@@ -208,7 +208,7 @@ class Steps:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Blocks that a page lays out together, below an optional heading."""
+    """Blocks that are placed together on a page, below an optional heading."""
 
     style: str
     blocks: Sequence["Block"]
@@ -217,7 +217,7 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Chapter:
-    """Blocks below a heading. `short` is its title in the contents, `anchor` the target of links to it."""
+    """A chapter: blocks below a heading. `short` is the title in the contents, `anchor` the target of links."""
 
     title: Text
     blocks: Sequence["Block"]
@@ -234,7 +234,7 @@ Block = Paragraph | Facts | Items | TextTable | Stack | Figure | Images | Steps 
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """Texts in the margins of a mission's printed pages: name, document, and digest or path of the file."""
+    """Texts in the page margins when a mission is printed: name, document, and digest or path of the file."""
 
     anchor: str
     name: str
@@ -244,7 +244,7 @@ class Margins:
 
 @dataclass(frozen=True, slots=True)
 class Compliance:
-    """A report. `subject` is the name of the mission or the number of missions, `title` the kind of report."""
+    """A whole report. `subject` is the name of the mission or the number of missions, `title` the kind of report."""
 
     version: str
     subject: str
@@ -255,7 +255,7 @@ class Compliance:
 
 
 def blocks_of(block: Compliance | Block) -> Iterator[Block]:
-    """All blocks within a report or a block, in order, nested blocks included."""
+    """Yield all blocks of a report or a block in order, including nested blocks."""
     inner: Sequence[Block] = ()
     if isinstance(block, Compliance):
         inner = block.chapters

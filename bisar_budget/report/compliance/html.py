@@ -28,7 +28,7 @@ _SHARE_ATTRIBUTES = _BAR_ATTRIBUTES.format(100)
 
 @cache
 def _page() -> Template:
-    """Template of the page, a file of `resource("templates")`. Its compilation takes as long as a check."""
+    """Load the template of the page from `resource("templates")`. Compiling it takes as long as a check."""
     environment = Environment(
         loader=FileSystemLoader(resource("templates")),
         autoescape=True,
@@ -60,7 +60,7 @@ def page(document: doc.Compliance) -> str:
 
 
 def _css_string(text: str) -> Markup:
-    """A string of a style sheet. Characters other than ASCII letters, digits and blanks become their numbers."""
+    """Write a CSS string. Characters other than ASCII letters, digits and blanks become numeric escapes."""
     safe = (c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in printable(text))
     return Markup(f'"{"".join(safe)}"')
 
@@ -144,7 +144,7 @@ def _element(tag: str, style: str, content: Markup) -> Markup:
 
 
 def _scroll(label: str, content: Markup) -> Markup:
-    """A region with keyboard focus, in which content wider than the page scrolls."""
+    """Wrap content in a region that can have the keyboard focus and scrolls if the content is wider than the page."""
     region = '<div class="scroll" tabindex="0" role="region" aria-label="{}">{}</div>'
     return Markup(region).format(printable(label), content)
 
@@ -168,7 +168,7 @@ def _chapter(chapter: doc.Chapter) -> Markup:
 
 
 def _cell(tag: str, text: doc.Text, style: str = "", scope: str = "") -> Markup:
-    """An element of a table or a list of facts. The style of its text becomes the style of the element."""
+    """Write an element of a table or a list of facts. The element gets the style of its text."""
     if isinstance(text, doc.Styled):
         style, text = text.style, text.text
     scoped = Markup(' scope="{}"').format(scope) if scope else ""
@@ -210,7 +210,7 @@ def _stack(stack: doc.Stack) -> Markup:
 
 
 def _inline(figure: doc.Figure) -> Markup:
-    """A drawing within the page. Its ids begin with the anchor, since a report may contain a mission twice."""
+    """Inline a drawing. The anchor is put before its ids, because a report may contain a mission twice."""
     return Markup(re.sub(r'\b(id|aria-labelledby|aria-describedby)="', rf'\1="{figure.anchor}-', figure.svg))
 
 
@@ -220,7 +220,7 @@ def _step(title: str, equations: Iterable[WorkedEquation | str | doc.Equality], 
 
 
 def _equation(equation: WorkedEquation | str | doc.Equality) -> Markup:
-    """An equation or text of a step: a formula as MathML, arithmetic and words as text."""
+    """Write an item of a step: a formula as MathML, arithmetic and words as text."""
     if isinstance(equation, doc.Equality):
         sides = (notation.catalogued(side, notation.MATHML) for side in (equation.left, equation.right))
         formula = notation.math("<mrow>{}<mo>=</mo>{}</mrow>".format(*sides))

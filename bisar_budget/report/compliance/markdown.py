@@ -24,7 +24,7 @@ def as_markdown(report: Report, style: Style) -> str:
 
 
 def markdown_document(document: doc.Compliance, assets: str) -> str:
-    """Write a document. `assets` is the folder of its drawings; empty: without drawings."""
+    """Write a document. `assets` is the folder of its drawings; if empty, the document has no drawings."""
     subject = "Motion-measurement error budget, bistatic SAR."
     texts = [f"# {document.title}", subject, *_blocks([document.facts, *document.chapters], assets)]
     return "\n\n".join(text.rstrip("\n") for text in texts if text) + "\n"
@@ -65,26 +65,26 @@ def _text(text: doc.Text, badge: str = "**{}**") -> str:
 
 
 def _inside(text: doc.Text, badge: str) -> str:
-    """Text of a fragment of a line. Leading spaces stay, and escapes apply to the text after them."""
+    """Write a part of a line. Leading spaces are kept, and the text after them is escaped."""
     if isinstance(text, str):
         return " " * (len(text) - len(text.lstrip(" "))) + _text(text.lstrip(" "))
     return _text(text, badge)
 
 
 def _bar(fraction: float) -> str:
-    """A bar of characters for a fraction of the whole."""
+    """Draw a fraction of the whole as a bar of characters."""
     return ("█" * round(_BAR_WIDTH * fraction)).ljust(_BAR_WIDTH, "░")
 
 
 def _use(fraction: float) -> str:
-    """A bar of characters with a mark at the limit. A use beyond its end has an arrow."""
+    """Draw a utilization as a bar of characters with a mark at the limit, and an arrow if it is beyond the end."""
     bar = _bar(min(1.0, fraction * _LIMIT_WIDTH / _BAR_WIDTH))
     return f"{bar[:_LIMIT_WIDTH]}┃{bar[_LIMIT_WIDTH:]}{'▶' if fraction > _BAR_WIDTH / _LIMIT_WIDTH else ''}"
 
 
 # ---------------------------------------------------------------------- blocks
 def _blocks(blocks: Iterable[doc.Block], assets: str) -> Iterator[str]:
-    """Texts of blocks, to be separated by blank lines."""
+    """Yield the text of each block. The caller puts blank lines between the texts."""
     is_introduced = False
     for block in blocks:
         yield from _block(block, assets, is_introduced)
@@ -152,7 +152,7 @@ def _table(table: doc.TextTable) -> str:
 
 
 def _formulas(equations: Iterable[WorkedEquation | str | doc.Equality]) -> Iterator[str]:
-    """A block of LaTeX for each formula, and lists of the texts between formulas."""
+    """Yield a LaTeX block for each formula, and a list for the texts between formulas."""
     lines: list[str] = []
     for equation in equations:
         if latex := _latex(equation):

@@ -1,4 +1,4 @@
-"""The rows of a mission in a report: the compliance matrix, and the contributions to phase and displacement."""
+"""Tables about the rows of a mission: the compliance matrix, and contributions to phase and displacement."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -34,10 +34,10 @@ _MAX_MATRIX_ROWS = 40  # of a summary; the annex has further rows, which use les
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Page:
-    """Findings about a mission, as the sections of its report share them.
+    """The findings about a mission that all sections of its report use.
 
-    `file` is the path of the mission file on the page, `anchor` identifies the mission within the report. `matrix`
-    are all rows except errors that are not declared, worst first. `in_summary` are the ids of the rows that a summary
+    `file` is the path of the mission file as the report shows it. `anchor` identifies the mission within the report.
+    `matrix` are all rows except undeclared errors, worst first. `in_summary` are the ids of the rows that a summary
     shows.
     """
 
@@ -52,7 +52,7 @@ class Page:
 
     @property
     def mission(self) -> Mission:
-        """The mission file, as it was read."""
+        """The mission as it was read from its file."""
         return self.analysis.mission
 
     @property
@@ -77,12 +77,12 @@ class Page:
 
 
 def page_of(findings: MissionFindings, style: Style, anchor: str) -> Page:
-    """Page of a mission.
+    """Return the page of a mission.
 
     Raises
     ------
     ValueError
-        The findings do not carry their analysis.
+        The findings do not contain their analysis.
     """
     rows = worst_first(findings.rows)
     important = [row for row in rows if matters(row)]
@@ -104,7 +104,7 @@ def page_of(findings: MissionFindings, style: Style, anchor: str) -> Page:
 
 # ---------------------------------------------------------------------- matrix
 def matrix_table(page: Page, rows: Iterable[Row], label: str, caption: str) -> doc.TextTable:
-    """Compliance matrix of some of the rows of a page."""
+    """Compliance matrix with the given rows of a page."""
     numbers = {row.id: number for number, row in enumerate(page.matrix, start=1)}
     verdicts = {verdict.id: verdict.verdict for verdict in page.findings.verdicts or ()}
     sizes = doc.numbers("Utilization", "Declared", "Allowable", "Margin")
@@ -144,7 +144,7 @@ def undeclared_table(page: Page) -> doc.TextTable:
 
 
 def grouped(row_texts: Iterable[tuple[str, Sequence[str]]]) -> doc.Facts | None:
-    """Texts of rows, with the ids of all rows that share a text; None without a text."""
+    """Group rows by text: each text once, with the ids of all its rows; None if no row has a text."""
     groups: dict[str, list[str]] = {}
     for row_id, texts in row_texts:
         if texts:
@@ -154,20 +154,20 @@ def grouped(row_texts: Iterable[tuple[str, Sequence[str]]]) -> doc.Facts | None:
 
 
 def all_remarks(page: Page) -> Iterator[tuple[str, Sequence[str]]]:
-    """Remarks of each row of the matrix, besides its numbers."""
+    """Yield the id and the remarks of each row of the matrix."""
     for row in page.matrix:
         yield row.id, [text for text in (row.reason, *row.remarks, *row.refuted) if text]
 
 
 def limit_words(value: float, unit: str) -> str:
-    """Write a limit rounded down. All limits of a page are written by this function."""
+    """Write a limit, rounded down to three digits. All limits of a page are written by this function."""
     return format_quantity(value, unit, 3, "down")
 
 
 def margin(row: Row) -> str:
-    """Write the margin, allowable over declared less one, or the difference of levels, rounded down.
+    """Write the margin of a row: allowable/declared − 1 in percent, or the difference of levels in dB.
 
-    From 1000 % on, write the ratio of allowable and declared.
+    It is rounded down. Above 1000 %, the ratio allowable/declared is written instead.
     """
     if row.margin is None:
         return "–"
@@ -185,13 +185,13 @@ def margin(row: Row) -> str:
 
 
 def _down(value: float) -> float:
-    """Round down to three digits. A tolerance of one part in 10¹² keeps exact numbers."""
+    """Round down to three digits, with a tolerance of one part in 10¹² so that exact numbers stay the same."""
     step = 2 - math.floor(math.log10(abs(value)))
     return math.floor(value * 10.0**step * (1 + math.copysign(1e-12, value))) / 10.0**step if step < 300 else value
 
 
 def source_of_limit(page: Page, row: Row) -> str:
-    """Requirement that sets the allowable of a row, in words."""
+    """Text about the requirement that sets the allowable of a row."""
     findings, requirements, allocation = page.findings, page.mission.requirements, page.findings.allocation
     binding = row.binding_requirement if row.metric == "quadratic_phase_error" else row.metric
     if binding in ("pslr", "islr"):
@@ -225,7 +225,7 @@ def source_of_limit(page: Page, row: Row) -> str:
 
 
 def method(row: Row, verdict: str | None) -> str:
-    """Verification of a row: by analysis, and by simulation if its image was formed."""
+    """Text on how a row was verified: by analysis, and also by simulation if its image was formed."""
     analysis = f"analysis: {row.equation}"
     if verdict is None:
         return analysis
@@ -235,9 +235,10 @@ def method(row: Row, verdict: str | None) -> str:
 # ---------------------------------------------------------------------- contributions
 @dataclass(frozen=True, slots=True)
 class Contribution:
-    """Effect of one declared error, of size `fraction` relative to the largest effect.
+    """Effect of one declared error. `fraction` is its size relative to the largest effect.
 
-    `model_cells` are further cells for a phase: its share of the sum, its values by the published and the full model.
+    `model_cells` are more table cells for a phase: its share of the sum, and its values by the published and the full
+    model.
     """
 
     id: str
@@ -254,15 +255,15 @@ class Contribution:
 
     @property
     def axis(self) -> str:
-        """Axis or term of the error."""
+        """Axis of the error, or term of a clock error."""
         return "height" if self.subject.kind == "terrain" else self.subject[3].replace("_", " ")
 
 
 def phase_contributions(page: Page) -> list[Contribution]:
-    """Quadratic phase errors of equal loss of the errors of the file, largest first.
+    """Contributions of the declared errors to the quadratic phase (of equal peak loss), largest first.
 
-    Each has its share of the sum and its values by both models. An error without an image has an infinite phase: it
-    comes first, and no error then has a share of the sum.
+    Each contribution has its share of the sum and its values by both models. An error without an image has an
+    infinite phase. It comes first, and no error then has a share of the sum.
     """
     by_model: dict[str, dict[str, float]] = {}
     for model in ("published", "full"):
@@ -289,7 +290,7 @@ def _phase(value: float, findings: MissionFindings) -> str:
 
 
 def displacement_contributions(page: Page) -> list[Contribution]:
-    """Displacements of the image by the errors of the file, largest first."""
+    """Displacements of the image by the declared errors, largest first."""
     displacements = {row.id: row.displacement_m for row in page.findings.rows}
     subjects = [error.subject for error in page.analysis.stated]
     subjects += [error.subject for error in page.analysis.random if error.declared is not None]
@@ -305,7 +306,7 @@ def displacement_contributions(page: Page) -> list[Contribution]:
 
 
 def largest_contributions(page: Page) -> Iterator[doc.Block]:
-    """Tables of the errors with the largest phases and with the largest displacements."""
+    """Yield two tables: the errors with the largest phases, and the errors with the largest displacements."""
     by_phase, by_displacement = phase_contributions(page), displacement_contributions(page)
     phase_caption = "Quadratic phase error of each declared error, before autofocus"
     displacement_caption = "Displacement of the image by each declared error"
@@ -326,7 +327,7 @@ def largest_contributions(page: Page) -> Iterator[doc.Block]:
 
 
 def _largest(page: Page, contributions: Sequence[Contribution], name: str, head: str, caption: str) -> doc.TextTable:
-    """Table of the largest contributions to the phase or to the displacement."""
+    """Make the table of the largest contributions to the phase or to the displacement."""
     sum_heads = doc.numbers("Share of the sum") if any(error.model_cells for error in contributions) else []
     size = doc.Head(head, "number")
     columns = doc.heads("Owner", "Kind", "Axis or term", size, "Relative to the largest", *sum_heads)
@@ -347,7 +348,7 @@ def _largest(page: Page, contributions: Sequence[Contribution], name: str, head:
 
 
 def all_contributions(page: Page) -> Iterator[doc.Block]:
-    """Tables of all errors that have a phase, and of all that displace the image."""
+    """Yield two tables: all errors with a quadratic phase, and all errors that displace the image."""
     models = ("Deciding model", "Share of the sum", "Published", "Full")
     for contributions, title, heads, caption in (
         (

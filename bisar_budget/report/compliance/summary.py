@@ -92,12 +92,12 @@ _COMBINATION_SENTENCES = {
 
 
 def compliance(report: Report, style: Style) -> doc.Compliance:
-    """Compliance report of a run, as a document.
+    """Make the compliance report of a run as a document.
 
     Raises
     ------
     ValueError
-        Findings do not carry their analysis.
+        Findings do not contain their analysis.
     """
     count = len(report.missions)
     index: list[doc.Line] = []
@@ -138,15 +138,15 @@ _WAIVED = (
 
 
 def _judged(status: str, waived: Sequence[int]) -> str:
-    """Verdict on rows and requirements, with the numbers of waived rows and requirements."""
+    """Text of the verdict for a status, with the numbers of waived rows and requirements in `waived`."""
     clauses = [f"{count} {words[count > 1]} waived" for count, words in zip(waived, _WAIVED, strict=True) if count]
     return "; ".join([STATUS[status].verdict, *clauses])
 
 
 def _waived(findings: MissionFindings) -> tuple[int, int]:
-    """Number of waived rows over their limit, and of waived rows and requirements that cannot be judged.
+    """Two counts: waived rows over their limit, and waived rows and requirements that cannot be judged.
 
-    A waived requirement counts only if no waived row shows it.
+    A waived requirement is counted only if none of its rows is waived.
     """
     rows = [row for row in findings.rows if row.status == "waived"]
     over = sum((row.utilization or 0.0) > 1 for row in rows)
@@ -154,7 +154,7 @@ def _waived(findings: MissionFindings) -> tuple[int, int]:
 
 
 def _overall(report: Report) -> str:
-    """Verdict on the run. Missions that declare no error are counted apart, since nothing was judged in them."""
+    """Text of the verdict on the run. Missions without declared errors are counted separately, as not judged."""
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
     count = len(report.missions)
     empty = sum(mission.is_empty and not mission.changes for mission in usable)
@@ -174,7 +174,7 @@ def _overall(report: Report) -> str:
 
 
 def _judges_each_alone(findings: MissionFindings) -> bool:
-    """Whether each error of a mission is judged alone."""
+    """Whether each error of a mission is judged alone, without a combination with other errors."""
     return not findings.is_empty and findings.combine == "each"
 
 
@@ -189,7 +189,7 @@ def _index(lines: Sequence[doc.Line]) -> doc.Chapter:
 
 
 def _index_line(page: Page) -> doc.Line:
-    """Line of a mission in the index, with its worst row, or a requirement that is worse than any row."""
+    """Line of a mission in the index, with its worst row or with a requirement that is worse than all rows."""
     findings, judged = page.findings, page.judged
     deciding = [requirement_id(each) for each in findings.requirements if each.status == findings.status]
     worst = judged[0].id if judged else ""
@@ -217,7 +217,7 @@ def _provenance(report: Report) -> doc.Chapter:
 
 
 def _approval(report: Report) -> doc.Chapter:
-    """The table of signatures, below a table of the figures that a level shifts off their source."""
+    """Return the chapter for signatures, with a table of the values that a stated level shifts off a data sheet."""
     blocks: list[doc.Block] = []
     shifted = [
         (findings.name, doc.Styled("id", doc.Name(error.key)), error.level, error.off)
@@ -248,7 +248,7 @@ def _facts_of_file(file: str, digest: str, document: Document, counts: doc.Text)
 
 
 def _faults(mission: UnusableMission, name: str, anchor: str) -> doc.Chapter:
-    """Faults of an unusable file."""
+    """Return the chapter with the faults of an unusable file."""
     verdict_words = f"{STATUS['error'].verdict}: the mission file is not usable."
     lines = [(f"{fault.line or '–'}:{fault.column or '–'}", str(fault)) for fault in mission.faults]
     columns = doc.heads("Line:column", "Fault")
@@ -330,7 +330,10 @@ def _requirements(page: Page) -> doc.TextTable:
 
 
 def _drivers(page: Page) -> Iterator[Row]:
-    """Rows that decide the verdict: broken, doubtful or waived rows, and rows with the largest use if all is met."""
+    """Yield the rows that decide the verdict.
+
+    They are the rows that fail, warn, cannot be judged or are waived; if all are met, the rows with the largest use.
+    """
     is_met = STATUS[page.findings.status].is_met
     for row in page.judged[:_MAX_DRIVER_ROWS]:
         if not STATUS[row.status].is_met or (is_met and row.utilization):
@@ -383,7 +386,7 @@ def _geometry(page: Page) -> Iterator[doc.Block]:
 
 
 def _allocation(page: Page) -> Iterator[doc.Block]:
-    """Shares of the quadratic phase error and of the power."""
+    """Yield the paragraphs and tables with the shares of the quadratic phase error and of the power."""
     findings, allocation = page.findings, page.findings.allocation
     total, gain = allocation.qpe_total, allocation.autofocus_gain
     yield doc.Paragraph(
@@ -414,7 +417,10 @@ def _allocation(page: Page) -> Iterator[doc.Block]:
 
 
 def _power_shares(page: Page) -> Iterator[doc.TextTable]:
-    """Shares of the power that vibration and noise may add. The clock has a column only if it has a share."""
+    """Yield the table with the shares of the power that vibration and noise may add.
+
+    The clock has a column only if it has a share.
+    """
     required, allocation = page.mission.requirements, page.findings.allocation
     rows = [
         (name, value, split)
@@ -474,7 +480,7 @@ _PATH_FILE_NAMES = {"accuracy": "Accuracy", "earth_orientation": "The Earth’s 
 
 
 def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
-    """Names and texts of the assumptions of the verdict, and of its range of validity."""
+    """Yield names and texts of the assumptions behind the verdict, including its range of validity."""
     mission, findings = page.mission, page.findings
     if findings.changes:
         yield "Mission", f"the mission of the file, changed by {changes_words(findings.changes)}"
@@ -561,7 +567,7 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
 
 
 def _air_of(propagation: Propagation) -> str:
-    """Whether both legs cross the same air, and the correlation time of its changes."""
+    """Text that states whether both legs cross the same air, and how fast its delays change."""
     legs = {name: propagation.leg(name) for name in Platforms._fields}
     times = {name: leg.correlation_time for name, leg in legs.items() if leg is not None}
     change_words = {
@@ -577,7 +583,10 @@ def _air_of(propagation: Propagation) -> str:
 
 
 def _inputs(page: Page) -> Iterator[tuple[str, str, str]]:
-    """Names and values that determine the findings, with their origin: a line of the file, `default` or `--set`."""
+    """Yield name, value and origin of the inputs that determine the findings.
+
+    The origin is a line of the file, `default` or `--set`.
+    """
     mission, findings, file = page.mission, page.findings, page.file
 
     def value_from(name: str, value: str, path: KeyPath) -> tuple[str, str, str]:

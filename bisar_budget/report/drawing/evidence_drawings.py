@@ -15,7 +15,7 @@ WITHOUT_ERROR, WITH_ERRORS, FOCUSED = "line dotted", "line receiver dashed", "li
 
 
 class Curve(NamedTuple):
-    """A cut along y′: positions [m], levels over the peak without error [dB], and the style of its line."""
+    """A cut along y′: positions [m], levels relative to the error-free peak [dB], and the style of its line."""
 
     name: str
     positions: Sequence[float]
@@ -24,7 +24,7 @@ class Curve(NamedTuple):
 
 
 def impulse_response_cuts(evidence: ImageEvidence) -> str:
-    """Cross-range cuts of a row at its limit as SVG, over the cut without error.
+    """Draw the cross-range cuts of a row at its limit as SVG, together with the cut without error.
 
     Cuts with autofocus are in a second panel.
     """
@@ -60,7 +60,7 @@ def _curve(name: str, levels: Sequence[float], step_m: float, style: str) -> Cur
 
 
 def numbers_in_words(evidence: ImageEvidence) -> Iterator[str]:
-    """Sentences with the prediction and the measurement at each limit."""
+    """Yield sentences with the predicted and the measured values at each limit."""
     verdict = evidence.verdict
     yield f"{_at_limit(verdict)}."
     measures = (
@@ -77,7 +77,7 @@ def numbers_in_words(evidence: ImageEvidence) -> Iterator[str]:
 
 
 def chip_png(image: PointImage) -> bytes:
-    """Write a chip as an 8-bit grey PNG, x′ to the right and y′ up, black at −40 dB of the error-free peak.
+    """Write a chip as an 8-bit grey PNG with x′ to the right and y′ up. Black is −40 dB below the error-free peak.
 
     The data is stored without compression, so that the bytes do not depend on a compression library.
     """
@@ -91,7 +91,7 @@ def chip_png(image: PointImage) -> bytes:
 
 
 def chip_caption(image: PointImage) -> str:
-    """Size, orientation and grey scale of a chip, in words."""
+    """Text about the size, orientation and grey scale of a chip."""
     along, across = (format_quantity(side, "m") for side in image.extent_m)
     return (
         f"{along} along x′ (look, to the right) by {across} along y′ (cross-range, up); "
@@ -100,9 +100,9 @@ def chip_caption(image: PointImage) -> str:
 
 
 def chip_size(image: PointImage, pixels_per_sample: int = 3) -> tuple[int, int]:
-    """Width and height on a page at which resolution cells are square. [px]
+    """Width and height of a chip on a page, such that its resolution cells are square. [px]
 
-    A cell may be ten times as long as it is wide, so that a chip to scale would be a narrow strip.
+    A chip to scale would be a narrow strip, because a cell may be ten times as long as it is wide.
     """
     return image.columns * pixels_per_sample, image.rows * image.thinned * pixels_per_sample
 

@@ -1,4 +1,4 @@
-"""Pictures as files: Matplotlib figures that do not depend on a user's settings, and SVG drawings."""
+"""Convert Matplotlib figures and SVG drawings to files that do not depend on the user's settings."""
 
 import os
 import re
@@ -17,7 +17,7 @@ _POINTS_PER_PIXEL, _PIXELS_PER_INCH = 0.75, 96.0  # pixels of an SVG drawing
 
 
 def new_figure(**settings: Any) -> "Figure":
-    """A Matplotlib figure that does not depend on a user's matplotlibrc and MPLBACKEND."""
+    """Create a Matplotlib figure that does not depend on the user's matplotlibrc and MPLBACKEND."""
     os.environ.pop("MPLBACKEND", None)  # an unknown name would make the import of Matplotlib fail
     import logging
 
@@ -31,7 +31,7 @@ def new_figure(**settings: Any) -> "Figure":
 
 
 def figure_file(figure: "Figure", kind: str, dpi: int = 110) -> bytes:
-    """Content of a `png`, `svg` or `pdf` file of a figure. The same input gives the same bytes."""
+    """Convert a figure to the bytes of a `png`, `svg` or `pdf` file. The same input gives the same bytes."""
     undated = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
     file = BytesIO()
     figure.savefig(file, format=kind, dpi=dpi, metadata=undated[kind])
@@ -39,7 +39,7 @@ def figure_file(figure: "Figure", kind: str, dpi: int = 110) -> bytes:
 
 
 def drawing_file(svg: str, kind: str, dpi: int = 192) -> bytes:
-    """Content of a `png`, `svg` or `pdf` file of a drawing of `svg.Canvas`. PNG and PDF have a white background."""
+    """Convert an `svg.Canvas` drawing to a `png`, `svg` or `pdf` file. PNG and PDF have a white background."""
     if kind == "svg":
         return svg.encode()
     drawing = ElementTree.fromstring(svg)
@@ -50,7 +50,7 @@ def drawing_file(svg: str, kind: str, dpi: int = 192) -> bytes:
 
 
 def paint(panel: "Axes", drawing: ElementTree.Element) -> None:
-    """Paint the elements of a drawing of `svg.Canvas` on Matplotlib axes with the size of the drawing."""
+    """Paint the elements of a `svg.Canvas` drawing on Matplotlib axes that are as large as the drawing."""
     from matplotlib.patches import Circle, PathPatch
     from matplotlib.patheffects import withStroke
 
@@ -105,7 +105,7 @@ def paint(panel: "Axes", drawing: ElementTree.Element) -> None:
 
 
 def _rules(css: str) -> list[tuple[str, Mapping[str, str]]]:
-    """Selectors of a drawing with their declarations, strongest last. Rules for dark screens are left out."""
+    """CSS selectors of a drawing and their declarations, strongest last. Rules for dark screens are left out."""
     css = re.sub(r"@media[^{]*\{[^{}]*\{[^{}]*\}\}", "", css)
     css = re.sub(r"var\(--\w+,(#\w+)\)", r"\1", css)
     rules = []
@@ -129,7 +129,7 @@ def _colour(name: str, opacity: str | None) -> tuple[str, float] | str:
 
 
 def _path(data: str) -> "Path":
-    """Matplotlib path of a path of `svg.Canvas`, which has absolute commands M, L, H, V and Z."""
+    """Convert the path data of a `svg.Canvas`, with absolute commands M, L, H, V and Z, to a Matplotlib path."""
     from matplotlib.path import Path
 
     codes, points = [], [(0.0, 0.0)]

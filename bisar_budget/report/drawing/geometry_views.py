@@ -1,7 +1,7 @@
-"""The collection drawn to scale, from above and from the side, as SVG.
+"""Draw the collection to scale as SVG, from above and from the side.
 
-Objects that would coincide at this scale are enlarged in a second panel below: a receiver beside the scene of a
-satellite, or two satellites flying together. The description of each drawing gives its numbers in words.
+Objects that would coincide at this scale are enlarged in a second panel below. Examples are a receiver next to the
+scene of a satellite, or two satellites in close formation. The text description of each drawing contains its numbers.
 """
 
 import math
@@ -36,9 +36,10 @@ _PLAN, _SIDE = ((210.0, 400.0), (74.0, 66.0, 66.0)), ((130.0, 360.0), (82.0, 52.
 
 
 class _Platform(NamedTuple):
-    """One platform in one view.
+    """A platform in one view.
 
-    `heading` is the unit velocity in the plane, `toward` the component of the unit velocity to the viewer.
+    `heading` is the projection of the unit velocity on the drawing plane; `toward` is its component towards the
+    viewer.
     """
 
     name: str
@@ -55,7 +56,7 @@ class _Platform(NamedTuple):
 
     @property
     def motion(self) -> str:
-        """Speed in words."""
+        """Text with the speed of the platform, or `fixed`."""
         return "fixed" if self.is_still else format_quantity(float(norm(self.state.velocity)), "m/s")
 
 
@@ -73,7 +74,10 @@ class _View(NamedTuple):
 
 
 def geometry_plan(findings: MissionFindings) -> str:
-    """The collection from above as SVG: platforms, velocities, lines of sight, φ_b of (11), smear of (31)."""
+    """Draw the collection from above as SVG.
+
+    The drawing has platforms, velocities, lines of sight, the look direction φ_b of (11) and the smear of (31).
+    """
     platforms = [
         _seen(name, state, findings, lambda vector: (vector[0], vector[1]), _direction(state.velocity)[2])
         for name, state in _named(findings.geometry)
@@ -89,10 +93,10 @@ def geometry_plan(findings: MissionFindings) -> str:
 
 
 def geometry_elevation(findings: MissionFindings) -> str:
-    """The collection from the side as SVG: heights, slant ranges, elevation angles.
+    """Draw the collection from the side as SVG, with heights, slant ranges and elevation angles.
 
     Each platform is drawn in the vertical plane through it and the scene centre, so that its slant range and
-    elevation are true; planes more than 90° apart in azimuth go to opposite sides.
+    elevation are true. If these planes are more than 90° apart in azimuth, they are drawn on opposite sides.
     """
     geometry = findings.geometry
     turned = _planes_apart(geometry)
@@ -120,7 +124,7 @@ def _named(geometry: BistaticGeometry) -> tuple[tuple[str, PlatformState], tuple
 
 
 def _flown(state: PlatformState, aperture_time: float) -> tuple[Vector, ...]:
-    """Positions along the aperture. A straight path has only its two ends."""
+    """Positions of a platform along the aperture, (3,) each; only the two end points for a straight path. [m]"""
     steps = 1 if state.is_straight else _PATH_STEPS
     if state.curve is not None:
         steps = max(steps, _STEPS_PER_PIECE * state.curve.count)
@@ -141,7 +145,10 @@ def _planes_apart(geometry: BistaticGeometry) -> float:
 
 
 def _is_on_other_side(geometry: BistaticGeometry, turned: float) -> bool:
-    """Whether the receiver is drawn opposite the transmitter: beyond 90°, or if one would cover the other."""
+    """Whether the receiver is drawn on the side opposite to the transmitter.
+
+    This is so if the azimuths are more than 90° apart (`turned` [rad]), or if one platform would cover the other.
+    """
     if turned > math.pi / 2:
         return True
     pair = geometry.transmitter, geometry.receiver
@@ -162,7 +169,7 @@ def _seen(
     projected: Callable[[Vector], PlanePoint],
     toward: float,
 ) -> _Platform:
-    """A platform in the plane on which `projected` projects."""
+    """Return a platform in the drawing plane; `projected` maps a vector to this plane."""
     path = tuple(map(projected, _flown(state, findings.aperture_time)))
     return _Platform(
         name, state, projected(plain_vector(state.position)), projected(_direction(state.velocity)), toward, path
@@ -213,7 +220,7 @@ def _compass(value: float, positive: str, negative: str) -> str:
 
 
 class _Panel(NamedTuple):
-    """A panel: its frame [px], the point `centre` of the plane in its middle [m], and its scale [px/m]."""
+    """A panel: its frame [px], the point `centre` of the drawing plane at its middle [m], and its scale [px/m]."""
 
     frame: svg.Box
     centre: PlanePoint
@@ -225,7 +232,7 @@ class _Panel(NamedTuple):
 
 
 def _drawing(view: _View, kind: str, side: str, description: str, note: str = "") -> str:
-    """Drawing of a view, with an enlargement below if objects are too close, and a note on the symbols."""
+    """Draw a view as SVG, with an enlargement below if objects are too close, and a note on the symbols."""
     canvas = svg.Canvas()
     main = _main_panel(view)
     enlarged = _enlargement(view, main)
@@ -254,7 +261,7 @@ def _drawing(view: _View, kind: str, side: str, description: str, note: str = ""
 
 
 def _main_panel(view: _View) -> _Panel:
-    """Panel with the platforms and the scene. A scene far larger than the collection is clipped."""
+    """Make the panel with the platforms and the scene. A scene much larger than the collection is clipped."""
     points = [_SCENE_CENTRE, *(p.at for p in view.platforms), *(point for p in view.platforms for point in p.path)]
     if view.radius <= 2 * max(math.hypot(*point) for point in points):
         points += _extent(view, _SCENE_CENTRE, view.radius)
@@ -266,7 +273,7 @@ def _platforms_at_scene(view: _View, main: _Panel) -> list[_Platform]:
 
 
 def _enlargement(view: _View, main: _Panel) -> _Panel | None:
-    """Panel below for platforms beside the scene or beside each other; None if it would not show more."""
+    """Panel below the main panel for platforms close to the scene or to each other; None if it shows no more."""
     top = main.frame.bottom + _AXIS_PX[1] + 26
     first, second = view.platforms
     separation = math.dist(first.state.position, second.state.position)
@@ -289,7 +296,7 @@ def _enlargement(view: _View, main: _Panel) -> _Panel | None:
 
 
 def _symbols(view: _View, panels: Sequence[_Panel]) -> Iterator[str]:
-    """Explanations of symbols without a label."""
+    """Yield sentences that explain the symbols without a label."""
     if any(not p.is_still and not _is_end_on(p) for p in view.platforms):
         yield "Arrows at the platforms: direction of flight, not speed."
     if any(_shows_path(panel, p) for panel in panels for p in view.platforms):
@@ -299,14 +306,14 @@ def _symbols(view: _View, panels: Sequence[_Panel]) -> Iterator[str]:
 
 
 def _extent(view: _View, centre: PlanePoint, reach: float) -> list[PlanePoint]:
-    """Outermost points of a circle around a point: four in the plan, two along the ground in the elevation."""
+    """Outermost points of a circle: four points in the view from above, two at ground level from the side."""
     x, y = centre
     ends = [(x - reach, y), (x + reach, y)]
     return [*ends, (x, y - reach), (x, y + reach)] if view.is_plan else ends
 
 
 def _fitted(view: _View, points: Sequence[PlanePoint], top: float, height_fraction: float = 1.0) -> _Panel:
-    """Panel at the largest scale that shows all points, with margins for their labels."""
+    """Make a panel with the largest scale at which all points and margins for their labels fit."""
     (lowest, highest), (margin_side, margin_above, margin_below) = _PLAN if view.is_plan else _SIDE
     highest *= height_fraction
     xs, ys = zip(*points, strict=True)
@@ -325,7 +332,7 @@ def _fitted(view: _View, points: Sequence[PlanePoint], top: float, height_fracti
 
 
 def _axes(canvas: svg.Canvas, panel: _Panel, view: _View) -> None:
-    """Grid, ticks and names of the axes, with the same step on both axes."""
+    """Draw grid, ticks and names of the axes, with the same step on both axes."""
     frame, scale = panel.frame, panel.scale
     step = svg.round_step(62 / scale)
     reach = max(abs(panel.centre[0]), abs(panel.centre[1])) + (frame.right - frame.left) / scale
@@ -353,7 +360,7 @@ def _axes(canvas: svg.Canvas, panel: _Panel, view: _View) -> None:
 
 
 def _outline(canvas: svg.Canvas, panel: _Panel) -> None:
-    """Frame of an enlargement, with a bar for its scale."""
+    """Draw the frame of an enlargement, with a scale bar."""
     frame = panel.frame
     svg.outline(canvas, frame, "grid")
     length = svg.round_step(40 / panel.scale)
@@ -366,7 +373,7 @@ def _outline(canvas: svg.Canvas, panel: _Panel) -> None:
 
 
 def _draw_panel(canvas: svg.Canvas, panel: _Panel, view: _View, is_detail: bool, enlarged: _Panel | None) -> None:
-    """Draw lines, then markers, then labels, which are placed in the remaining space."""
+    """Draw the content of a panel: first lines, then markers, then labels in the remaining space."""
     frame, scene = panel.frame, panel.pixel(_SCENE_CENTRE)
     if view.is_plan:
         if view.radius * panel.scale >= 3:
@@ -406,7 +413,7 @@ def _draw_panel(canvas: svg.Canvas, panel: _Panel, view: _View, is_detail: bool,
 def _labels(
     panel: _Panel, view: _View, visible: Sequence[_Platform], has_scene: bool, enlarged: _Panel | None
 ) -> Iterator[svg.DrawnLabel]:
-    """Labels of platforms and scene. Objects on one spot share a label."""
+    """Yield the labels of platforms and scene. Objects at the same place in the drawing share a label."""
     frame, scene = panel.frame, panel.pixel(_SCENE_CENTRE)
     # From the side, labels of platforms are above the ground.
     above = frame if view.is_plan else frame._replace(bottom=min(frame.bottom, scene[1]))
@@ -496,7 +503,7 @@ def _is_end_on(platform: _Platform) -> bool:
 
 
 def _marker(canvas: svg.Canvas, at: svg.Point, platform: _Platform) -> None:
-    """Triangle for the transmitter, square for the receiver; hollow if it does not move."""
+    """Draw a triangle for the transmitter or a square for the receiver; it is hollow for a fixed platform."""
     x, y = at
     style = f"marker {'hollow line' if platform.is_still else 'solid'} {platform.name}"
     if platform.name == "transmitter":
@@ -515,7 +522,7 @@ def _shows_path(panel: _Panel, platform: _Platform) -> bool:
 
 
 def _degrees(angle: float) -> str:
-    """Angle in degrees, to a hundredth."""
+    """Text of an angle [rad] in degrees, with up to two decimals."""
     return f"{svg.axis_number(round(math.degrees(angle), 2))}°"
 
 

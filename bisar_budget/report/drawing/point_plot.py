@@ -49,13 +49,13 @@ Limits = tuple[float, float, float, float]
 
 
 class ImagePanel(NamedTuple):
-    """An image in dB over the error-free peak, on pixels given by their corners.
+    """An image in dB relative to the error-free peak, with the corners of its pixels.
 
-    `level_db` is (nx, ny), x or x′ along its first axis, NaN for pixels without an image. `corners`
-    (nx + 1, ny + 1, 2) are the corners of the pixels. `true_places` (n, 2) are the positions of the targets,
-    `shown_places` (n, 2) their image points by (25), and `image_points` (n, 2) their peaks; without peaks if (25)
-    agrees with them. `points` (n, 3, 2) are the image points of the thirds of the aperture by (29). All coordinates
-    are in `axes`. [m]
+    `level_db` (nx, ny) has x or x′ along its first axis, and NaN for pixels without an image. `corners`
+    (nx + 1, ny + 1, 2) are the corners of the pixels. `true_places` (n, 2) are the positions of the targets, and
+    `shown_places` (n, 2) are their image points by (25). `image_points` (n, 2) are their peaks in the image; it is
+    empty if the peaks agree with (25). `points` (n, 3, 2) are the image points of the thirds of the aperture by (29).
+    All coordinates are in metres along `axes`.
     """
 
     title: str
@@ -69,13 +69,13 @@ class ImagePanel(NamedTuple):
 
     @property
     def extent(self) -> Limits:
-        """Left, right, bottom and top of the outermost pixel edges. [m]"""
+        """Left, right, bottom and top edge of the image. [m]"""
         low, high = self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))
         return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
     @property
     def limits(self) -> Limits:
-        """Limits of the axes, which contain the picture and the targets near it. [m]"""
+        """Left, right, bottom and top limit of the axes, which include the image and targets near it. [m]"""
         left, right, bottom, top = self.extent
         near = _NEAR_RATIO * max(right - left, top - bottom)
         x, y = self.true_places.T
@@ -90,9 +90,9 @@ class ImagePanel(NamedTuple):
 class Sheet(NamedTuple):
     """Numbers of all figures.
 
-    `segments` (3, 2, 2) are the ends of three lines that approximate the range error, time [s] and range error [mm],
-    each over a third of the aperture. `points` (3, 2) are the image points of these thirds by (29) for a target at
-    the scene centre [m], `points_by` names the gradients of (29).
+    `segments` (3, 2, 2) are the end points, time [s] and range error [mm], of three straight lines, each of which
+    approximates the range error over a third of the aperture. `points` (3, 2) are the image points of these thirds by
+    (29) for a target at the scene centre [m]. `points_by` names the gradients in (29).
     """
 
     slow_time: Floats
@@ -108,7 +108,7 @@ class Sheet(NamedTuple):
 
 
 def sheet(images: PointImages) -> Sheet:
-    """Numbers of the figures of some images."""
+    """Compute the numbers of all figures from the images of a mission."""
     peak = float(np.abs(images.error_free).max())
     cosine, sine = math.cos(images.look_azimuth), math.sin(images.look_azimuth)
     turn = np.array([[cosine, -sine], [sine, cosine]])  # (10), from the right
@@ -154,7 +154,7 @@ def sheet(images: PointImages) -> Sheet:
 
 
 def rotated_back(images: PointImages) -> Complexes:
-    """Focused image on the pixels of the image along (x, y), the last step of image formation in the paper."""
+    """Resample the focused image on the pixels of the image along (x, y), the last step in the paper."""
     return resampled(images.focused, images.grid, images.scene_grid)
 
 
@@ -167,9 +167,10 @@ def _segments_of(images: PointImages) -> Floats:
 
 
 def _bright(images: list[Complexes], peak: float, spacing: tuple[float, float]) -> tuple[slice, slice]:
-    """Slices of a patch to draw, equally long in metres along both axes.
+    """Slices of the part of a patch to draw, which has equal lengths in metres along both axes.
 
-    They contain all pixels of any image above a level, with a margin for the nearest sidelobes.
+    The part contains all pixels that are above a level in any image, and a margin for the nearest sidelobes. `peak`
+    is the error-free peak, `spacing` the pixel spacing along both axes. [m]
     """
     bright = np.maximum.reduce([np.abs(image) for image in images]) > peak * 10 ** (_DRAWN_DB / 20)
     used_indices = [np.nonzero(bright.any(axis=1 - axis))[0] for axis in (0, 1)]
@@ -186,7 +187,7 @@ def _bright(images: list[Complexes], peak: float, spacing: tuple[float, float]) 
 
 
 def _interpolated(image: Complexes, grid: Floats, region: tuple[slice, slice], peak: float) -> tuple[Floats, Floats]:
-    """Interpolated region of an image [dB], and the corners of its pixels [m]."""
+    """Interpolate a region of an image. Returns its levels [dB] and the corners of its pixels [m]."""
     rows, columns = region
     shape = (rows.stop - rows.start, columns.stop - columns.start)
     factor = max(1, min(_FINE_FACTOR, math.isqrt(int(_MAX_PICTURE_PIXELS / (shape[0] * shape[1])))))
@@ -208,7 +209,7 @@ def _decibels(samples: Complexes, peak: float) -> Floats:
 
 
 def _cuts_of(images: PointImages, turned: Floats, region: tuple[slice, slice], peak: float) -> tuple[Curve, ...]:
-    """Lines through the peaks, over y′."""
+    """Cross-range cuts through the peaks, with levels along y′."""
     columns = np.arange(region[1].start * _CUT_FACTOR, (region[1].stop - 1) * _CUT_FACTOR + 1)
     cuts = []
     shown = (
@@ -270,9 +271,9 @@ def drawn_panel(name: str, drawn: Sheet) -> bytes:
 
 
 def archive(images: PointImages, changes: Sequence[SetValue] = ()) -> bytes:
-    """Content of an NPZ file with the complex images, their grids and the errors.
+    """Return the bytes of an NPZ file with the complex images, their grids and the errors.
 
-    `changes` are the options that changed the mission. The file has them as texts `KEY=VALUE` (n,).
+    `changes` are the options that changed the mission. They are stored as texts `KEY=VALUE`, (n,).
     """
     file = BytesIO()
     np.savez_compressed(
@@ -322,7 +323,7 @@ def _flown(mission: Mission) -> str:
 
 
 def summary(images: PointImages, mission: Mission) -> str:
-    """Effects of the errors on the targets, and responses after autofocus, as lines of text."""
+    """Write a text about the effects of the errors on the targets, and about the responses after autofocus."""
     clean = images.clean_response
     east, north = (round(float(moved), 3) for moved in images.effect.displacement)
     is_point = len(images.responses) == 1 and images.targets.clutter_db is None
@@ -385,7 +386,7 @@ def _of_the_point(images: PointImages) -> list[str]:
 
 
 def _of_targets(images: PointImages) -> list[str]:
-    """A line for each target. Its peak is relative to its peak without error, its width is that of its cut."""
+    """Write a line for each target, with its peak relative to the peak without error and the width of its cut."""
     lines = [
         f"{'target [m]':>17} {'level':>7} {'moved by [m]':>15} {'phase':>8} {'with errors':>14} {'autofocused':>14}",
         f"{'east':>8} {'north':>8} {'[dB]':>7} {'east':>7} {'north':>7} {'[rad]':>8} "
@@ -433,7 +434,7 @@ def _points(panel: "Axes", drawn: Sheet) -> None:
 
 
 def _image(panel: "Axes", picture: ImagePanel, *, with_points: bool = False) -> "QuadMesh":
-    """Draw an image. Each pixel is drawn between its corners, since the pixels follow lines of equal range."""
+    """Draw an image. Each pixel is drawn between its corners, because pixel rows follow curves of equal range."""
     mesh = panel.pcolormesh(
         picture.corners[..., 0],
         picture.corners[..., 1],
@@ -466,7 +467,7 @@ def _image(panel: "Axes", picture: ImagePanel, *, with_points: bool = False) -> 
 
 
 def _target_mark(color: str) -> MarkStyle:
-    """Mark of the position of a target: a cross with a free middle."""
+    """Style of the mark at the position of a target: a cross with an open middle."""
     from matplotlib.path import Path
 
     arms = [(x * r, y * r) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)) for r in (0.5, 1.0)]
@@ -475,12 +476,12 @@ def _target_mark(color: str) -> MarkStyle:
 
 
 def _prediction_mark(color: str) -> MarkStyle:
-    """Mark of the image point of a target by (25): a circle."""
+    """Style of the mark at the image point of a target by (25): a circle."""
     return {"ls": "none", "marker": "o", "color": color, "ms": 12, "mfc": "none", "mew": 1.2}
 
 
 def _peak_mark(color: str) -> MarkStyle:
-    """Mark of a peak of an image: a square."""
+    """Style of the mark at a peak of an image: a square."""
     return {"ls": "none", "marker": "s", "color": color, "ms": 12, "mfc": "none", "mew": 1.2}
 
 
@@ -489,7 +490,7 @@ def _is_within(point: Floats, limits: Limits) -> bool:
 
 
 def _point_to(panel: "Axes", point: Floats, middle: Floats, color: str) -> None:
-    """Write the distance of a target outside the panel, with an arrow in its direction."""
+    """Write the distance of a target that is outside the panel, with an arrow towards the target."""
     away = point - middle
     distance = float(np.hypot(*away))
     panel.text(
@@ -501,7 +502,7 @@ def _point_to(panel: "Axes", point: Floats, middle: Floats, color: str) -> None:
 
 
 def _cuts_drawing(drawn: Sheet) -> str:
-    """The cross-range cuts, as a report draws them."""
+    """Drawing of the cross-range cuts as SVG, in the style of a report."""
     canvas = Canvas()
     curves = [*drawn.cuts[1:], drawn.cuts[0]]  # the cut without error is last, so that no line covers it
     bottom = cut_panel(canvas, 0.0, *_CUT_SIZE_PX, "Cross-range cuts", curves)

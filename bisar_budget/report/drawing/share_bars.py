@@ -1,4 +1,4 @@
-"""Shares of errors in the limit of each row, as stacked bars. Errors have their numbers from the sheet."""
+"""Draw the share of each error in the limits of rows as stacked bars. The errors are numbered as in the sheet."""
 
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
@@ -23,14 +23,14 @@ _SHARES_STYLE = (
 
 
 def limiting(sheet: SpecificationSheet) -> list[RowUse]:
-    """Rows that limit a specification, in the order of their requirements."""
+    """Rows of the sheet that limit a specification, in the order of their requirements."""
     rows = [row for row in sheet.rows if row.multiplier > LEAST_WEIGHT_FRACTION]
     order = [*REQUIREMENT_NAMES, None]
     return sorted(rows, key=lambda row: order.index(row.requirement))
 
 
 def share_bars(sheet: SpecificationSheet) -> str:
-    """Bars as SVG, one for each limiting row, divided into the shares of the errors in its limit."""
+    """Draw a bar for each limiting row as SVG, divided into the shares of the errors in its limit."""
     canvas = svg.Canvas()
     keys = [spec.key for spec in sheet.specifications]
     rule = "squares add up" if sheet.combine == "rss" else "sizes add up"

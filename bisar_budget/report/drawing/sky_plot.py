@@ -1,7 +1,7 @@
-"""Passes of a satellite as a drawing: their tracks in the sky over the scene, and the resolution of each pass.
+"""Draw the passes of a satellite: their tracks in the sky over the scene, and the resolution of each pass.
 
-The sky is oriented like a map: north up, east to the right, the zenith in the middle. A track has the colour of its
-status, an arrow head at its setting and a dot at the mid-time.
+The sky is oriented like a map, with north up, east to the right and the zenith in the middle. A track has the colour
+of its status, an arrow head where the satellite sets, and a dot at the mid-time.
 """
 
 import math
@@ -31,8 +31,8 @@ _STATUS_DASHES = ("", "6 3", "2 2.5")  # of statuses with the same colour
 def sky_plot(passes: Passes, title: str, verdict: str) -> str:
     """Draw passes as SVG.
 
-    `verdict` is the sentence with the number of complying passes. It is written below the name of the mission, and is
-    the description for readers who cannot see the drawing.
+    `verdict` is the sentence with the number of complying passes. It is written below the name of the mission, and
+    also serves as the description for readers who cannot see the drawing.
     """
     canvas = svg.Canvas()
     top = svg.head(canvas, [svg.short(passes.name, _SKY_WIDTH_PX), printable(verdict)])
@@ -82,7 +82,7 @@ def _style(statuses: Sequence[str], width: float) -> str:
 
 # ---------------------------------------------------------------- the sky
 def _at(middle: svg.Point, azimuth: float, elevation: float) -> svg.Point:
-    """Point on the page of a direction: azimuth from east, counter-clockwise, and elevation. [rad]"""
+    """Point on the page for a direction, given by azimuth (from east, counter-clockwise) and elevation. [rad]"""
     radius, angle = _HORIZON_PX * (1 - 2 * elevation / math.pi), bearing(azimuth)
     return middle[0] + radius * math.sin(angle), middle[1] - radius * math.cos(angle)
 
@@ -139,7 +139,10 @@ def _arrow(track: Sequence[svg.Point]) -> list[svg.Point]:
 def _numbers(
     canvas: svg.Canvas, overpasses: Sequence[SatellitePass], marks: Sequence[svg.Point], within: svg.Box
 ) -> None:
-    """Write numbers of passes beside their marks. Among very many passes only complying ones have numbers, if few."""
+    """Write the numbers of passes beside their marks.
+
+    If there are very many passes, only complying passes get numbers, and only if these are few.
+    """
     numbered_marks = list(zip(overpasses, marks, strict=True))
     if len(numbered_marks) > _MAX_NUMBERED_COUNT:
         numbered_marks = [(overpass, at) for overpass, at in numbered_marks if overpass.complies]
@@ -149,7 +152,7 @@ def _numbers(
 
 # ---------------------------------------------------------------- resolution over time
 def _resolutions(canvas: svg.Canvas, frame: svg.Box, passes: Passes) -> None:
-    """Draw both resolutions of each pass over its mid-time, on a logarithmic scale."""
+    """Draw the range and cross-range resolution of each pass against its mid-time, on a logarithmic scale."""
     span = passes.stop.since(passes.start)
     across = svg.Scale(0.0, span, frame.left, frame.right)
     shown = [(overpass, resolutions) for overpass in passes.found if (resolutions := _sizes(overpass))]
@@ -203,7 +206,7 @@ def _square(canvas: svg.Canvas, at: svg.Point, style: str) -> None:
 
 
 def _dates(start: Instant, span: float, width: float) -> Iterator[tuple[float, str]]:
-    """Times of ticks after the start [s], each with its date or hour."""
+    """Yield the times of the ticks after the start [s], each with its date or hour as text."""
     hours = next(
         (step for step in _DATE_STEPS_HOURS if step * _HOUR_S * width >= span * _DATE_PX), _DATE_STEPS_HOURS[-1]
     )

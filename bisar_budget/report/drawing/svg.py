@@ -1,4 +1,4 @@
-"""A small SVG canvas with axes and colours: lines, markers, labels that find free space. Its output is reproducible.
+"""A small SVG canvas with axes, colours, lines, markers, and labels that find free space. Its output is reproducible.
 
 Colours are custom properties with a fallback, so that a page which inlines a drawing can set them: --ink, --muted,
 --grid, --paper, --transmitter, --receiver. A drawing in a separate file has its own light and dark colours. Only the
@@ -57,7 +57,7 @@ _MARGIN_PX = 2.0  # around a label
 
 @dataclass(frozen=True)
 class _LabelCosts:
-    """Costs of a position for a label, in px² of covered area.
+    """Costs of a label position, in units of covered area. [px²]
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class Box(NamedTuple):
         return self.left <= point[0] <= self.right and self.top <= point[1] <= self.bottom
 
     def clipped(self, segment: Segment) -> Segment | None:
-        """Segment of a line inside the box, by Liang-Barsky; None if the line is outside."""
+        """Part of a line segment that is inside the box, by the Liang-Barsky algorithm; None if there is none."""
         (x, y), (u, v) = segment
         dx, dy = u - x, v - y
         enter, leave = 0.0, 1.0
@@ -141,7 +141,7 @@ class Box(NamedTuple):
 
 
 class DrawnLabel(NamedTuple):
-    """Lines of text for a point, to be written inside a box."""
+    """A label for a point: lines of text that must be written inside a box."""
 
     at: Point
     lines: tuple[str, ...]
@@ -218,7 +218,7 @@ class Canvas:
             self.polygon([end, *sides], f"solid {colour}".rstrip(), is_obstacle=False)
 
     def text(self, at: Point, lines: Sequence[str], style: str = "", anchor: str = "start") -> None:
-        """Write lines of text. `at` is on the baseline of the first line, which is a name if further lines follow."""
+        """Write lines of text. `at` is on the baseline of the first line, which is a name if there are more lines."""
         x, y = at
         spans = []
         for index, line in enumerate(lines):
@@ -239,10 +239,10 @@ class Canvas:
         )
 
     def labels(self, labels: Sequence["DrawnLabel"]) -> None:
-        """Write labels near their points, at positions with the least overlap with the drawing and other labels.
+        """Write labels near their points, where they overlap least with the drawing and with other labels.
 
-        Labels are positioned one after the other. Several orders are tried, because an early label may take the only
-        good position of a later one; the order with the least cost counts.
+        Labels are placed one after the other. An early label may take the only good position of a later one, so
+        several orders are tried, and the order with the lowest cost is used.
         """
         options = [self._options(label) for label in labels]
         indices = range(len(labels))
@@ -284,7 +284,7 @@ class Canvas:
         return cost
 
     def document(self, size: tuple[float, float], key: str, title: str, description: str, style: str = "") -> str:
-        """The drawing as SVG, with a title and a description for readers who cannot see it.
+        """Return the drawing as SVG, with a title and a description for readers who cannot see it.
 
         `style` are CSS rules of this kind of drawing, in addition to `DRAWING_STYLE`.
         """
@@ -301,7 +301,7 @@ class Canvas:
 
 
 def _through(points: Iterable[Point]) -> str:
-    """Path data of a line through points."""
+    """SVG path data of a line through points."""
     return "M" + "L".join(f"{_number(x)} {_number(y)}" for x, y in points)
 
 
@@ -313,7 +313,10 @@ def text_width(line: str) -> float:
 
 
 def _positions(at: Point, width: float, height: float) -> Iterator["_LabelPosition"]:
-    """Positions for a label around a point. The cost grows with the distance and the order of directions."""
+    """Yield possible positions of a label around a point, with costs.
+
+    The cost grows with the distance from the point, and from direction to direction in a fixed order.
+    """
     for gap in _LABEL_GAPS_PX:
         for order, (x, y) in enumerate(_DIRECTIONS):
             # The nearest point of the box is `gap` away. Above and below its point the box is centred.
@@ -330,7 +333,10 @@ def _positions(at: Point, width: float, height: float) -> Iterator["_LabelPositi
 def _positioned(
     options: Sequence[Sequence["_LabelPosition"]], order: Sequence[int]
 ) -> tuple[float, dict[int, "_LabelPosition"]]:
-    """Total cost, and the position of each label by its index, if labels take positions in the given order."""
+    """Place labels one after the other in the given order.
+
+    Returns the total cost, and the position of each label by its index.
+    """
     total, taken = 0.0, dict[int, _LabelPosition]()
     for index in order:
         best, least = options[index][0], math.inf
@@ -350,7 +356,7 @@ def _overlap(box: Box, obstacle: Box) -> float:
 
 
 def _runs(points: Sequence[Point], within: Box | None) -> Iterator[list[Point]]:
-    """Connected pieces of a line inside a box."""
+    """Yield the connected pieces of a line that are inside a box."""
     if within is None:
         yield list(points)
         return
@@ -375,7 +381,7 @@ def _with_subscripts(line: str) -> str:
 
 
 def _number(value: float) -> str:
-    """A coordinate to a hundredth of a pixel, without trailing zeros and without -0."""
+    """Write a coordinate to a hundredth of a pixel, without trailing zeros and without -0."""
     text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
@@ -388,7 +394,7 @@ _SMALL_FONT_RATIO = 0.9  # width of a text in the font of a legend over its usua
 
 
 def axis_number(value: float) -> str:
-    """Number at an axis, with a minus sign."""
+    """Write a number at an axis, with a typographic minus sign."""
     return f"{value + 0.0:.6g}".replace("-", "−")
 
 
@@ -399,7 +405,7 @@ def ticks(lower: float, upper: float, step: float) -> Sequence[float]:
 
 
 def round_step(least: float) -> float:
-    """Smallest number of the form 1, 2 or 5 times a power of ten that is not below a value."""
+    """Round a value up to the next number of the form 1, 2 or 5 times a power of ten."""
     least = max(least, _MIN_AXIS_STEP_SIZE)
     power = 10.0 ** math.floor(math.log10(least))
     return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9))
@@ -415,12 +421,12 @@ class Scale(NamedTuple):
     is_log: bool = False
 
     def at(self, value: float) -> float:
-        """Coordinate of a value. [px]"""
+        """Coordinate on the page for a value. [px]"""
         low, high, value = (math.log(number) if self.is_log else number for number in (self.low, self.high, value))
         return self.start + (value - low) / (high - low) * (self.end - self.start)
 
     def ticks(self, room: float) -> Sequence[float]:
-        """Round values at distances of at least `room` px."""
+        """Round numbers for ticks that are at least `room` px apart."""
         size, (low, high) = abs(self.end - self.start), sorted((self.low, self.high))
         if not self.is_log:
             return ticks(low, high, round_step((high - low) * room / size))
@@ -434,7 +440,7 @@ class Scale(NamedTuple):
 
 
 def short(word: str, room: float) -> str:
-    """Text of at most `room` px. A longer text ends with an ellipsis."""
+    """Shorten a text to at most `room` px, with an ellipsis at its end."""
     text = printable(word)
     while text_width(text) > room and len(text) > 2:
         text = f"{text[:-2].rstrip('…')}…"
@@ -442,7 +448,7 @@ def short(word: str, room: float) -> str:
 
 
 def head(canvas: Canvas, lines: Sequence[str]) -> float:
-    """Write lines above a drawing, its name first. Returns the top of the drawing. [px]"""
+    """Write the lines above a drawing; the first is its name. Returns the top of the drawing. [px]"""
     for index, line in enumerate(lines):
         canvas.text((8, 18 + index * LINE_PX), [line], "small" if index else "name")
     return 16 + len(lines) * LINE_PX if lines else 10.0
@@ -495,24 +501,24 @@ def grid(canvas: Canvas, frame: Box, across: Scale | None, up: Scale | None) -> 
 
 
 class LegendLine(NamedTuple):
-    """An entry of a legend: its words, and a function that draws its mark, 25 px wide, from its left middle."""
+    """An entry of a legend: its text, and a function that draws its 25 px wide mark from a left middle point."""
 
     words: str
     mark: Callable[[Point], None]
 
 
 def line_entry(canvas: Canvas, words: str, style: str) -> LegendLine:
-    """Entry for a line of some style."""
+    """Legend entry for a line of a style."""
     return LegendLine(words, lambda at: canvas.lines([(at, (at[0] + 25, at[1]))], style))
 
 
 def circle_entry(canvas: Canvas, words: str, radius: float, style: str) -> LegendLine:
-    """Entry for a circle of some style. [px]"""
+    """Legend entry for a circle of a style; `radius` is in px."""
     return LegendLine(words, lambda at: canvas.circle((at[0] + 13, at[1]), radius, style))
 
 
 def box_entry(canvas: Canvas, words: str, *styles: str) -> LegendLine:
-    """Entry for a rectangle that is drawn in several styles, one over the other."""
+    """Legend entry for a rectangle that is drawn in several styles on top of each other."""
 
     def mark(at: Point) -> None:
         for style in styles:
@@ -542,7 +548,7 @@ EMPTY_TONE = "reserve"  # colour of a case without a mission
 
 @cache
 def colours() -> tuple[Mapping[str, str], Mapping[str, str]]:
-    """Colours of the page by name, on white paper and on a dark screen."""
+    """Colours of the page by name: first for white paper, then for a dark screen."""
     sheet = resource("templates", "report.css").read_text(encoding="utf-8")
     blocks = sheet.split("}", 2)[:2]
     light, dark = (dict(re.findall(r"--([\w-]+): (#[0-9a-f]{3,6})", block)) for block in blocks)
@@ -550,7 +556,7 @@ def colours() -> tuple[Mapping[str, str], Mapping[str, str]]:
 
 
 def style_sheet(rules: Iterable[str], tones: Iterable[str]) -> str:
-    """CSS rules of one kind of drawing, with the dark colours of a drawing in a separate file."""
+    """CSS rules for one kind of drawing, including dark colours for a drawing in a separate file."""
     _, dark = colours()
     scoped = "".join(f"svg.drawing {rule}" for rule in rules)
     dark_tones = ";".join(f"--{tone}:{dark[tone]}" for tone in dict.fromkeys(tones))
@@ -573,7 +579,7 @@ def status_words(status: str) -> str:
 
 
 def marks_within_colours(statuses: Sequence[str], marks: Sequence[Mark]) -> Mapping[str, Mark]:
-    """A mark for each status. Statuses with the same colour get successive items of `marks`, the first one first."""
+    """Assign a mark to each status. Statuses with the same colour get different `marks`, in their order."""
     tones = [tone_of(name) for name in statuses]
     indices = (tones[:index].count(tone) for index, tone in enumerate(tones))
     return {name: marks[min(index, len(marks) - 1)] for name, index in zip(statuses, indices, strict=True)}

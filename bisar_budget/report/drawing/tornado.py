@@ -1,6 +1,6 @@
-"""Effect of each number of a mission on its worst utilization, as bars to both sides, the largest at the top.
+"""Draw the effect of each number of a mission on its worst utilization as a tornado diagram, largest at the top.
 
-All bars are for the same change: 1 % of a number, of a radian, of a power, of the smaller slant range.
+All bars are for a change of 1 %: of the number, of a radian, of a power, or of the smaller slant range.
 """
 
 from bisar_budget.design.sensitivity import COMPARED_CHANGE_FRACTION, Sensitivity, Slope
@@ -23,7 +23,8 @@ _BAR_STYLES = {"larger": "", "smaller": " pale"}  # style of a bar by the change
 def tornado(sensitivity: Sensitivity) -> str:
     """Draw the numbers with the largest effects as SVG.
 
-    A strong bar is the effect of a larger number, a pale bar that of a smaller number; both have the same slope.
+    A strong bar shows the effect of increasing a number, a pale bar the effect of decreasing it. Both use the same
+    slope.
     """
     canvas = svg.Canvas()
     shown = sensitivity.shown[:MAX_BAR_COUNT]
@@ -76,7 +77,7 @@ def _label(slope: Slope) -> str:
 
 
 def _even(slope: Slope) -> str:
-    """Change of the number for which its bar is drawn."""
+    """Text of the change in the number that its bar shows."""
     if slope.measure == COMPARED_CHANGE_FRACTION:
         return slope.per_text
     size, _, unit = slope.per_text.partition(" ")

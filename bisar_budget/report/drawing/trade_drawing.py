@@ -1,4 +1,4 @@
-"""The drawing of a sweep: utilizations and the limit over one key, or a map of statuses or of a column over two keys.
+"""Draw a sweep: utilizations and limit against one key, or a map of statuses or of a column against two keys.
 
 A report inlines the drawing with the colours of the page. `sweep --plot` writes it to a file with light and dark
 colours. A polar map is a view from above: azimuth from east, counter-clockwise, and the other key as the radius.
@@ -85,7 +85,7 @@ def trade_drawing(
 
 
 def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
-    """Lines above a drawing in a separate file: mission, fixed values, changes, model, and axes of a polar map."""
+    """Lines above a drawing in a separate file: mission, fixed values, changes, model, and the axes if polar."""
     is_gating = any(axis.key == "allocation.model" for axis in trade.axes)
     model = "" if is_gating else f"{mission.gating_model} model"
     subtitle = ", ".join(filter(None, (*trade.fixed, changes_words(mission.changes), model)))
@@ -130,7 +130,7 @@ def _style(trade: Trade) -> str:
 
 
 def _heat_colour(fraction: float) -> str:
-    """Colour of a fraction of the span of a heat map, by Matplotlib's viridis."""
+    """Colour of Matplotlib's viridis map at a fraction from 0 to 1."""
     index = min(int(fraction * (len(_VIRIDIS) - 1)), len(_VIRIDIS) - 2)
     remainder = fraction * (len(_VIRIDIS) - 1) - index
     ends = [[int(colour[start : start + 2], 16) for start in (0, 2, 4)] for colour in _VIRIDIS[index : index + 2]]
@@ -138,7 +138,7 @@ def _heat_colour(fraction: float) -> str:
 
 
 def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> svg.Scale:
-    """Scale of a column. For utilizations [%] it is logarithmic and contains the limit and a decade below it."""
+    """Axis scale for a column. For utilizations [%] it is logarithmic, and includes 100 % and a decade below."""
     finite = values[np.isfinite(values)]
     if is_use:
         finite = np.append(finite[finite > 0], 100.0)
@@ -157,9 +157,9 @@ def _swatches(canvas: svg.Canvas, statuses: Sequence[str]) -> list[svg.LegendLin
 def _curves(
     canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Floats], by_word: Mapping[str, Trade]
 ) -> float:
-    """Curves over a number: utilizations of rows or of words with their limit, or a column.
+    """Draw curves against a number: utilizations of rows or words with their limit, or the values of a column.
 
-    The colour of the background is the status.
+    The background has the colour of the status. Returns the bottom of the drawing. [px]
     """
     first = next(iter(by_word.values())) if by_word else trade
     (axis,) = first.axes
@@ -199,7 +199,7 @@ def _curves(
 def _curve(
     canvas: svg.Canvas, frame: svg.Box, across: svg.Scale, up: svg.Scale, x: Floats, values: Floats, style: str
 ) -> None:
-    """Draw one curve with gaps at missing values. A single value between gaps is a short line."""
+    """Draw one curve with gaps at missing values. A single value between gaps is drawn as a short line."""
     points = [
         (across.at(position), up.at(value)) if math.isfinite(value) and (value > 0 or not up.is_log) else None
         for position, value in zip(x.tolist(), values.tolist(), strict=True)
@@ -221,7 +221,7 @@ def _curve(
 
 
 def _seen(points: Sequence[svg.Point]) -> list[svg.Point]:
-    """The visible points of a dense curve: the first, lowest, highest and last point of each half pixel."""
+    """Reduce a dense curve to its visible points: the first, lowest, highest and last point in each half pixel."""
     height = itemgetter(1)
     visible: list[svg.Point] = []
     column: list[svg.Point] = []
@@ -235,7 +235,10 @@ def _seen(points: Sequence[svg.Point]) -> list[svg.Point]:
 
 
 def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Floats]) -> float:
-    """A bar of utilization or of a column for each word, in the colour of its status, with dots for rows."""
+    """Draw a bar for each word: its utilization or column value in the colour of its status, and dots for rows.
+
+    Returns the bottom of the drawing. [px]
+    """
     (axis,) = trade.axes
     left = min(max(map(svg.text_width, axis.words)) + 34, _MAX_NAMES_PX)
     canvas.text((8, top + 8), [svg.short(axis.key, _TRADE_WIDTH_PX)], "small")
@@ -277,20 +280,23 @@ def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Float
 
 # ---------------------------------------------------------------- two keys
 class _Plane(NamedTuple):
-    """Coordinates of a map on its page: to the right and up [px], or azimuth [rad] and radius [px] about `middle`."""
+    """Mapping from the keys of a map to the page.
+
+    The scales give horizontal and vertical coordinates [px], or azimuth [rad] and radius [px] around `middle`.
+    """
 
     across: svg.Scale
     up: svg.Scale
     middle: svg.Point | None = None
 
     def at(self, p: float, q: float) -> svg.Point:
-        """Point on the page of coordinates on the two scales."""
+        """Point on the page for a pair of coordinates on the two scales."""
         if self.middle is None:
             return p, q
         return self.middle[0] + q * math.cos(p), self.middle[1] - q * math.sin(p)
 
     def line(self, points: Sequence[svg.Point]) -> list[svg.Point]:
-        """Line on the page through points on the two scales."""
+        """Convert a line through points on the two scales to points on the page; curved lines get more points."""
         line = [self.at(*points[0])]
         for (p, q), (u, v) in pairwise(points):
             step_count = 1 if self.middle is None else max(1, math.ceil(abs(u - p) / _CURVE_STEP_RAD - 1e-9))
@@ -308,14 +314,17 @@ class _Plane(NamedTuple):
 
 
 def _axis_scale(axis: Axis, start: float, end: float) -> svg.Scale:
-    """The scale of an axis. Words have a cell of width 1 each; numbers span the first to the last value."""
+    """Scale of an axis. Each word gets a cell of width 1; the scale of numbers goes from the first to the last."""
     if axis.words:
         return svg.Scale(-0.5, axis.values[-1] + 0.5, start, end)
     return svg.Scale(float(axis.values[0]), float(axis.values[-1]), start, end, axis.is_log)
 
 
 def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometry | None) -> float:
-    """Map of statuses or of a column over two keys, with the line of 100 % and the binding rows."""
+    """Draw a map of statuses or of a column against two keys, with the 100 % contour and the binding rows.
+
+    Returns the bottom of the drawing. [px]
+    """
     trade = thinned(trade)
     x, y = trade.axes
     left = min(max(map(svg.text_width, y.words)) + 34, _MAX_NAMES_PX) if y.words else _TRADE_LEFT_PX + 10
@@ -360,7 +369,7 @@ def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometr
 
 
 def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[float]) -> Iterator[svg.Box]:
-    """Cells of a mask as rectangles. Neighbours along the first axis share a rectangle."""
+    """Yield the cells of a mask as rectangles. Neighbours along the first axis are merged to one rectangle."""
     for j in range(mask.shape[1]):
         padded = np.concatenate([[False], mask[:, j], [False]])
         ends = np.flatnonzero(padded[1:] != padded[:-1])
@@ -370,7 +379,7 @@ def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[fl
 
 
 def _limit(trade: Trade, plane: _Plane) -> list[tuple[svg.Point, svg.Point]]:
-    """Line of 100 %, interpolated in the logarithms of utilizations, which are less curved."""
+    """Contour line of a utilization of 100 %. It is interpolated in the logarithm, which is less curved."""
     uses = np.asarray(trade.values["utilization"], float)
     # With a row that is not evaluated, the other rows do not determine the distance to the limit.
     unknown = [name for name in trade.statuses if not STATUS[name].is_held]
@@ -385,7 +394,7 @@ def _limit(trade: Trade, plane: _Plane) -> list[tuple[svg.Point, svg.Point]]:
 def _heat(
     canvas: svg.Canvas, frame: svg.Box, trade: Trade, plane: _Plane, columns: Sequence[float], lines: Sequence[float]
 ) -> None:
-    """A column in colours, with a colour scale beside it. Over more than two decades the scale is logarithmic."""
+    """Draw a column as a heat map with a colour bar. Above two decades the colour scale is logarithmic."""
     column_values = np.asarray(trade.values[trade.column], float)
     column_values = np.where(np.isfinite(column_values), column_values, np.nan)
     finite = column_values[np.isfinite(column_values)]
@@ -426,9 +435,9 @@ def _in_cells(canvas: svg.Canvas, trade: Trade, columns: Sequence[float], lines:
 def _names(
     canvas: svg.Canvas, rows: NumbersOrWords, plane: _Plane, columns: Sequence[float], lines: Sequence[float]
 ) -> list[svg.LegendLine]:
-    """Write the name of its row in each region: level, upright in a tall region, or as a letter.
+    """Write the name of the binding row in each region: horizontally, vertically in a tall region, or as a letter.
 
-    Returns entries of the legend for letters and for regions without a name.
+    Returns legend entries for the letters and for regions without a name.
     """
     letters: dict[str, str] = {}
     named = set()
@@ -466,9 +475,9 @@ def _names(
 
 # ---------------------------------------------------------------- from above
 def _from_above(around: Axis, radius: Axis, frame: svg.Box) -> _Plane:
-    """Coordinates of a polar map: azimuths from east, counter-clockwise, and the other key as a radius from 0.
+    """Mapping of a polar map: azimuth from east, counter-clockwise, and the other key as a radius from 0.
 
-    An elevation is 90 deg in the middle, since a platform there is above the scene.
+    If the other key is an elevation, the middle is 90 deg, because a platform there is above the scene.
     """
     first, last = float(around.values[0]), float(around.values[-1])
     is_elevation = radius.key.endswith(".elevation")

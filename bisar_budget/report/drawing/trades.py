@@ -1,4 +1,4 @@
-"""The content of a drawing of a sweep, as arrays."""
+"""Compute the content of a sweep drawing as arrays: axes, curves, regions and contour lines."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -30,8 +30,8 @@ def check_plot(cases: Cases, *, is_polar: bool) -> None:
     Raises
     ------
     QuestionError
-        The sweep is no grid, does not vary one or two keys, or has too many cases; or a polar map lacks an azimuth or
-        a number from 0 for its radius.
+        The sweep is not a grid, does not vary one or two keys, or has too many cases; or a polar map has no azimuth
+        or no number from 0 for its radius.
     """
     accepted = "accepted: --vary of one key, or of two"
     if not cases.is_grid:
@@ -81,13 +81,13 @@ class Gathered:
             column_pieces.append(self.described.converted(name, part.values[name]))
 
     def passing(self, parts: Iterable[Part]) -> Iterator[Part]:
-        """Parts of a sweep, unchanged. The needed columns of each part are kept."""
+        """Yield the parts of a sweep unchanged, and keep the needed columns of each part."""
         for part in parts:
             self.add(part)
             yield part
 
     def trade(self, *, is_polar: bool = False) -> Trade:
-        """The sweep on sorted axes. In a polar map the azimuth is the first axis."""
+        """Return the sweep with sorted axes. For a polar map, the azimuth is the first axis."""
         axes: list[Axis] = []
         varying_indices, fixed, orders = [], [], []
         for index, (varied, values) in enumerate(zip(self.cases.varied, self.cases.columns, strict=True)):
@@ -112,7 +112,7 @@ class Gathered:
         return Trade(tuple(axes), laid_out, tuple(fixed), self.column, self.heading)
 
     def _axis(self, varied: Varied, values: Values) -> Axis:
-        """Axis of a key, with its values in the order of the sweep."""
+        """Make the axis of a key, with its values in the order of the sweep."""
         if not isinstance(varied, Number):
             words = tuple(values.tolist())
             own_value = float(words.index(varied.value)) if varied.value in words else None
@@ -124,7 +124,7 @@ class Gathered:
 
 
 def _is_log(values: Floats) -> bool:
-    """Whether an axis is logarithmic: its values have a wide span and rather equal ratios than equal steps."""
+    """Whether an axis is logarithmic: its values span a large factor, and are closer to equal ratios than steps."""
     if values[0] <= 0 or values[-1] / values[0] < _LOG_SPAN_RATIO or values.size < 3:
         return False
     steps, ratios = np.diff(values), np.diff(np.log(values))
@@ -132,9 +132,9 @@ def _is_log(values: Floats) -> bool:
 
 
 def per_word(trade: Trade) -> tuple[Axis, Mapping[str, Trade]] | None:
-    """Axis of the words and a sweep over the number for each word, of a sweep over a number and a few words.
+    """Split a sweep over a number and a few words into one sweep over the number for each word.
 
-    None for any other sweep.
+    Returns the axis of the words and the sweeps by word; None for any other sweep.
     """
     word_axes = [word_axis for word_axis, axis in enumerate(trade.axes) if axis.words]
     if len(trade.axes) != 2 or len(word_axes) != 1 or len(trade.axes[word_axes[0]].words) > MAX_ROWS:
@@ -150,15 +150,15 @@ def per_word(trade: Trade) -> tuple[Axis, Mapping[str, Trade]] | None:
 
 
 def rows_that_matter(trade: Trade) -> tuple[str, ...]:
-    """Rows that are the worst row of any case, the most frequent first; at most `MAX_ROWS`."""
+    """Rows that are the worst row in at least one case, the most frequent first; at most `MAX_ROWS` rows."""
     rows, counts = np.unique(trade.values["worst_row"][trade.values["worst_row"] != ""], return_counts=True)
     return tuple(str(row) for row in rows[np.argsort(-counts, kind="stable")][:MAX_ROWS])
 
 
 def uses_of_rows(trade: Trade, gathered: Callable[[Sequence[str]], Gathered]) -> Mapping[str, Floats]:
-    """Utilizations of the rows that matter, over the one key that varies; empty for any other sweep.
+    """Utilizations of the rows that matter in a sweep over one key, (cases,) each; empty for any other sweep.
 
-    `gathered` repeats the sweep and gathers the columns of its argument.
+    `gathered` runs the sweep again and collects the columns with the given names.
     """
     if len(trade.axes) != 1 or trade.column or not (rows := rows_that_matter(trade)):
         return {}
@@ -167,34 +167,34 @@ def uses_of_rows(trade: Trade, gathered: Callable[[Sequence[str]], Gathered]) ->
 
 
 def cell_edges(axis: Axis) -> list[float]:
-    """Edges of the cells around the values of an axis.
+    """Edges of the map cells around the values of an axis.
 
-    The outermost cells of numbers end at the first and the last value. Cells of words extend to both sides.
+    The first and last cell of a number axis end at its first and last value. Cells of words are not cut off.
     """
     edges = axis.edges.tolist()
     return edges if axis.words else [float(axis.values[0]), *edges[1:-1], float(axis.values[-1])]
 
 
 def stretches(begins: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Starts and stops of stretches of equal neighbours.
+    """Yield start and stop indices of the stretches of equal neighbours in a sequence of n items.
 
-    `begins` (n - 1,) says for each item after the first whether it begins a new stretch.
+    `begins` (n - 1,) is True for each item after the first that begins a new stretch.
     """
     return pairwise([0, *(np.flatnonzero(begins) + 1).tolist(), begins.size + 1])
 
 
 def runs(axis: Axis, statuses: NumbersOrWords) -> Iterator[tuple[str, float, float]]:
-    """Stretches of an axis with the same status: status, first edge, last edge."""
+    """Yield the stretches of an axis with the same status, each with its status, first edge and last edge."""
     edges = cell_edges(axis)
     for start, stop in stretches(statuses[1:] != statuses[:-1]):
         yield str(statuses[start]), edges[start], edges[stop]
 
 
 class MapRegion(NamedTuple):
-    """Neighbouring cells of a map with the same worst row.
+    """A region of neighbouring cells of a map with the same worst row.
 
-    `cell` are the indices of the cell with the name, `size` the numbers of cells of the region through it along both
-    axes.
+    `cell` are the indices of the cell where the name is written. `size` are the numbers of connected cells of the
+    region through this cell along the first and the second axis.
     """
 
     row: str
@@ -203,7 +203,7 @@ class MapRegion(NamedTuple):
 
 
 def thinned(trade: Trade) -> Trade:
-    """A sweep over two keys with no more values than a drawing shows. The first and last values stay."""
+    """Reduce a sweep over two keys to as many values as a drawing can show. The first and last values are kept."""
     picks = [
         np.arange(size)
         if axis.words
@@ -235,7 +235,10 @@ def regions(rows: NumbersOrWords) -> list[MapRegion]:
 
 
 def _connected(rows: NumbersOrWords, seen: NDArray[np.bool_], start: tuple[int, int]) -> list[tuple[int, int]]:
-    """Cells with the same row that are connected with a first cell side by side. They are marked as seen."""
+    """Indices of the cells that have the same row as `start` and are connected to it by common sides.
+
+    These cells are marked in `seen`.
+    """
     cells = [start]
     seen[start] = True
     for first, second in cells:  # the list grows in the loop
@@ -248,7 +251,7 @@ def _connected(rows: NumbersOrWords, seen: NDArray[np.bool_], start: tuple[int, 
 
 
 def _innermost(mask: NDArray[np.bool_]) -> tuple[int, int]:
-    """The cell of a mask that remains when the rim is removed again and again."""
+    """Indices of the innermost cell of a mask, found by repeated removal of the border cells."""
     inner = mask
     while True:
         padded = np.pad(inner, 1)
@@ -262,7 +265,7 @@ def _innermost(mask: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def _run(line: NDArray[np.bool_], index: int) -> int:
-    """Number of connected cells of a line around an index."""
+    """Number of consecutive True cells of a line around an index."""
     ends = np.flatnonzero(~line)
     low = ends[ends < index].max(initial=-1)
     high = ends[ends > index].min(initial=line.size)
@@ -270,7 +273,10 @@ def _run(line: NDArray[np.bool_], index: int) -> int:
 
 
 def borders(rows: NumbersOrWords, first: Floats, second: Floats) -> Floats:
-    """Lines between cells of a map with different rows: (count, 2, 2), from edges (n + 1,) and (m + 1,)."""
+    """Border lines between cells (n, m) of a map with different rows, as end points (count, 2, 2).
+
+    `first` (n + 1,) and `second` (m + 1,) are the edges of the cells along the two axes.
+    """
     lines = []
     i, j = np.nonzero(rows[1:] != rows[:-1])
     lines.append(np.stack([np.stack([first[i + 1], second[j]], -1), np.stack([first[i + 1], second[j + 1]], -1)], 1))
@@ -280,10 +286,10 @@ def borders(rows: NumbersOrWords, first: Floats, second: Floats) -> Floats:
 
 
 def level_lines(levels: Floats, x: Floats, y: Floats) -> list[tuple[Point, Point]]:
-    """Lines along which a grid of numbers is 0, by linear interpolation between its points.
+    """Contour lines where a grid of numbers is 0, by linear interpolation between the grid points.
 
-    `levels` is (n, m) at `x` (n,) and `y` (m,). A cell with a corner that is not finite has no line. In a saddle the
-    mean of the corners decides which corners are connected.
+    `levels` is (n, m) at `x` (n,) and `y` (m,). A cell with a corner that is not finite has no line. In a saddle, the
+    mean of the four corners decides which corners are connected.
     """
     lines: list[tuple[Point, Point]] = []
     is_finite = np.isfinite(levels)

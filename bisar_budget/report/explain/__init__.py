@@ -1,1 +1,1 @@
-"""How a row comes to its status: equations with their numbers, and how they are set."""
+"""Explanations of the status of a row: the equations with their numbers, and their typesetting."""

@@ -1,4 +1,4 @@
-"""The first half of an explanation: an error, from its line in the file to its phase, displacement and share."""
+"""Explanation steps of an error: from its line in the file to its phase, displacement and allowable."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -23,7 +23,7 @@ from bisar_budget.report.words.sentences import dotted
 
 
 def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
-    """Steps from the line in the file to `declared`: value, frame and coverage factor."""
+    """Yield the steps from the line in the file to the value `declared`: stated value, frame and coverage factor."""
     yield from stated(mission, source.path, source.declared, source.evidence)
     if source.declared is None:
         return
@@ -52,7 +52,7 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
 
 
 def _rotated_declaration(mission: Mission, source: ErrorSource, axis: str) -> Iterator[Step]:
-    """Step from the errors in another frame to the declared error along one axis of the scene."""
+    """Yield the step that converts errors in another frame to the declared error along an axis of the scene."""
     platform, kind = source.owner, source.subject.kind
     error = getattr(mission.platforms, platform).motion_error
     axes = getattr(mission.platforms, platform).state.frame(error.frame)
@@ -78,7 +78,7 @@ def _rotated_declaration(mission: Mission, source: ErrorSource, axis: str) -> It
 
 
 def _quadratic_form(products: Sequence[str], correlation: Sequence[Sequence[float]]) -> str:
-    """Text of the square root of Σ ρᵢⱼ pᵢ pⱼ."""
+    """Write √(Σ ρᵢⱼ pᵢ pⱼ) as text, with the correlation coefficients ρᵢⱼ and the `products` pᵢ."""
     terms = [f"({product})^2" for product in products]
     terms += [
         f"2*{number(rho)}*{products[i]}*{products[j]}"
@@ -90,7 +90,7 @@ def _quadratic_form(products: Sequence[str], correlation: Sequence[Sequence[floa
 
 
 def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterator[Step]:
-    """Steps from `declared` to the quadratic phase error. An error that is not declared has a size of one unit."""
+    """Yield the steps from `declared` to the quadratic phase error; one unit stands in for an undeclared error."""
     size = 1.0 if source.declared is None else abs(source.declared)
     each = " of one unit" if source.declared is None else ""
     signed = math.copysign(size, source.declared or 1.0)
@@ -133,7 +133,10 @@ def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterat
 
 
 def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
-    """Coefficient β̃ of one unit. β̃₂ and β̃₃ follow from their phases at the aperture edge, (2π/λ)·β·(T/2)ⁿ."""
+    """Coefficient β̃ₙ of the range error of one unit, where n is `order`. [m/sⁿ per unit]
+
+    β̃₂ and β̃₃ are computed from their phases at the aperture edge, (2π/λ)·β̃ₙ·(T/2)ⁿ.
+    """
     if order < 2:
         return float(source.effect[order])
     phase = float(source.effect.qpe if order == 2 else source.effect.cubic)
@@ -209,7 +212,7 @@ def _source_of(analysis: Analysis, platform: str, kind: str, axis: str) -> Error
 
 
 def _common_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Steps of an error of both platforms, whose effects add with their signs."""
+    """Yield the steps for an error that both platforms share; the phases of both legs add with their signs."""
     _, _, kind, axis, *_ = source.subject
     values = {}
     for platform in PLATFORMS:
@@ -231,7 +234,7 @@ def _common_effect(analysis: Analysis, source: ErrorSource, size: float, each: s
 
 
 def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Steps of a time tag error: velocity and acceleration times the tag, and the phase by the published model."""
+    """Yield the steps for a time tag error: its position and velocity errors, and its published phase."""
     for name in (PLATFORMS[index] for index in source.platforms):
         state: PlatformState = getattr(analysis.geometry, name)
         values = {"δt": size}
@@ -258,14 +261,17 @@ def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each:
 
 
 def _times_declared(source: ErrorSource, size: float, each: str) -> Step:
-    """Step from the effect of one unit to that of the declared size."""
+    """Return the step that multiplies the effect of one unit by the declared size."""
     values = {"QPE/unit": abs(float(source.effect.qpe)), "declared": size}
     qpe = abs(float(source.effect.qpe)) * size
     return step(f"Quadratic phase error{each}", WorkedEquation("QPE", "QPE/unit*declared", values, qpe, "rad"))
 
 
 def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[str, float]:
-    """Effects along the axes of the scene, projected on the axis of the error: text and value of the sum."""
+    """Project the effects along the axes of the scene on the axis of the error.
+
+    Returns the sum as text and as a number [rad per unit].
+    """
     _, _, kind, axis, frame, _ = source.subject
     state: PlatformState = getattr(analysis.geometry, platform)
     direction = plain_vector(state.frame(frame)[FRAME_AXES[frame].index(axis)])
@@ -275,7 +281,10 @@ def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[
 
 
 def _common_projected_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Steps of equal components in the frames of both platforms, whose projections add with their signs."""
+    """Yield the steps for an error with equal components in the frames of both platforms.
+
+    The projected effects of both platforms add with their signs.
+    """
     axis, frame = source.subject.axis, source.subject.frame
     unit, values = f"rad per {source.unit}", dict[str, float]()
     for platform in PLATFORMS:
@@ -294,7 +303,10 @@ def _common_projected_effect(analysis: Analysis, source: ErrorSource, size: floa
 
 
 def _projected_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Steps of an error along an axis of another frame: projection of the effects along the axes of the scene."""
+    """Yield the steps for an error along an axis of another frame.
+
+    Its effect is the projection of the effects along the axes of the scene.
+    """
     terms, _ = _projected(analysis, source, source.owner)
     unit = f"rad per {source.unit}"
     yield step(
@@ -305,7 +317,7 @@ def _projected_effect(analysis: Analysis, source: ErrorSource, size: float, each
 
 
 def _displacement(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
-    """Step to the displacement of the image by (25)."""
+    """Yield the step that computes the displacement of the image, equation (25)."""
     published, by_table = analysis.published, source.effect
     if published.degeneracy or source.declared is None:
         return
@@ -325,14 +337,14 @@ def _displacement(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
 
 
 def location(mission: Mission, path: KeyPath) -> str:
-    """File, line and column of a value, or of the nearest key above it in the file."""
+    """Text `file:line:column` of a value, or of its nearest parent key that the file has."""
     line = mission.line(path)
     file = printable(mission.file)
     return file if line is None else f"{file}:{line.region.line}:{line.region.column}"
 
 
 def stated(mission: Mission, path: KeyPath, declared: float | None, evidence: str | None) -> Iterator[Step]:
-    """Steps with the line and the evidence of a declared value, or with the key that is missing."""
+    """Yield the steps with the line and the evidence of a declared value; one step with the key if it is missing."""
     if declared is None:
         yield step(missing(mission, path))
         return
@@ -342,12 +354,12 @@ def stated(mission: Mission, path: KeyPath, declared: float | None, evidence: st
 
 
 def missing(mission: Mission, path: KeyPath) -> str:
-    """Sentence that the file does not declare a key."""
+    """Sentence that says that the file does not declare a key, with the location of the nearest key."""
     return f"Not declared: no {dotted(path)} (the nearest key is at {location(mission, path)})"
 
 
 def as_written(mission: Mission, path: KeyPath) -> str:
-    """Key and text of a value, or of the nearest value above it in the file."""
+    """Text `key: value` of a value, or of its nearest parent key that the file has."""
     while path and path not in mission.places:
         path = path[:-1]
     text = getattr(mission.places.get(path), "value", None)
@@ -361,10 +373,10 @@ _MIN_SHOWN_BEYOND_RAD = 1e-6  # rms phase beyond the cubic that may be rounding
 
 
 class Residual:
-    """Range error of an error of a signed size at the displaced image of the scene centre.
+    """Residual range error at the displaced image point of the scene centre, for an error of a signed size.
 
-    `image_point` is the displacement east and north [m], None if there is no image. `ranges` are the range errors at
-    the nodes of the fit. [m]
+    `image_point` is the displacement east and north [m], None if there is no image. `ranges` are the residual range
+    errors at the nodes of the fit. [m]
     """
 
     def __init__(self, analysis: Analysis, source: ErrorSource, size: float) -> None:
@@ -388,21 +400,21 @@ class Residual:
 
     @cached_property
     def orders(self) -> list[float]:
-        """Mean, and orders 1 to 3 at the aperture edge, signed. [m]"""
+        """Orders 0 to 3 of the range error: its mean, and signed values of orders 1 to 3 at the aperture edge. [m]"""
         return [
             math.fsum(w * m for w, m in zip(weights, self.ranges, strict=True)) for weights in self.exact.fit.tolist()
         ]
 
     @cached_property
     def beyond(self) -> list[float]:
-        """Range error at the nodes less orders 0 to 3. [m]"""
+        """Range error at the nodes after the subtraction of orders 0 to 3. [m]"""
         fitted_orders = np.polynomial.legendre.legvander(self.exact.sampling.places, _CUBIC_ORDER) @ (
             self.orders / LEGENDRE_LEADING
         )
         return _without_rounding((np.array(self.ranges) - fitted_orders).tolist(), self.rms(self.ranges))
 
     def rms(self, values: Sequence[float]) -> float:
-        """Root of the mean square over the aperture of values at the nodes. [m]"""
+        """Rms over the aperture of `values` [m] at the nodes. [m]"""
         return math.sqrt(math.fsum(w * m * m for w, m in zip(self.exact.fit[0].tolist(), values, strict=True)))
 
     @property
@@ -412,21 +424,25 @@ class Residual:
 
     @property
     def is_turned(self) -> bool:
-        """Whether a line of sight turns by more than a radian, so that orders have no meaning."""
+        """Whether a line of sight turns by more than a radian, so that polynomial orders have no meaning."""
         return bool(self.exact.is_turned[0])
 
     def phase(self, order: int) -> float:
-        """Phase of an order at the aperture edge, signed. [rad]"""
+        """Signed phase at the aperture edge of one order of the range error. [rad]"""
         return self.k * self.orders[order]
 
     @property
     def beyond_phase(self) -> float:
-        """Rms phase beyond the cubic. [rad]"""
+        """Rms phase of the range error beyond the cubic order. [rad]"""
         return self.k * self.rms(self.beyond)
 
     @property
     def hidden(self) -> float:
-        """Quadratic phase with the same loss of peak as the range errors that band and turn hide. [rad]"""
+        """Quadratic phase with the same peak loss as the range errors that a quadratic phase does not show. [rad]
+
+        These errors are the range error over the band and its slope. If `is_turned`, the cubic order and the rest are
+        included.
+        """
         square = float(self.exact.band[0]) * self.rms(self.ranges) ** 2 + self.orders[_SLOPE_ORDER] ** 2 / 3
         if self.is_turned:
             square += 4 * self.orders[_CUBIC_ORDER] ** 2 / 175 + self.rms(self.beyond) ** 2
@@ -434,18 +450,22 @@ class Residual:
 
     @property
     def judged(self) -> float:
-        """Phase that is compared with a limit, which contains the gain of autofocus. [rad]"""
+        """Phase that is compared with a limit. [rad]
+
+        The limit contains the gain of autofocus. Autofocus does not correct the hidden phase, so the hidden phase is
+        multiplied by this gain.
+        """
         return math.hypot(self.phase(_QUADRATIC_ORDER), self.gain * self.hidden)
 
     def sum(self, symbol: str, order: int) -> Sum:
-        """The sum that gives the phase of an order."""
+        """Text of the weighted sum of the range errors that gives the phase of an order."""
         terms = self._terms(order)
         return Sum(
             f"{symbol} = 2*π/{number(self.radar.wavelength)}*({terms}) = {with_unit(self.phase(order), 'rad')}"
         )
 
     def steps(self, mark: str = "full") -> Iterator[Step]:
-        """Steps from the remaining range error to the judged phase."""
+        """Yield the steps from the residual range error to the phase that is judged."""
         values = {"B": self.radar.bandwidth, "f_0": self.radar.center_frequency}
         b = math.sqrt(float(self.exact.band[0]))
         orders: list[WorkedEquation | str] = [
@@ -492,12 +512,12 @@ class Residual:
             yield step("Judged against a limit that includes the gain: autofocus corrects no hidden phase", worked)
 
     def listed(self, values: Sequence[float]) -> list[str]:
-        """Lines of values at the nodes, with their times."""
+        """Write a line with time and value for each node; `values` are in metres."""
         times = self.exact.times[:, 0].tolist()
         return [f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, values, strict=True)]
 
     def rest_steps(self) -> Iterator[Step]:
-        """Steps that list the range error beyond the cubic at the nodes, and compute the rms of its phase."""
+        """Yield the steps that list the range error beyond the cubic order and compute its rms phase."""
         yield step("Beyond P₃ there", *self.listed(self.beyond))
         terms = self._products(self.beyond)
         wavelength = number(self.radar.wavelength)
@@ -517,7 +537,7 @@ class Residual:
 
 
 def _without_rounding(values: Sequence[float], full_size: float) -> list[float]:
-    """Values, with 0 for those that are rounding errors of differences of numbers of `full_size`."""
+    """Replace values by 0 that may be rounding errors of a difference between numbers as large as `full_size`."""
     return [value if abs(value) > VECTOR_ROUNDING_FRACTION * full_size else 0.0 for value in values]
 
 
@@ -536,7 +556,7 @@ def _beyond_phase(residual: Residual) -> float:
 def worse_sign(
     analysis: Analysis, source: ErrorSource, size: float, measure: Callable[[Residual], float] = _judged
 ) -> Residual:
-    """Range error of the sign, positive or negative, with the larger phase by `measure`."""
+    """Residual range error of the sign of the error, positive or negative, that has the larger `measure`."""
     signs = [Residual(analysis, source, signed) for signed in (size, -size)]
     if signs[0].is_small or not signs[1].ranges:
         return signs[0]
@@ -545,9 +565,9 @@ def worse_sign(
 
 
 def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Steps from the signed size of an error [unit] to its phases by the full model.
+    """Yield the steps from the signed size of an error to its phases by the full model.
 
-    An error that is not declared has a size of one unit, and `each` says so.
+    `size` is in the unit of the error. An undeclared error has a size of one unit; the text `each` states this.
     """
     each = each.replace(" of ", ", for ")
     if not source.is_heard:
@@ -587,7 +607,7 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
 
 
 def _orbit_motion(analysis: Analysis, source: ErrorSource, size: float) -> Iterator[Step]:
-    """Steps with the motion of each platform in free fall by an error, at the first and the last node of the fit."""
+    """Yield the steps for platforms in free fall, with the position error at the first and last node of the fit."""
     if source.shifts is None:
         return
     times = analysis.exact.times[:, 0].tolist()
@@ -613,7 +633,7 @@ def _residual_formula(exact: ExactRanges) -> str:
 
 
 def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Step with the result of the full model for an error that the published model judges."""
+    """Yield the step with the result of the full model for comparison; the published model judges the error."""
     residual = worse_sign(analysis, source, size, _of_order(_QUADRATIC_ORDER))
     if not residual.ranges:
         yield step(f"Full model{each}, for comparison: no ground point has the range history")
@@ -627,7 +647,7 @@ def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: s
 def at_the_allowable(
     analysis: Analysis, source: ErrorSource, allowable: float, requirement: str = QUADRATIC
 ) -> Iterator[Step]:
-    """Steps that show that an allowable, found by a search, reaches its limit."""
+    """Yield the steps that show that an error as large as an allowable, found by a search, reaches the limit."""
     sizes = [Residual(analysis, source, signed) for signed in (allowable, -allowable)]
     if not all(residual.ranges for residual in sizes):
         return
@@ -650,7 +670,7 @@ def _displacement_of(residual: Residual) -> float:
 
 
 def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
-    """Step that explains the end of the image."""
+    """Yield the step for a limit where the image ends, because no ground point has the range history of the error."""
     yield step(
         "End of the image: no ground point has the range history of a larger error of either sign",
         "The point is followed as the error grows, to where range and Doppler gradients become parallel there",
@@ -659,12 +679,15 @@ def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
 
 
 def no_limit(row: Row) -> Step:
-    """Step of the explanation that says that a row has no limit, and why."""
+    """Return the step that states that a row has no limit, and the reason."""
     return step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
 
 
 def smallest_size(row: Row, sizes: Mapping[str, float]) -> Iterator[Step]:
-    """The allowable of a row: the smallest of the sizes that its requirements allow, each by its symbol."""
+    """Yield the steps to the allowable of a row, the smallest of the `sizes` that its requirements allow.
+
+    `sizes` are given by symbol.
+    """
     if row.allowable is None or not sizes:
         yield no_limit(row)
         return
@@ -692,7 +715,7 @@ RULE_WORDS = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-squa
 
 
 def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
-    """Steps to the limit of the quadratic phase: budget times share times gain."""
+    """Yield the steps to the limit of the quadratic phase: budget · share · gain of autofocus."""
     total, share, gain = allocation.qpe_total, allocation.qpe.of(owner), allocation.autofocus_gain
     owner_words = {
         "clock": "the receiver’s share" if allocation.qpe.clock is None else "the clock’s share",
@@ -705,7 +728,7 @@ def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[St
 
 
 def autofocus_gain(allocation: Allocation) -> Iterator[Step]:
-    """Steps to the gain, the factor by which autofocus multiplies limits."""
+    """Yield the steps to the gain, the factor that autofocus puts on the limits."""
     if allocation.n_pull is None:
         yield step("No autofocus (autofocus.n_pull): gain = 1")
         return
@@ -727,7 +750,10 @@ def combined(
     symbol: str = "combined",
     unit: str = "rad",
 ) -> Iterator[Step]:
-    """Step of the total of errors by a rule: names and sizes of the errors, and their sum. `total` may be None."""
+    """Yield the step that combines the sizes of errors to a total by a rule: the largest, the sum or the rss.
+
+    If `total` is None, the step only lists the names and sizes.
+    """
     title = f"{title}, {RULE_WORDS[rule]}"
     # The remainder of terms that cancel exactly is rounding.
     largest = max((abs(size) for _, size in sizes_by_name), default=0.0)

@@ -1,4 +1,4 @@
-"""Explanation of the phases of sensors, clocks, air and vibrations: figures, lines of sight, spectra, integrals."""
+"""Explanation steps of random errors: the phases of inertial sensors, clocks, air delays and vibrations."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -91,7 +91,7 @@ _PHASE_WORDS = ("quadratic phase at the aperture edge", "cubic phase there", "re
 
 
 def explained_random(analysis: Analysis, allocation: Allocation, error: RandomError, row: Row) -> Iterator[Step]:
-    """Steps of a random error from the line of the file to the allowable."""
+    """Yield the steps of a random error, from its line in the file to its allowable."""
     mission, kind = analysis.mission, error.subject.kind
     model = row.model or "published"
     yield from _declared(mission, error, row)
@@ -141,7 +141,7 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
 
 
 def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Steps of an inertial sensor, with the line of sight at mid-aperture."""
+    """Yield the steps for an inertial sensor by the published model, with the line of sight at mid-aperture."""
     mission, kind = analysis.mission, error.subject.axis
     symbol = _SYMBOLS[kind]
     formulas = inertial_phases(symbol)
@@ -176,7 +176,7 @@ def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _without_arm(analysis: Analysis, error: RandomError) -> RandomError:
-    """The error of an inertial sensor on a platform without a lever arm."""
+    """Return the error of an inertial sensor as if its platform had no lever arm."""
     mission = analysis.mission
     platform = getattr(mission.platforms, error.owner)
     bare = platform._replace(motion_error=platform.motion_error._replace(lever_arm=None))
@@ -186,7 +186,7 @@ def _without_arm(analysis: Analysis, error: RandomError) -> RandomError:
 
 
 def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Steps of the effect of a tilt through the lever arm."""
+    """Yield the steps for the effect of a tilt error through the lever arm."""
     lever = getattr(analysis.mission.platforms, error.owner).motion_error.lever_arm
     if lever is None or lever.arm is None or error.subject.axis not in TILTS:
         return
@@ -206,7 +206,7 @@ _TILT_GROWTH = {"attitude": "ψ", "gyro_bias": "ε·τ", "angle_random_walk": "N
 
 
 def _arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Steps with the arm at mid-aperture, and its swing along the line of sight by a tilt."""
+    """Yield the steps with the lever arm at mid-aperture, and its motion along the line of sight per tilt."""
     mission = analysis.mission
     platform = getattr(mission.platforms, error.owner)
     state, motion = platform.state, platform.motion_error
@@ -256,14 +256,17 @@ def _lever_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _by_unit(values: Sequence[float], unit: str) -> list[str]:
-    """Lines of the quadratic phase, cubic phase and remainder by a unit of an error, as many as `values`."""
+    """Write a line for each of the effects per unit: quadratic phase, cubic phase and residual after the cubic.
+
+    `values` may have fewer than three items.
+    """
     return [
         f"{symbol}/unit = {with_unit(value, unit)}" for symbol, value in zip(_PHASE_SYMBOLS, values, strict=False)
     ]
 
 
 def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
-    """Step with the effects of a unit by the full model, if they differ from the published model."""
+    """Yield the step with the effects per unit by the full model, if they differ from the published model."""
     unit, full = error.published, error.full
     if full[:3] == unit[:3]:
         return
@@ -281,7 +284,7 @@ def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
 
 
 def _displacement(error: RandomError, model: str) -> Iterator[Step]:
-    """Step to the displacement by a unit."""
+    """Yield the step to the displacement of the image per unit of the error."""
     effect = error.effect(model)
     if not effect.displacement > 0:
         return
@@ -298,12 +301,15 @@ def _displacement(error: RandomError, model: str) -> Iterator[Step]:
 
 
 def _per_unit(unit: str, error: RandomError) -> str:
-    """Unit of an effect of a unit of an error. The unit of an oscillator is its noise as declared."""
+    """Unit of an effect per unit of an error, such as `rad per m/s`; only `unit` for an error in dB."""
     return unit if error.unit == "dB" else f"{unit} per {'unit' if error.unit == '1' else error.unit}"
 
 
 def _unit_effect(kind: str, order: int, wavelength: float, T: float) -> float:
-    """Effect of one unit along the line of sight."""
+    """Phase of one unit of an inertial sensor error along the line of sight. [rad]
+
+    `order` selects the quadratic phase (0), the cubic phase (1) or the residual (2).
+    """
     row = evaluators.inertial_phases(1.0, 1.0, 1.0, wavelength, T)[list(_SYMBOLS).index(kind)]
     return row[order]
 
@@ -320,7 +326,7 @@ def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _changing_delay(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Steps of the zenith delay as a process, if it changes within the aperture."""
+    """Yield the steps for the zenith delay as a random process, if it changes within the aperture."""
     correlation_time = correlation_time_of(analysis.mission, error.owner)
     if correlation_time is not None and error.published.quadratic:
         yield from _gauss_markov(
@@ -335,9 +341,10 @@ def _changing_delay(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 def _gauss_markov(
     mission: Mission, error: RandomError, correlation_time: float, along: str, title: str
 ) -> Iterator[Step]:
-    """Steps to the mean squares of the process, and to the quadratic phase of a unit by the published model.
+    """Yield the steps to the mean squares of a Gauss-Markov process, and to its quadratic phase per unit.
 
-    `along` is the symbol of the component along the line of sight.
+    The phase is that of the published model. `along` is the symbol of the component along the line of sight, `title`
+    the title of the last step.
     """
     T, quadratic = mission.collection.aperture_time, error.published.quadratic
     yield step(
@@ -383,7 +390,11 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
 def _slow(
     kind: str, frequency: float, remaining: LeftTone, free: float, mission: Mission, unit: str
 ) -> Iterator[Step]:
-    """Step of a tone, or of its folded frequencies, below one cycle per aperture. Its squares add to the noise."""
+    """Yield the step for a tone below one cycle per aperture, or for its folded frequencies below that.
+
+    The squares of its phases are added to those of the noise. `free` is its peak phase without synchronization, in
+    `unit`.
+    """
     T = mission.collection.aperture_time
     slow = [
         f"{slow_frequency:.6g} Hz, {slow_frequency * T:.3g} cycles per aperture: "
@@ -410,13 +421,16 @@ def _pieces_text(pieces: Sequence[PowerLawPiece]) -> list[str]:
 
 
 def _power_of_f(exponent: float) -> str:
-    """Text of a power of f. A negative exponent is in brackets, so that it is not read as a difference."""
+    """Text of a power of f, with brackets around a negative exponent, so that nobody reads it as a difference."""
     exponent = exponent or 0.0  # white noise has the power −0.0
     return f"f^{exponent:.6g}" if exponent >= 0 else f"f^(\u2212{-exponent:.6g})"
 
 
 def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization) -> Iterator[Step]:
-    """Step with sigmas and correlation of orders 0 and 1 of the range error by a clock's drift since its setting."""
+    """Yield the step for the drift of a clock since it was set.
+
+    The step has the standard deviations of orders 0 and 1 of the range error, and their correlation.
+    """
     T, age, averaging = (
         np.array([value or 0.0]) for value in (mission.collection.aperture_time, sync.age, sync.averaging)
     )
@@ -444,7 +458,7 @@ def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchroniz
 def _integrals(
     pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization | None, unit: str = "rad"
 ) -> Iterator[Step]:
-    """Steps with the contributions of the pieces of a spectrum to the mean squares."""
+    """Yield the steps that integrate each piece of a spectrum to the quadratic phase, cubic phase and residual."""
     T, interval = mission.collection.aperture_time, None if sync is None else sync.interval
     if sync is not None and sync.is_direct_path:
         geometry, delay = mission.geometry, mission.geometry.echo_delay
@@ -494,7 +508,7 @@ def _link(mission: Mission, error: RandomError) -> Iterator[Step]:
 
 
 def _spectrum_steps(vibration: Vibration | FeltVibration, spectrum: Spectrum) -> Iterator[Step]:
-    """Steps with the points of a spectrum of acceleration or displacement, and with its level."""
+    """Yield the steps with the points of a spectrum of acceleration or displacement, and with its shift in level."""
     quantity, unit = ("acceleration", "g²/Hz") if spectrum.is_accelerated else ("displacement", "m²/Hz")
     scale = STANDARD_GRAVITY_MPS2**2 if spectrum.is_accelerated else 1.0
     points = [f"{f:.6g} Hz: {density / scale:.6g} {unit}" for f, density in spectrum.points]
@@ -539,7 +553,7 @@ def _spectrum(mission: Mission, error: RandomError) -> Iterator[Step]:
 
 
 def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
-    """Steps of the random vibration of an oscillator, its slow tones, and the turn of its platform."""
+    """Yield the steps for an accelerated oscillator: random vibration, slow tones, and turn of the platform."""
     name, f_0, sync = error.owner, mission.radar.center_frequency, mission.synchronization
     felt_vibration = felt(mission, name)
     if felt_vibration is None or not any(error.published[:3]):
@@ -577,7 +591,7 @@ def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
 
 
 def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterator[Step]:
-    """Steps from a unit of the zenith delay to the delay of the leg over the aperture."""
+    """Yield the steps from one unit of zenith delay to the delay on the leg `name` over the aperture."""
     mission, delay = analysis.mission, error.subject.axis
     path: PlatformState = getattr(analysis.geometry, name)
     (x, y, z), height = plain_vector(path.position), float(height_of(path.position))
@@ -655,7 +669,7 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
 
 
 def _covered(mission: Mission, error: RandomError) -> float:
-    """Coverage factor within the declared value. That of an oscillator is in its phases instead, which gives 1."""
+    """Coverage factor that the declared value contains; 1 for an oscillator, whose phases contain it instead."""
     return 1.0 if error.unit == "dB" else float(error.coverage(mission))
 
 
@@ -713,7 +727,10 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
 
 
 def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, limited: RandomEffect) -> Iterator[Step]:
-    """Step that adds the power of the cubic phase to the remainder, if no requirement of its own judges it."""
+    """Yield the step that adds the power of the cubic phase to the residual.
+
+    It applies if the mission has no requirement on the cubic phase.
+    """
     k, factor = _covered(mission, error), float(error.coverage(mission))
     values = {"cubic/unit": effect.cubic, "left/unit": effect.spread * k, "k": factor}
     # The remainder is shown for one sigma, the cubic phase with the coverage factor of the declared value or without.

@@ -1,4 +1,4 @@
-"""Explanations of tones, with their echoes and displacements, and of power that noise spreads, alone and in total."""
+"""Explanation steps of tones, with their echoes and displacements, and of phase noise that spreads power."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -41,20 +41,23 @@ from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, numb
 
 
 def allowed_variance(model: str, power: float, energy: float) -> tuple[str, dict[str, float]]:
-    """Formula of the variance that an ISLR allows by a model, and its values."""
+    """Formula of the phase variance that an ISLR allows by a model, and the values of its symbols.
+
+    `power` is the ISLR as a power ratio, `energy` the fraction of the energy within the first nulls of the response.
+    """
     if model == "published":
         return "ISLR", {"ISLR": power}
     return "log(E*ISLR + 1)", {"ISLR": power, "E": energy}
 
 
 def _level(model: str, variance: str) -> str:
-    """Formula of the ISLR of a variance by a model. [dB]"""
+    """Formula of the ISLR [dB] that a phase variance causes by a model; `variance` is its symbol."""
     ratio = variance if model == "published" else f"(e^{variance} - 1)/E"
     return f"10*log({ratio})/log(10)"
 
 
 def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Steps to the total of all powers that spread."""
+    """Yield the steps to the ISLR: the total of all phase variances that spread power, and its allowable."""
     mission, model, owner = analysis.mission, row.model or "published", row.owner
     members = {each.row_id: each.variance for each in declared_powers(analysis, owner, model)}
     total, energy = math.fsum(members.values()), mainlobe_energy(mission)
@@ -92,7 +95,7 @@ def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iter
 def _tones_and_cubic(
     analysis: Analysis, allocation: Allocation, owner: str, model: str, members: Mapping[str, float]
 ) -> Iterator[Step]:
-    """Steps to the powers of tones and of the cubic phase, if no requirement of their own judges them."""
+    """Yield the steps to the spread power of tones and of the cubic phase, if no own requirement judges these."""
     powers = [
         Sum(f"{tone.subject.id} = {number(tone.phase)}^2/2 = {with_unit(members[tone.subject.id], 'rad²')}")
         for tone in tones(analysis.mission)
@@ -115,7 +118,7 @@ def _tones_and_cubic(
 
 
 def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
-    """Steps from all tones to their highest echo in the worst of their phases."""
+    """Yield the steps from all tones to their highest echo, where the phases of the tones are the worst possible."""
     all_tones = tones(mission)
     echo = highest_echo(all_tones)
     if echo is None:
@@ -151,7 +154,7 @@ def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
 
 
 def _with_its_pair(tone: Tone, pair_tone: Tone | None) -> str:
-    """Text of the peak phase of a tone, or of the root-sum-square with a tone a quarter of a turn away."""
+    """Text of the peak phase of a tone, or of its root-sum-square with `pair_tone`, which is 90 degrees apart."""
     return number(tone.phase) if pair_tone is None else f"sqrt({number(tone.phase)}^2 + {number(pair_tone.phase)}^2)"
 
 
@@ -170,7 +173,7 @@ def _echo_level(echo: Echo) -> Iterator[Step]:
 
 
 def use_of_amplitudes(row: Row) -> Iterator[Step]:
-    """Step to the utilization of a row in decibel, if it has one."""
+    """Yield the step to the utilization, a ratio of amplitudes, of a row with values in decibels, if it has one."""
     if row.utilization is None or row.declared is None or row.allowable is None:
         return
     values = {"declared": row.declared, "allowable": row.allowable}
@@ -179,7 +182,10 @@ def use_of_amplitudes(row: Row) -> Iterator[Step]:
 
 
 def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) -> Iterator[Step]:
-    """Steps to the orders of a tone and their displacement, for each axis and for a folded frequency."""
+    """Yield the steps from the orders of a tone to the displacement of the image.
+
+    Each item of `parts`, an axis or a folded frequency, has its own step. `moved` is the total east and north. [m]
+    """
     source = "(25)" if model == "published" else "exact ranges"
     for index, tone_part in enumerate(parts):
         if (tone_part.displacement[:, 0] < 1e-3 * np.abs(moved)).all():
@@ -214,7 +220,7 @@ def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) ->
 
 
 def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Steps from a spur of an oscillator to its paired echoes, and to the level that the platform's share allows."""
+    """Yield the steps from a spur of an oscillator to its paired echoes, and to the level that the share allows."""
     oscillator = getattr(mission.platforms, row.owner).oscillator
     path = ("platforms", row.owner, "oscillator", "spurs")
     entry = row.subject.entry or 0
@@ -245,7 +251,7 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
 
 
 def _phase_at_limit(mission: Mission, row: Row, limits: VibrationLimits, symbol: str) -> tuple[float, Step]:
-    """Peak phase of a vibration at the limit of the platform of a tone, and its step. [rad]"""
+    """Peak phase [rad] of a vibration at the limit for the platform of `row`, and the step that computes it."""
     values = {"A": float(limits.by(row.model or "published")), "λ": mission.radar.wavelength}
     phase = 2 * math.pi * values["A"] / values["λ"]
     by_power = "" if row.metric == "pslr" else ", √2 times the rms value that ISLR allows"
@@ -254,7 +260,7 @@ def _phase_at_limit(mission: Mission, row: Row, limits: VibrationLimits, symbol:
 
 
 def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Steps from a vibration of an oscillator to its echoes, and to the sensitivity that the share allows."""
+    """Yield the steps from a vibration of an oscillator to its echoes and its allowable sensitivity."""
     name, entry = row.owner, row.subject.entry or 0
     tone = next(tone for tone in accelerated_tones(mission) if (tone.name, tone.entry) == (name, entry))
     felt_vibration, f_0 = felt(mission, name), mission.radar.center_frequency
@@ -298,7 +304,10 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
 
 
 def _worst_phases(tone: LeftTone, free: float, mission: Mission) -> Iterator[Step]:
-    """Steps to the quadratic and cubic phase of the echoes of a tone below three cycles per aperture."""
+    """Yield the steps to the largest quadratic and cubic phase of a tone below three cycles per aperture.
+
+    `free` is the peak phase of the tone without synchronization.
+    """
     T = mission.collection.aperture_time
     near = [
         (free * float(share), float(frequency) * T)
@@ -320,9 +329,10 @@ def _worst_phases(tone: LeftTone, free: float, mission: Mission) -> Iterator[Ste
 def near_phases(
     mission: Mission, allocation: Allocation, row: Row, judged: float, sizes: dict[str, float]
 ) -> Iterator[Step]:
-    """Steps from the judged quadratic [rad] and the cubic phase of a slow tone to the size that they allow.
+    """Yield the steps from the quadratic and cubic phase of a slow tone to the size that their limits allow.
 
-    A tone of three cycles per aperture or more has no such steps. The size is added to `sizes`, by its symbol.
+    `judged` is the quadratic phase [rad]. A tone of three cycles per aperture or more has no such steps. The size is
+    added to `sizes` under its symbol.
     """
     limit, allowed = allocation.qpe_allowed(row.owner), mission.requirements.cubic_phase_error
     if not judged and not row.cubic_rad:
@@ -344,13 +354,13 @@ def near_phases(
 
 
 def smallest_of(row: Row, sizes: Mapping[str, float]) -> Step:
-    """Step to the allowable of a tone, the smallest of sizes, which are given by their symbols."""
+    """Return the step to the allowable of a tone, the smallest of `sizes`, which are given by symbol."""
     formula = f"min({', '.join(sizes)})" if len(sizes) > 1 else next(iter(sizes))
     return step("Allowable", WorkedEquation("allowable", formula, sizes, row.allowable or 0.0, row.unit))
 
 
 def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Steps from a stated ISLR to the phase that spreads the same power, and to the requirement."""
+    """Yield the steps from a stated ISLR to the rms phase that spreads the same power, and to its limit."""
     index, model = row.subject.entry or 0, row.model or "full"
     power = next(each for each in stated_powers(mission) if each.subject == row.subject)
     yield from stated(mission, ("other_errors", index, "islr"), row.declared, row.evidence)
@@ -372,5 +382,5 @@ def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Itera
 
 
 def effect_from_elsewhere() -> Step:
-    """The step of an error that is stated by its effect."""
+    """Return the step for an error that the file states by its effect on the image."""
     return step("Stated by its effect on the image, whatever makes it; it has no coverage factor")

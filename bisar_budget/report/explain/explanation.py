@@ -1,4 +1,4 @@
-"""Explanation of a row or a requirement: its line in the file, the equations with their numbers, and the verdict."""
+"""Explain a row or a requirement by its line in the file, the equations with their numbers, and the verdict."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -82,7 +82,7 @@ _MAX_UNIT_CHARACTERS = 16  # of a unit after a number
 
 
 def explain(mission: Mission, findings: MissionFindings, row_id: str) -> str:
-    """Text of the equations of one row of a mission, with their numbers."""
+    """Explain one row of a mission as text, with the equations and their numbers."""
     row = next(row for row in findings.rows if row.id == row_id)
     title = f"{STATUS[row.status].text} {printable(f'{row.id}{own_id(row)}')}"
     steps = _lines(_to_utilization(mission, findings, row))
@@ -92,7 +92,7 @@ def explain(mission: Mission, findings: MissionFindings, row_id: str) -> str:
 
 
 def explain_requirement(mission: Mission, findings: MissionFindings, requirement: JudgedRequirement) -> str:
-    """Text of a requirement of a mission: status, line in the file, and the rows that judge it."""
+    """Explain a requirement of a mission as text: its status, its line in the file, and the rows that judge it."""
     title = f"{STATUS[requirement.status].text} {requirement_id(requirement)}"
     return _text(
         mission,
@@ -113,7 +113,7 @@ def _text(mission: Mission, title: str, body: Iterable[str]) -> str:
 
 
 def _fitted(line: str) -> list[str]:
-    """Break a line. Equations continue with a deeper indent, and are not broken between `=`, result and unit."""
+    """Wrap a line. The next lines of an equation are indented more; `=`, result and unit stay on one line."""
     start = len(line) - len(line.lstrip())
     if not start:
         return wrapped(line, "  ")
@@ -125,7 +125,7 @@ def _fitted(line: str) -> list[str]:
 
 
 def chain(mission: Mission, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Steps from the line of the mission file to the utilization of a row, or to the reason why it is not judged."""
+    """Yield the steps from the line in the file to the utilization of a row, or to the reason why it has none."""
     yield from _to_utilization(mission, findings, row)
     yield from not_judged(findings, row)
 
@@ -181,7 +181,10 @@ def _to_utilization(mission: Mission, findings: MissionFindings, row: Row) -> It
 
 
 def collection_chain(findings: MissionFindings) -> Iterator[Step]:
-    """Steps to look direction, smear direction and determinant of Q, which do not depend on errors."""
+    """Yield the steps to the quantities that depend on the geometry only.
+
+    They are the look direction (11), the smear direction (31) and det Q, the determinant of the matrix in (30).
+    """
     values: dict[str, float] = {}
     for name, state in (("t", findings.geometry.transmitter), ("r", findings.geometry.receiver)):
         (x, y, _), (v_x, v_y, _) = plain_vector(state.position), plain_vector(state.velocity)
@@ -201,7 +204,7 @@ def collection_chain(findings: MissionFindings) -> Iterator[Step]:
 
 
 def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]:
-    """Steps from the requirements to the smallest size that they allow."""
+    """Yield the steps from the requirements to the allowable of an error, the smallest size that they allow."""
     allocation, requirements = analysis.allocation, analysis.mission.requirements
     limit = allocation.qpe_allowed(source.owner)
     yield from limit_steps(allocation, source.owner, limit)
@@ -252,7 +255,10 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
 def _vibration_in_its_unit(
     mission: Mission, allocation: Allocation, row: Row, tone: SlowTone | None
 ) -> Iterator[Step]:
-    """Steps of a vibration. A line that the file states in g is converted to metres and back."""
+    """Yield the steps of a vibration in the unit of the file.
+
+    For a spectral line that the file states in g, the steps are in metres, and the results are converted back.
+    """
     lines = lines_of(mission, row.owner)
     entry = row.subject.entry or 0
     if row.unit == "m" or row.declared is None:
@@ -269,7 +275,10 @@ def _vibration_in_its_unit(
 
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTone | None) -> Iterator[Step]:
-    """Steps of a vibration from the file to the limits of both models, for a line, near lines, or noise."""
+    """Yield the steps of a vibration from the file to the limits by both models.
+
+    The vibration is one spectral line, the sum of several lines near each other, or noise.
+    """
     platform, entry = row.owner, row.subject.entry or 0
     is_sinusoid, is_sum = row.subject.axis != "wideband", row.subject.axis == "sinusoidal.sum"
     path: KeyPath = ("platforms", platform, "motion_error", "vibration", "sinusoidal" if is_sinusoid else "wideband")
@@ -362,7 +371,10 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
 def _limit(
     model: str, formula: str, values: Mapping[str, float], result: float, *, is_power: bool
 ) -> Iterator[WorkedEquation]:
-    """Limit of a vibration by a model. With `is_power` the limit is an rms value, which gives the amplitude."""
+    """Yield the equations for the limit of a vibration amplitude by a model. [m]
+
+    With `is_power` the formula gives an rms value, and a second equation multiplies it by √2.
+    """
     if not is_power:
         yield WorkedEquation(model, formula, values, result, "m")
         return
@@ -372,7 +384,7 @@ def _limit(
 
 
 def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTone) -> Iterator[Step]:
-    """Steps from the phases of a vibration below one cycle per aperture to the amplitude that they allow."""
+    """Yield the steps from the phases of a vibration below one cycle per aperture to its allowable amplitude."""
     axes, gain = tone.declared.axes(), allocation.autofocus_gain
     yield step("By either model", _of_axes("QPE", [phase.quadratic for phase in axes]))
     yield step("Cubic phase likewise", _of_axes("cubic", [phase.cubic for phase in axes]))
@@ -407,13 +419,13 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, tone: Sl
 
 
 def _of_axes(symbol: str, phases: Sequence[Floats]) -> Sum:
-    """Sum of the phases of all axes. [rad]"""
+    """Text of the sum of the phases of all axes, in radians."""
     numbers = [phase.item() for phase in phases]
     return Sum(f"{symbol} = {' + '.join(map(number, numbers))} = {with_unit(math.fsum(numbers), 'rad')}")
 
 
 def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]:
-    """Steps to the amplitudes in metres of a line that the file states in g."""
+    """Yield the steps that convert the amplitudes of a spectral line from an acceleration to metres."""
     line = getattr(mission.platforms, platform).motion_error.vibration.sinusoidal[entry]
     if not isinstance(line, AcceleratedSinusoid):
         return
@@ -426,7 +438,10 @@ def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]
 
 
 def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: int, declared: float) -> Iterator[Step]:
-    """Step to the component of a vibration along the line of sight, or in the range less the direct path."""
+    """Yield the step that projects a vibration on the line of sight.
+
+    With a direct path, the vibration is projected on the change of the range minus the direct path.
+    """
     vibration = getattr(mission.platforms, platform).motion_error.vibration
     value = vibration.sinusoidal[entry].displacement if is_sinusoid else vibration.wideband.rms
     title, is_vector = "Along the line of sight, as it turns, rms over the aperture", isinstance(value, tuple)
@@ -453,7 +468,7 @@ def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: in
 
 
 def _near_lines(mission: Mission, platform: str, index: int, total: float) -> Iterator[Step]:
-    """Step of lines near each other: the amplitude of each at the frequency with the highest sum of echoes."""
+    """Yield the step that adds spectral lines near each other where the sum of their echoes is highest."""
     lines, T = lines_of(mission, platform), mission.collection.aperture_time
     members = near_lines([line.frequency * T for line in lines])[index]
     near = [lines[member] for member in members]
@@ -513,7 +528,7 @@ def _cubic_aggregate(together: Together, findings: MissionFindings, row: Row) ->
 
 
 def _dispersion(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Steps to the quadratic phase over the band of each leg and of both legs."""
+    """Yield the steps to the quadratic phase over the band by ionospheric dispersion, for each leg and for both."""
     mission = analysis.mission
     legs = dispersed_legs(mission, mission.geometry)
     for name, phase in legs.items():
@@ -540,7 +555,7 @@ def _dispersion(analysis: Analysis, findings: MissionFindings, row: Row) -> Iter
 
 
 def _spatial_variance(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Steps to the largest difference of phases between the centre and the edge of the scene."""
+    """Yield the steps to the largest difference in quadratic phase between the edge and the centre of the scene."""
     scene = findings.scene
     if scene is None or scene.degeneracy or row.declared is None:
         return
@@ -593,7 +608,7 @@ _EFFECT_TITLES = {"cubic": "Cubic phase", "spread": "Rms phase that spreads", "t
 
 
 def finding_of(mission: Mission, findings: MissionFindings, requirement: JudgedRequirement) -> Iterator[Step]:
-    """Steps with the line of a requirement in the file, and the rows that judge it."""
+    """Yield the steps with the line of a requirement in the file, and the rows that judge it."""
     path = ("requirements", requirement.key)
     if requirement.key == DECLARE:
         yield from _asked_for(mission)
@@ -612,7 +627,7 @@ def finding_of(mission: Mission, findings: MissionFindings, requirement: JudgedR
 
 
 def declarations(mission: Mission) -> Iterator[Step]:
-    """Steps with the errors that must be declared, and those that the file lacks."""
+    """Yield the steps with the errors that the file must declare, and the errors that it lacks."""
     yield from _asked_for(mission)
     missing_keys = [declaration.lacks or declaration.key for declaration in missing_declarations(mission)]
     yield step("Not in the file", *(missing_keys or ["nothing: all of it is declared"]))
@@ -624,7 +639,10 @@ def _asked_for(mission: Mission) -> Iterator[Step]:
 
 
 def not_judged(findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Steps behind a row that could not be judged: an effect, a path in doubt, or an unknown displacement."""
+    """Yield the steps that explain why a row could not be judged.
+
+    The reason is an effect without a requirement, a path in doubt, or an unknown displacement.
+    """
     analysis = findings.analysed()
     mission, reason = analysis.mission, _reason(findings, row)
     if reason is None:
@@ -645,7 +663,10 @@ def not_judged(findings: MissionFindings, row: Row) -> Iterator[Step]:
 
 
 def _air_that_changes(reason: Note) -> Step:
-    """Step of constant delays in the air: their effect as if they changed, and its share of the allowable."""
+    """Return the step for air delays that are declared constant.
+
+    It gives the effect that they would have if they changed, and the fraction of the allowable that this is.
+    """
     values: Sequence[SectionValue] = reason.values
     _, correlation_time, key, size, use, _ = values
     unit = {"islr": "dB", LOCATION: "m"}.get(key, "rad")
@@ -667,7 +688,10 @@ def _reason(findings: MissionFindings, row: Row) -> Note | None:
 
 
 def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[Step]:
-    """Steps of an effect that no requirement judges: its size, the negligible size, and the size of a row in it."""
+    """Yield the steps for an effect that no requirement judges.
+
+    They give its size, the size that is negligible, and the contribution of the row.
+    """
     kind = untaken.kind
     totals = []
     for model in analysis.gates:
@@ -700,7 +724,7 @@ def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[S
 
 
 def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
-    """Steps of a path in doubt: its possible error, and the position errors that the file declares."""
+    """Yield the steps for a path in doubt: its possible error, and the position errors that the file declares."""
     for doubt in input_doubts(mission):
         if row.owner != "mission" and not is_in_doubt(row.subject, doubt.owner, mission, doubt.kind):
             continue
@@ -727,7 +751,7 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
 
 
 def _of_log(doubt: InputDoubt) -> Step:
-    """Step with the residual of a log or the resolution of its fixes, and the largest negligible value."""
+    """Return the step with the residual of a log or the resolution of its fixes, and the largest negligible value."""
     if doubt.kind == RESIDUAL:
         title = f"Residual of the {doubt.owner}’s smoothed log along the line of sight, rms phase"
         return step(title, f"left = {with_unit(doubt.doubt, 'rad')}", f"most = {with_unit(doubt.declared, 'rad')}")
@@ -737,14 +761,14 @@ def _of_log(doubt: InputDoubt) -> Step:
 
 
 def _stated_by_source(doubt: InputDoubt) -> Step:
-    """Step with the error that the source of a path states, and the declared error along the same axis."""
+    """Return the step with the error that the source of a path states, and the declared error along the same axis."""
     unit = MOTION_UNITS[doubt.kind]
     title = f"The {doubt.kind} error that the source of the {doubt.owner}’s path states exceeds the declared one"
     return step(title, f"stated = {with_unit(doubt.doubt, unit)}", f"declared = {with_unit(doubt.declared, unit)}")
 
 
 def _displacing(analysis: Analysis, row: Row) -> Iterator[Step]:
-    """Step with the phases of clocks whose displacement of the image is unknown."""
+    """Yield the step with the phases of clocks that displace the image by an unknown amount."""
     model, lines = row.model or "published", []
     names = {error.id for error in analysis.random if error.displaces_unknown}
     for contribution in analysis.together(model).own:

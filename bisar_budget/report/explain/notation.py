@@ -1,8 +1,8 @@
-"""Steps and formulas of an explanation, as text with numbers, as MathML and as LaTeX.
+"""Steps and formulas of an explanation as text with numbers, as MathML and as LaTeX.
 
-`catalogue` has the formulas of the derivation typeset. Formulas that only explanations have, such as a projection on
-an axis or a sum over both platforms, are plain text in the same notation: + - * / ^, brackets, | |, sqrt and log, and
-symbols such as β̃_2.
+The formulas of the derivation are typeset in `catalogue`. Other formulas, such as a projection on an axis or a sum
+over both platforms, occur only in explanations. They are plain text with the operators + - * / ^, brackets, | |,
+sqrt and log, and with symbols such as β̃_2.
 """
 
 import re
@@ -46,7 +46,7 @@ class Node(NamedTuple):
 
 
 class Language(NamedTuple):
-    """Templates of the operations in a language, with `%s` for each child.
+    """Templates for writing formulas in an output language, with `%s` for each child of an operation.
 
     `catalogue_index` is the index of this language in the entries of the catalogue.
     """
@@ -106,7 +106,7 @@ LATEX = Language(
 
 @lru_cache(maxsize=256)
 def is_mathematical(formula: str) -> bool:
-    """Whether all symbols of a formula are letters. Other formulas, such as budget times share, stay in words."""
+    """Whether all symbols of a formula are letters. Formulas with words, such as budget times share, stay text."""
     try:
         parsed(formula)
     except ValueError:
@@ -165,7 +165,7 @@ def formula_text(formula: str, language: Language, numbers: Mapping[str, str] | 
 
 
 def symbol(name: str, language: Language) -> str:
-    """Typeset a symbol: its letter with accents, and its subscript."""
+    """Typeset a symbol, which has a letter with accents and a subscript."""
     if name in SYMBOLS:
         return SYMBOLS[name][language.catalogue_index]
     head, _, below = name.partition("_")
@@ -185,7 +185,7 @@ def symbol(name: str, language: Language) -> str:
 
 
 def _bare(node: Node) -> Node:
-    """The node without its outer brackets, which numerators and denominators do not need."""
+    """Remove the outer brackets of a node, since the numerator and denominator of a fraction need none."""
     return node.children[0] if node.kind == "brackets" else node
 
 
@@ -270,36 +270,36 @@ def motion_symbol(kind: str, axis: str, platform: str) -> str:
 
 
 def motion_coefficients(kind: str, axis: str, platform: str) -> dict[int, str]:
-    """Cells of Table I for one motion error, by order in slow time."""
+    """Formulas in Table I for one motion error, by the order of the slow time."""
     names = {order: f"Table I {motion_symbol(kind, axis, platform)} {order}" for order in range(4)}
     return {order: TEXTS[name] for order, name in names.items() if name in TEXTS}
 
 
 def motion_phase(kind: str, axis: str, platform: str) -> str | None:
-    """Cell of Table II; None for a position error, which has no quadratic phase."""
+    """Formula in Table II for one motion error; None for a position error, which has no quadratic phase."""
     return TEXTS.get(f"Table II {motion_symbol(kind, axis, platform)} 0")
 
 
 def clock_coefficient(order: int) -> str:
-    """Cell of the first row of Table I."""
+    """Formula for a clock error in the first row of Table I, for an order of the slow time."""
     return TEXTS[f"Table I t̃ {order}"]
 
 
 def inertial_phases(symbol: str) -> tuple[str, ...]:
-    """Formulas of the quadratic phase, cubic phase and remainder of a unit of an inertial sensor's figure.
+    """Formulas of the quadratic phase, cubic phase and residual per unit of an inertial sensor error.
 
-    A formula is empty if the figure has no such phase.
+    `symbol` identifies the error. A formula is empty if the error has no such phase.
     """
     return tuple(TEXTS.get(f"Inertial sensors {symbol} {order}", "") for order in range(3))
 
 
 def amplitude_share(platform: str) -> str:
-    """Formula of the share of a platform in an amplitude of both platforms."""
+    """Formula of a platform's part of an echo amplitude to which both platforms contribute."""
     return TEXTS[f"amplitude share {platform[0]}"]
 
 
 class WorkedEquation(NamedTuple):
-    """A formula as text, the values of its symbols and its result. A known result has an empty formula."""
+    """A formula as text, with the values of its symbols and its result; the formula is empty for a given number."""
 
     symbol: str
     formula: str
@@ -309,7 +309,7 @@ class WorkedEquation(NamedTuple):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The formula, and below it the formula with numbers and the result, with aligned equals signs."""
+        """Two lines with aligned equals signs: the formula, and the formula with numbers and its result."""
         if not self.formula:
             return (f"{self.symbol} = {with_unit(self.result, self.unit)}",)
         margin = " " * sum(not combining(letter) for letter in self.symbol)
@@ -318,7 +318,7 @@ class WorkedEquation(NamedTuple):
 
 
 class Sum(str):
-    """Text of a sum with its numbers, without any text of the user."""
+    """Text of an equation with numbers only. It contains no text from the user's file."""
 
     __slots__ = ()
 
@@ -331,19 +331,19 @@ class Step(NamedTuple):
 
     @property
     def lines(self) -> Iterator[str]:
-        """The title, and the indented lines below it."""
+        """Yield the title and the indented lines below it."""
         yield self.title
         for item in self.body:
             yield from (f"    {line}" for line in (item.lines if isinstance(item, WorkedEquation) else (item,)))
 
 
 def step(title: str, *body: WorkedEquation | str) -> Step:
-    """One step of an explanation with the equations or texts below its title."""
+    """Make a step of an explanation from its title and the equations or texts below it."""
     return Step(title, body)
 
 
 def filled(formula: str, values: Mapping[str, float]) -> str:
-    """Replace the symbols of a formula by numbers of six digits, negative numbers in brackets."""
+    """Replace the symbols of a formula by numbers with six digits, and put brackets around negative numbers."""
     names = sorted(values, key=len, reverse=True)
     # A symbol ends where no letter, digit or accent follows: v_x is not the start of v_xt.
     pattern = re.compile(r"(?<![\w\u0300-\u036f])(?:" + "|".join(map(re.escape, names)) + r")(?![\w\u0300-\u036f])")
@@ -351,18 +351,18 @@ def filled(formula: str, values: Mapping[str, float]) -> str:
 
 
 def number(value: float) -> str:
-    """Six digits, with brackets around a negative number."""
+    """Write a number with six digits, and with brackets if it is negative."""
     text = six_digits(value)
     return f"({text})" if text.startswith("-") else text
 
 
 def six_digits(value: float) -> str:
-    """Six digits; a zero has no sign."""
+    """Write a number with six digits; zero is written without a sign."""
     return f"{value + 0.0:.6g}"
 
 
 def with_unit(value: float, unit: str) -> str:
-    """Six digits and the unit. A ratio has no unit."""
+    """Write a number with six digits and its unit; a ratio (unit `1`) has none."""
     return f"{six_digits(value)} {'' if unit == '1' else unit.replace('^2', '²')}".rstrip()
 
 
@@ -370,30 +370,30 @@ _MINUS = re.compile("(?<!e)-")  # except the sign of an exponent of ten
 
 
 class Typeset(NamedTuple):
-    """One equation in one language: `symbol = formula`, then `= numbers = result`."""
+    """An equation in one output language, in two parts: `symbol = formula` and `= numbers = result`."""
 
     formula: str
     numbers: str
 
 
 def is_formula(equation: WorkedEquation) -> bool:
-    """Whether an equation is typeset as a formula: a formula of the derivation, or one in letters."""
+    """Whether an equation is typeset as a formula: it is one of the derivation, or its symbols are letters."""
     return not equation.formula or equation.formula in FORMULAS or is_mathematical(equation.formula)
 
 
 def as_text(equation: WorkedEquation) -> Typeset:
-    """Text of an equation with · between factors and without carets."""
+    """Write an equation as text, with · between factors and without carets."""
     formula, *numbers = equation.lines
     return Typeset(readable(formula), readable("".join(numbers).lstrip()))
 
 
 def readable(text: str) -> str:
-    """Text of a formula with mathematical signs for the operators of programs."""
+    """Replace the operators of a programming language by mathematical signs, such as `*` by ·."""
     return _MINUS.sub("−", text.replace("*", " · ").replace("^2", "²").replace("sqrt(", "√("))
 
 
 def as_mathml(equation: WorkedEquation) -> Typeset:
-    """MathML of an equation in three `math` elements, between which a narrow page can break."""
+    """Write an equation as MathML in up to three `math` elements, so that a narrow page can break between them."""
     unit = ""
     if equation.unit:
         unit = f'<mspace width="0.25em"/><mtext>{xml_text(equation.unit.replace("^2", "²"))}</mtext>'
@@ -409,7 +409,7 @@ def as_mathml(equation: WorkedEquation) -> Typeset:
 
 
 def as_latex(equation: WorkedEquation) -> Typeset:
-    """LaTeX of an equation without delimiters. Both lines are aligned at their first `=`."""
+    """LaTeX of an equation, without delimiters; its two lines are aligned at their first `=`."""
     unit = rf"\,\mathrm{{{equation.unit.replace('^2', '^{2}')}}}" if equation.unit else ""
     result = f"{_number_in(LATEX, equation.result)}{unit}"
     formula, numbers = _in_letters_and_numbers(equation, LATEX)
@@ -417,7 +417,7 @@ def as_latex(equation: WorkedEquation) -> Typeset:
 
 
 def _in_letters_and_numbers(equation: WorkedEquation, language: Language) -> tuple[str, str]:
-    """The formula of an equation, and the formula with numbers, negative numbers in brackets."""
+    """Typeset the formula of an equation twice: with symbols, and with numbers (negative ones in brackets)."""
     if equation.formula in FORMULAS:
         formula = FORMULAS[equation.formula][language.catalogue_index]
         index = language.catalogue_index
@@ -434,12 +434,15 @@ def math(content: str) -> str:
 
 
 def catalogued(formula: str, language: Language) -> str:
-    """A formula or symbol of the catalogue in a language, without numbers and without the element around it."""
+    """Formula or symbol of the catalogue in a language, without numbers and without the enclosing element."""
     return (FORMULAS.get(formula) or SYMBOLS[formula])[language.catalogue_index]
 
 
 def _mathml_filled(formula: str, values: Mapping[str, float]) -> str:
-    """Replace elements by numbers. Bases of powers with a power of ten, and negative numbers, are in brackets."""
+    """Replace the MathML elements of symbols by numbers.
+
+    A negative number gets brackets, and so does a number with a power of ten that is the base of a power.
+    """
 
     def filled_match(match: re.Match[str]) -> str:
         value = values[match[2]]
@@ -466,13 +469,13 @@ def _latex_filled(formula: str, values: Mapping[str, float]) -> str:
 
 
 def _latex_symbols(values: Mapping[str, float]) -> re.Pattern[str]:
-    """Pattern that matches the symbols in LaTeX text, but not as parts of longer names or of commands."""
+    """Pattern that matches symbols in LaTeX text, but not inside longer names or commands."""
     longest_first = "|".join(re.escape(symbol) for symbol in sorted(values, key=len, reverse=True))
     return re.compile(rf"(?<![A-Za-z\\])(?:{longest_first})(?![A-Za-z])")
 
 
 def _number_in(language: Language, value: float) -> str:
-    """A number with six digits, with a power of ten if it is large or small."""
+    """Write a number with six digits in a language; a very large or small number gets a power of ten."""
     digits, _, exponent = six_digits(abs(value)).partition("e")
     number = language.number % digits
     if exponent:

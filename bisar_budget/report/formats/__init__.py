@@ -1,1 +1,1 @@
-"""A module for each format; `bisar_budget.report` finds it by name."""
+"""Modules of the report formats. `bisar_budget.report` finds the module of a format by its name."""

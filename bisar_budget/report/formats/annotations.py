@@ -1,7 +1,8 @@
-"""Findings that need attention, at the value in the mission file: commands of GitHub's runner, and SARIF 2.1.0.
+"""Annotate mission files with the findings that need attention: as GitHub workflow commands and as SARIF 2.1.0.
 
-Rows that pass, judge nothing or are not declared are left out. A requirement is a finding if it is broken or waived
-and no row shows that. Overrides from outside a mission file are a finding as well.
+Each finding points to a value in the mission file. Rows that pass, judge nothing or are not declared are left out. A
+requirement is a finding if it is broken or waived and none of its rows has this status. Overrides from outside a
+mission file are a finding as well.
 """
 
 import json
@@ -50,9 +51,9 @@ class _Annotation(NamedTuple):
 
 
 def as_github(report: Report, style: Style) -> str:
-    """Write one command per finding, worst first. Without findings, write one line that is not a command.
+    """Write one workflow command per finding, worst first; without findings, one line that is not a command.
 
-    The runner shows ten errors and ten warnings of a step.
+    The runner shows at most ten errors and ten warnings per step.
     """
     annotations = sorted(
         _annotations(report, style), key=lambda annotation: _COMMANDS_WORST_FIRST.index(annotation.command)
@@ -208,7 +209,7 @@ _RULE_INDEX = {rule: index for index, rule in enumerate(ANNOTATION_RULES)}
 
 
 def as_sarif(report: Report, style: Style) -> str:
-    """Write one log with one run, for code scanning and editors.
+    """Write a SARIF log with one run, for code scanning and editors.
 
     A waived finding is a result with a suppression. Faults of an unusable file are notifications of the tool.
     """
@@ -326,7 +327,7 @@ def _requirement(
 
 
 def _properties(mission: MissionFindings, **values: str | float | None) -> dict[str, str | float]:
-    """Properties of the mission and of a finding that have a value. Texts are made printable."""
+    """Properties of the mission and of a finding, without missing values. Texts are made printable."""
     values = {
         "mission": mission.name,
         "confidence": mission.confidence,
@@ -343,10 +344,10 @@ def _properties(mission: MissionFindings, **values: str | float | None) -> dict[
 def _located(
     rule: str, level: str, message: str, line: int | None, artifact: _Object, name: tuple[str, ...]
 ) -> _Object:
-    """A result with its location and fingerprint.
+    """SARIF result with its location and fingerprint.
 
-    The fingerprint depends on the rule and on `name`, which identifies the finding and stays when lines move. The
-    last item of `name` is the subject of the finding.
+    The fingerprint depends on the rule and on `name`, which identifies the finding and does not change when lines
+    move. The last item of `name` is the subject of the finding.
     """
     return {
         "ruleId": rule,
@@ -379,7 +380,7 @@ def _sarif_region(line: int | None) -> dict[str, int]:
 
 
 def _suppressed(status: str, waivers: Sequence[AppliedWaiver], artifact: _Object) -> _Object:
-    """Suppression by the first waiver that has not expired; empty if the status is not waived.
+    """SARIF suppression with the first waiver that has not expired; empty if the status is not waived.
 
     The waiver is written in the checked file, which the standard calls `inSource`.
     """

@@ -1,4 +1,4 @@
-"""Answers of solve and sensitivity, as text for reading and as JSON: `solve/1` and `sensitivity/1`."""
+"""Write the answers of the commands solve and sensitivity as text and as JSON: `solve/1` and `sensitivity/1`."""
 
 import math
 import re
@@ -31,7 +31,7 @@ Answer = Solution | Comparison | Sensitivity
 
 
 def as_json(answers: Sequence[Answer], style: Style) -> str:
-    """Write `solve/1` or `sensitivity/1`, as the answers need. Values are in SI; a missing value is null."""
+    """Write `solve/1` or `sensitivity/1`, depending on the answers. Values are in SI; a missing value is null."""
     command = "sensitivity" if isinstance(answers[0], Sensitivity) else "solve"
     missions = [
         {"file": answer.file, "name": answer.name, **outside_item(answer), **_document(answer)} for answer in answers
@@ -85,7 +85,7 @@ def _solved(solution: Solution) -> dict[str, object]:
 
 
 def _imaged(imaged: Imaged | None) -> dict[str, object] | None:
-    """Item of the verified row. The verdict has the form of `verify --format json`."""
+    """JSON item of the row that was verified in an image. The verdict has the form of `verify --format json`."""
     if imaged is None:
         return None
     return {
@@ -99,7 +99,7 @@ def _imaged(imaged: Imaged | None) -> dict[str, object] | None:
 
 
 def _compared(comparison: Comparison) -> dict[str, object]:
-    """Item of a comparison of catalogue parts, with the keys of `_solved`. Keys of values and borders are null."""
+    """JSON item of a comparison of catalogue parts. It has the keys of `_solved`; keys that do not apply are null."""
     best = next(iter(comparison.complying), None)
     return {
         "key": comparison.key,
@@ -159,7 +159,7 @@ def _state(state: State) -> dict[str, object]:
 
 
 def _lines_of_parts(comparison: Comparison, style: Style) -> Iterator[str]:
-    """Lines of a comparison: verdict, table of parts with their use of the budget, and footnotes."""
+    """Yield the lines of a comparison: verdict, table of parts with their use of the budget, and footnotes."""
     count, total = len(comparison.complying), len(comparison.parts)
     subject = f"row {printable(comparison.row)} complies" if comparison.row else "the mission complies"
     verdict = f"{subject} with {count} of {total} parts" if count else f"{subject} with none of {total} parts"
@@ -220,7 +220,7 @@ def _range_words(solution: Solution) -> str:
 
 
 def _intervals(solution: Solution) -> Iterator[str]:
-    """Words of each interval of the range that complies, such as "up to 3 m"."""
+    """Yield a text for each interval of values that complies, such as "up to 3 m"."""
     start = ""
     for crossing in solution.crossings:
         value = _value_text(solution, crossing.inside.value)
@@ -281,7 +281,7 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
 
 
 def _shown(imaged: Imaged) -> str:
-    """Verdict of the image on the binding row, in words."""
+    """Text of the verdict from an image of the binding row."""
     row = f"{printable(imaged.row)} at {printable(imaged.at)}"
     verdict = imaged.verdict
     if verdict is None:
@@ -301,12 +301,12 @@ def _shown(imaged: Imaged) -> str:
 
 
 def _undecided(requirement: str | None) -> str:
-    """Words for a state without a deciding row; they name the requirement that cannot be judged."""
+    """Text for a state without a deciding row, with the requirement that cannot be judged, if any."""
     return "no row decides" if requirement is None else f"{REQUIREMENT_NAMES[requirement]} cannot be judged"
 
 
 def _state_words(state: State) -> str:
-    """Status of the mission at a value, with the deciding row and its use of the requirement."""
+    """Text about the mission at one value: its status, the deciding row and the utilization of the requirement."""
     word = STATUS[state.status].text
     word += f" ({waiver_names(state.waived_by)})" if state.waived_by else ""
     if state.reason:
@@ -375,7 +375,7 @@ def _relaxed(relaxed: Relaxed) -> dict[str, object]:
 
 
 def _lines_of_numbers(sensitivity: Sensitivity, style: Style) -> Iterator[str]:
-    """Lines of a sensitivity. Numbers are sorted by the change that uses up the margin, smallest first."""
+    """Yield the lines of a sensitivity. The number whose smallest change uses up the margin comes first."""
     status = STATUS[sensitivity.status]
     requirement = BINDING_WORDS.get(sensitivity.requirement, sensitivity.requirement.replace("_", " "))
     text = f"worst utilization {percent(sensitivity.utilization)}: {printable(sensitivity.worst_row)} ({requirement})"
@@ -424,7 +424,10 @@ def _table(sensitivity: Sensitivity, style: Style) -> Iterator[str]:
 
 
 def to_limit(sensitivity: Sensitivity, slope: Slope) -> str:
-    """Change of a number that uses up the margin: in percent, as a factor from tenfold on, in degrees or in dB."""
+    """Text of the change in a number that uses up the margin.
+
+    It is in percent, in degrees or in dB, or a factor if the number changes tenfold or more.
+    """
     change = sensitivity.to_limit(slope)
     if change is None:
         return "-"

@@ -1,4 +1,4 @@
-"""Requirements and rows as CSV for a spreadsheet: a header, and a line of SI values for each requirement and row.
+"""Write requirements and rows as CSV for a spreadsheet: a header, and a line of SI values for each of them.
 
 The column `kind` says whether a line is a requirement or a row. The line of a requirement has an id such as
 `requirement.islr`, the reached value in the column `declared`, the required value in `allowable`, and the deciding
@@ -72,7 +72,7 @@ _values_of = attrgetter(*_ROW_COLUMNS)
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
-    """Write every requirement and row of a mission, or every fault of an unusable file with the status `error`."""
+    """Write a line for each requirement and row of a mission, or for each fault of an unusable file."""
     return csv_text(_faults(mission) if isinstance(mission, UnusableMission) else _rows(mission))
 
 
@@ -84,8 +84,8 @@ def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
     """Write rows as lines of CSV.
 
-    None is an empty cell. Numbers have all digits that reproduce them. Text that a spreadsheet would take for a
-    formula is made harmless.
+    None becomes an empty cell. Numbers are written with all digits that are needed to reproduce them. An apostrophe
+    is put before text that a spreadsheet would run as a formula.
     """
     output = io.StringIO()
     harmless = ([spreadsheet_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
@@ -161,5 +161,5 @@ def _requirement(requirement: JudgedRequirement) -> dict[str, object]:
 
 
 def _waived_by(judged: Row | JudgedRequirement) -> str | None:
-    """Ids of the waivers in force, as the file writes them; None without a waiver."""
+    """Ids of the waivers in force, spelled as in the file; None without a waiver."""
     return "; ".join(waiver.id for waiver in judged.waived_by) or None

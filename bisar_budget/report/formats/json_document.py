@@ -1,4 +1,4 @@
-"""The report as JSON, `bisar-budget/check/1`. Keys may be added, never changed or removed."""
+"""Write the report as JSON `bisar-budget/check/1`. Later versions may add keys, but never change or remove them."""
 
 import json
 import math
@@ -28,13 +28,13 @@ CHECK_FORMAT = "bisar-budget/check/1"
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
-    """Write the item of one mission, with a line for each row. A number that is not finite is an error."""
+    """Write the JSON item of one mission, with a line for each row. A number that is not finite raises an error."""
     item = _unusable(mission) if isinstance(mission, UnusableMission) else _mission(mission)
     return _indented(item, _INDENTED_LEVELS, _MARGIN)
 
 
 def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
-    """Write the one JSON document."""
+    """Write one JSON document with the items of all missions."""
     document = {"format": CHECK_FORMAT, "version": version, "status": worst(piece.status for piece in pieces)}
     head = _indented(document, 1).removesuffix("\n}")
     missions = f",\n{_MARGIN}".join(piece.text for piece in pieces)
@@ -53,9 +53,9 @@ def _encoder(separator: str) -> Callable[[object], str]:
 
 
 def _indented(value: object, levels: int, margin: str = "") -> str:
-    """JSON of a value whose upper levels are indented.
+    """Write a value as JSON with only the upper `levels` indented.
 
-    `json.dumps` with an indentation runs in Python and takes as long as the check itself.
+    `json.dumps` with an indentation would run in pure Python and take as long as the check itself.
     """
     if levels == 0 or not value or not isinstance(value, dict | list | tuple):
         return _encoder(", ")(value)
@@ -79,12 +79,12 @@ def _indented(value: object, levels: int, margin: str = "") -> str:
 
 
 def document_text(form: str, content: Mapping[str, object]) -> str:
-    """Text of a JSON document of the contract `form`. A number that is not finite is an error."""
+    """Write a JSON document in the documented format `form`. A number that is not finite raises an error."""
     return json.dumps({"format": form, "version": __version__, **content}, indent=2, allow_nan=False) + "\n"
 
 
 def outside_item(mission: "AboutMission") -> dict[str, object]:
-    """JSON item of changes and overrides from outside the mission file; all JSON documents have the same item."""
+    """JSON item of changes and overrides from outside the mission file, the same in all JSON documents."""
     return {
         "set": [change._asdict() for change in mission.changes],
         "overrides": [override._asdict() for override in mission.overrides],
@@ -92,7 +92,7 @@ def outside_item(mission: "AboutMission") -> dict[str, object]:
 
 
 def fault_item(fault: Fault) -> dict[str, object]:
-    """Item of a fault of a file."""
+    """JSON item of a fault in a file."""
     return {
         "line": fault.line,
         "column": fault.column,
@@ -201,7 +201,7 @@ def _warning(warning: FileWarning) -> dict[str, object]:
 
 
 def verdict_item(verdict: Verdict) -> dict[str, object]:
-    """Item of the verdict of images on a limit, with the codes of its reasons."""
+    """JSON item of the verdict from the images at a limit, with the codes of its reasons."""
     reasons = {"reason_code": verdict.reason, "reason_autofocus_code": verdict.reason_autofocus}
     return verdict._asdict() | {name: None if reason is None else reason.code for name, reason in reasons.items()}
 
@@ -228,7 +228,7 @@ def _row(row: Row) -> dict[str, object]:
 
 
 def monte_carlo_item(drawn: MonteCarlo) -> dict[str, object]:
-    """Item of the Monte Carlo result, with the probability of each requirement."""
+    """JSON item of the Monte Carlo result, with the probability of each requirement."""
     return {**drawn._asdict(), "requirements": [requirement._asdict() for requirement in drawn.requirements]}
 
 
@@ -264,7 +264,7 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, object]:
 
 
 def _stated_accuracy(stated: StatedAccuracy) -> dict[str, object]:
-    """Item of the standard deviations that the source of a path states.
+    """JSON item of the standard deviations that the source of a path states.
 
     They are along the axes of the scene, or one total without a direction.
     """

@@ -1,4 +1,4 @@
-"""Passes of a satellite as text for reading, as `passes/1`, CSV, and as events of a calendar (RFC 5545)."""
+"""Write the passes of a satellite as text, as JSON `passes/1`, as CSV, and as calendar events (RFC 5545)."""
 
 import math
 import re
@@ -70,7 +70,7 @@ def _summarized(passes: Passes) -> dict[str, int]:
 
 
 def _item(overpass: SatellitePass) -> dict[str, object]:
-    """Values of a pass, by the keys of JSON and CSV."""
+    """Values of a pass by their keys in JSON and CSV."""
     state = overpass.state
     values: dict[str, object] = {
         "number": overpass.number,
@@ -106,7 +106,7 @@ def _item(overpass: SatellitePass) -> dict[str, object]:
 
 
 def direction(overpass: SatellitePass) -> str:
-    """Direction of the satellite along its orbit, towards north or south."""
+    """Text `ascending` for a satellite that flies towards north, or `descending` for one towards south."""
     return "ascending" if overpass.is_ascending else "descending"
 
 
@@ -145,12 +145,18 @@ _WAIVERS = ("waived by", "", "<")  # a column where any pass is waived
 
 
 def as_text(passes: Passes, style: Style) -> str:
-    """Write text for a terminal: verdict, a table of at most 100 columns and waivers, and the deciding rows."""
+    """Write text for a terminal: verdict, table of passes and notes.
+
+    The table is at most 100 columns wide, without the column of waivers. The notes name the deciding rows.
+    """
     return "\n".join(_lines(passes, style)) + "\n"
 
 
 def verdict(passes: Passes) -> str:
-    """Number of complying passes and of all passes, period and least elevation. Waived passes are counted apart."""
+    """Sentence with the numbers of complying passes and of all passes, the period and the least elevation.
+
+    Waived passes are counted separately.
+    """
     count = len(passes.found)
     comply = len(passes.complying)
     if not count:
@@ -171,7 +177,10 @@ def verdict(passes: Passes) -> str:
 
 
 def _counted(passes: Passes) -> Iterator[str]:
-    """Numbers of passes by status. Statuses without a pass are left out, except for failures."""
+    """Yield texts with the number of passes for each status.
+
+    If no pass is unevaluated or without a mission, this number is left out.
+    """
     counts = passes.counts
     count = len(passes.found)
     yield f"{count} pass{'es' if count > 1 else ''}: {len(passes.complying)} comply"
@@ -183,12 +192,12 @@ def _counted(passes: Passes) -> Iterator[str]:
 
 
 def short_time(instant: Instant) -> str:
-    """An instant to a minute, such as 2026-07-01 00:00."""
+    """Write an instant, rounded down to a minute, such as 2026-07-01 00:00."""
     return _seconds(Instant(instant.day, instant.seconds - instant.seconds % 60))[:16]
 
 
 def _seconds(instant: Instant) -> str:
-    """An instant to a second, such as 2026-07-01 05:30:12."""
+    """Write an instant, rounded to a second, such as 2026-07-01 05:30:12."""
     rounded = Instant(instant.day, 0.0).after(math.floor(instant.seconds + 0.5))
     return rounded.as_text()[:19].replace("T", " ")
 
@@ -239,7 +248,7 @@ def _cells(overpass: SatellitePass) -> tuple[str, ...]:
 
 
 def _metres(size: float | None) -> str:
-    """Three digits, without a power of ten."""
+    """Write a size [m] with three digits and without a power of ten; a dash for None."""
     return "-" if size is None else f"{size:.3g}" if size < 999.5 else f"{size:.0f}"
 
 
@@ -248,9 +257,10 @@ def _degrees(angle: float | None, digits: int = 0) -> str:
 
 
 def _notes(passes: Passes) -> Iterator[str]:
-    """Notes below the passes: deciding rows, reasons, passes cut by the period, and times without an orbit.
+    """Yield the notes below the table of passes.
 
-    Passes with the same deciding row or reason share one note.
+    They name the deciding rows, reasons, passes that the period cuts off, and times without an orbit. Passes with the
+    same deciding row or reason share one note.
     """
     for text, numbers in _grouped(passes.found, _decided):
         yield f"{sentence(text)}: {numbers}."
@@ -295,14 +305,14 @@ def _decided(overpass: SatellitePass) -> str:
 
 
 def _figureless(overpass: SatellitePass) -> str:
-    """Status and reason of a pass, with every number of the reason replaced by `#`."""
+    """Status and reason of a pass, where `#` replaces every number in the reason."""
     return f"{overpass.status} {re.sub(r'-?[0-9][0-9.]*', '#', overpass.reason)}"
 
 
 def _grouped(
     overpasses: Sequence[SatellitePass], text_of: Callable[[SatellitePass], str]
 ) -> Iterator[tuple[str, str]]:
-    """Sentences about passes, each with the numbers of its passes."""
+    """Yield each different text from `text_of` with the numbers of the passes that have it."""
     groups: dict[str, list[int]] = {}
     for overpass in overpasses:
         if text := text_of(overpass):
@@ -312,7 +322,7 @@ def _grouped(
 
 
 def _numbers(numbers: Iterable[int]) -> str:
-    """Numbers as "1, 3 to 5". Empty without numbers."""
+    """Write ascending numbers as text, such as "1, 3 to 5"; empty without numbers."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][-1] + 1:
@@ -331,10 +341,10 @@ _MAX_LINE_BYTES = 75  # without the end of the line
 
 
 def as_ics(passes: Passes, stamp: date) -> str:
-    """Write an event for each pass (RFC 5545), made on the day `stamp` of UTC.
+    """Write a calendar with an event for each pass (RFC 5545). `stamp` is the day (UTC) of its creation.
 
-    Lines end with a line feed, in whose place a calendar has CR and LF. An event keeps its UID with newer elements,
-    as long as the pass stays in its half hour.
+    Lines end with LF; the file must have CR LF instead. With newer orbital elements an event keeps its UID, as
+    long as the culmination stays in the same half hour.
     """
     lines = ["BEGIN:VCALENDAR", "VERSION:2.0", f"PRODID:-//bisar-budget//passes {__version__}//EN"]
     seen: Counter[str] = Counter()
@@ -369,7 +379,7 @@ def _summary(overpass: SatellitePass, passes: Passes) -> str:
 
 
 def _description(overpass: SatellitePass, passes: Passes) -> Iterator[str]:
-    """Facts about a pass, a line each."""
+    """Yield the facts about a pass, one line for each."""
     yield f"{printable(passes.file)}, {passes.platform}, {passes.model} model"
     state = overpass.state
     if overpass.center is not None and state is not None:
@@ -401,15 +411,16 @@ def _description(overpass: SatellitePass, passes: Passes) -> Iterator[str]:
 
 
 def _escaped(text: str) -> str:
-    """Text of RFC 5545, 3.3.11: a backslash before each separator."""
+    """Escape text as in RFC 5545, section 3.3.11, with a backslash before each separator."""
     text = text.replace("\\", "\\\\").replace(";", "\\;").replace(",", "\\,").replace("\n", "\\n")
     return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _folded(line: str) -> Iterator[str]:
-    """Lines of at most 75 bytes. Every line after the first begins with a space. No character is cut.
+    """Fold a line into lines of at most 75 bytes (RFC 5545). Every line after the first begins with a space.
 
-    No continued line begins with a colon, and adjacent `#` are put on two lines: logs take either for a command.
+    No character is split. A continued line does not begin with a colon, and two adjacent `#` are put on different
+    lines, because CI logs would take either for a command.
     """
     start, size = 0, 0
     for index, letter in enumerate(line):

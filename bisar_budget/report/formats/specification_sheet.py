@@ -1,4 +1,4 @@
-"""The sheet of specifications: `allocate/1`, CSV, text for a terminal, Markdown and HTML for a purchaser.
+"""Write the sheet of specifications as JSON `allocate/1`, CSV or terminal text, or as Markdown or HTML for a buyer.
 
 Sphinx-Needs and StrictDoc read the specifications as requirements derived from the requirements of the mission.
 """
@@ -179,13 +179,13 @@ def _offered(offer: Offer) -> str:
 
 
 def _parts_words(spec: Specification) -> str:
-    """First parts of the catalogue that meet a specification, and the number of further parts."""
+    """Text with the first catalogue parts that meet a specification, and the number of other such parts."""
     more = f" and {len(spec.parts) - _LISTED_COUNT} more" if len(spec.parts) > _LISTED_COUNT else ""
     return f"{', '.join(spec.parts[:_LISTED_COUNT])}{more}"
 
 
 def _broken_words(row: Broken) -> list[str]:
-    """Cells of a row in which other errors leave no room."""
+    """Table cells of a row in which the other errors leave no room for the specified errors."""
     if row.used is None:
         return [row.id, "-", percent(row.allowed), "over its limit: they leave no image"]
     if row.used > 1 + MIN_ROOM_FRACTION:
@@ -196,7 +196,7 @@ def _broken_words(row: Broken) -> list[str]:
 
 
 def _way_out(sheet: SpecificationSheet) -> str:
-    """Remedies where other errors leave no room."""
+    """Sentence on how to get room for the specified errors if the other errors leave none."""
     used = [math.inf if row.used is None else row.used for row in sheet.broken]
     room_fraction = 1 - max(used) / (1 - MIN_ROOM_FRACTION)
     permille = math.ceil(1e3 * room_fraction) - 1 if room_fraction > 0 else -1  # strictly less than the room
@@ -206,7 +206,7 @@ def _way_out(sheet: SpecificationSheet) -> str:
 
 
 def _remarks(sheet: SpecificationSheet) -> Iterator[str]:
-    """Remarks for the reader of a sheet."""
+    """Yield remarks for the reader of a sheet, about limits and specifications."""
     for row in limiting(sheet):
         if row.requirement is None and row.id.startswith("negligible"):
             effect = row.id.partition(".")[2]
@@ -289,9 +289,9 @@ def _decided_by(line: RequirementLine) -> doc.Text:
 
 
 def specified(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:
-    """The specifications with their shares and a drawing of the shares of each limit.
+    """Yield the specifications with their shares, and a drawing of the shares of each limit.
 
-    Without specifications: the rows in which other errors leave no room, and the remedy.
+    If there are no specifications, yield the rows in which other errors leave no room, and the remedy.
     """
     if sheet.broken:
         heads = doc.heads("Row", *doc.numbers("Used", "May use"), "")
@@ -347,7 +347,7 @@ ELEMENTS:
 
 
 def as_needs(answers: Sequence[Answer], style: Style) -> str:
-    """Write each specification as a need of the type `req`, with links to the ids of its parents."""
+    """Write each specification as a need of the type `req`, with links to the requirements it is derived from."""
     needs: list[tuple[tuple[str, ...], dict[str, object]]] = []
     for sheet, identity, spec in _specified(answers, style):
         content = [_statement(spec), _rationale(sheet, spec), f"{sheet.name}, {identity.path}"]
@@ -364,7 +364,7 @@ def as_needs(answers: Sequence[Answer], style: Style) -> str:
 
 
 def as_sdoc(answers: Sequence[Answer], style: Style) -> str:
-    """Write each specification as a requirement of a StrictDoc document. UIDs name its parents."""
+    """Write each specification as a requirement of a StrictDoc document, with the UIDs of its parent requirements."""
     specifications = list(_specified(answers, style))
     names = [identity.of(spec.key) for _, identity, spec in specifications]
     uids = distinct([identifier(_PREFIX, name) for name in names], names)
@@ -382,7 +382,7 @@ def as_sdoc(answers: Sequence[Answer], style: Style) -> str:
 def _specified(
     answers: Sequence[Answer], style: Style
 ) -> Iterator[tuple[SpecificationSheet, Identity, Specification]]:
-    """Every specification that has a value, with its sheet and the identity of its mission."""
+    """Yield every specification that has a value, with its sheet and the identity of its mission."""
     sheets = [sheet for sheet, _ in answers if sheet.findings is not None]
     missions = [sheet.findings for sheet in sheets if sheet.findings is not None]
     for sheet, identity in zip(sheets, identities(missions, style), strict=True):
@@ -394,7 +394,7 @@ def _title(sheet: SpecificationSheet, spec: Specification) -> str:
 
 
 def _statement(spec: Specification) -> str:
-    """The requirement in words. The key of the mission file defines the number."""
+    """Write a specification as a sentence. The key of the mission file defines what the number means."""
     return f"{spec.key}, as the mission file counts it, shall be at most {spec.text}."
 
 
@@ -411,7 +411,10 @@ def _rationale(sheet: SpecificationSheet, spec: Specification) -> str:
 
 
 def _parents(sheet: SpecificationSheet, spec: Specification) -> list[str]:
-    """Requirement ids of the project: of rows that limit a specification, of their requirements, of its own rows."""
+    """Requirement ids of the project from which a specification is derived.
+
+    They belong to the rows that limit the specification, to the requirements of these rows, and to its own rows.
+    """
     findings = sheet.findings
     if findings is None or findings.mission is None:
         return []

@@ -1,4 +1,4 @@
-"""The report for a terminal: verdict, table of requirements, geometry, and the rows that matter, worst first."""
+"""Write the report for a terminal: verdict, table of requirements, geometry, and rows that matter, worst first."""
 
 import re
 from bisect import bisect_left
@@ -53,7 +53,7 @@ _MIN_LISTED_ROWS = 3  # also in a report that is longer than a page
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
-    """Write the report of one mission in at most 80 columns. Long names of the file may need more."""
+    """Write the report of one mission in at most 80 columns, or more if the file has long names."""
     return "\n".join(_unusable(mission, style) if isinstance(mission, UnusableMission) else _mission(mission, style))
 
 
@@ -104,7 +104,7 @@ def _alone(mission: MissionFindings) -> list[str]:
 
 
 def _verdict(mission: MissionFindings, style: Style) -> list[str]:
-    """Verdict, name and document of the mission, rule of the judgement, overrides, and doubts about the model."""
+    """Lines above the tables: verdict, name and document of the mission, model and rule, overrides, and doubts."""
     summary = _summary(mission)
     first, *continuation = wrapped(summary, "  ") if mission.changes else wrapped_counts(summary)
     document = ", ".join(filter(None, (document_words(mission.document), mission.document.author)))
@@ -119,7 +119,7 @@ def _verdict(mission: MissionFindings, style: Style) -> list[str]:
 
 
 def requirement_table(mission: MissionFindings, style: Style) -> Iterator[str]:
-    """The table of requirements."""
+    """Yield the lines of the table of requirements."""
     requirement_rows = list(requirement_lines(mission))
     cells = [
         REQUIREMENT_COLUMNS[:4],
@@ -132,7 +132,7 @@ def requirement_table(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 
 def _requirements(mission: MissionFindings, style: Style) -> Iterator[str]:
-    """The table of requirements, the effects that no requirement judges, and the number of declared errors."""
+    """Yield the table of requirements, the effects that no requirement judges, and the number of declared errors."""
     yield from requirement_table(mission, style)
     for effect in unjudged_effects(mission):
         rows = ", ".join(row.id if row.line is None else f"{row.id} of line {row.line}" for row in effect.rows)
@@ -141,7 +141,7 @@ def _requirements(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 
 def _requirement(line: RequirementLine, widths: Sequence[int], style: Style) -> Iterator[str]:
-    """One line of the table of requirements. A long deciding row goes on a line of its own below."""
+    """Yield one entry of the table of requirements. If the deciding row is long, it is written on the next line."""
     start = spaced((line.name, line.allowed, line.reached, line.use), widths, "<>>>")
     decided = ", ".join(filter(None, (line.decided_by, line.remark)))
     if len(start) + 10 + len(decided) <= style.table_width:
@@ -152,9 +152,9 @@ def _requirement(line: RequirementLine, widths: Sequence[int], style: Style) -> 
 
 
 def _head(mission: MissionFindings, style: Style) -> Iterator[tuple[str, str]]:
-    """Keys and texts of the collection geometry, and with -v the number of rows of each status.
+    """Yield names and texts of the collection geometry; with -v also the number of rows of each status.
 
-    The model is left out: it follows the name of the mission.
+    The model is left out, because it is written after the name of the mission.
     """
     yield from ((key, text) for key, text in head(mission) if key != "Model")
     if style.verbosity > 0:
@@ -162,7 +162,7 @@ def _head(mission: MissionFindings, style: Style) -> Iterator[tuple[str, str]]:
 
 
 def _after(mission: MissionFindings, style: Style) -> Iterator[str]:
-    """Lines below the rows: reasons, warnings, results of Monte Carlo and of images."""
+    """Yield the lines below the rows: reasons, warnings, and the results of Monte Carlo and images."""
     if details := list(_details(mission, style)):
         yield from ("", *details)
     yield from (line for text in _asides(mission, style) for line in wrapped(text, "  "))
@@ -177,9 +177,9 @@ _TABLE_HEADER = (f"{'status':<{_STATUS_WIDTH}} row", "declared", "allowable", "u
 
 
 def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
-    """Rows that are declared or limit something, worst first, and the numbers of hidden rows.
+    """Yield the table of rows that are declared or limit something, worst first, and the numbers of hidden rows.
 
-    Passing rows are hidden, least use first, until the table has at most `room` lines.
+    To fit `room` lines, passing rows are hidden, beginning with the row that has the smallest utilization.
     """
     rows, hidden = worst_first(mission.rows), list[Row]()
     # A mission without declared errors shows all rows: the allowables are the answer.
@@ -193,7 +193,7 @@ def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
 
     @cache
     def lines_without(count: int) -> list[str]:
-        """Lines of the table without `count` passing rows, those with the least use."""
+        """Lines of the table without the `count` passing rows that have the smallest utilization."""
         left_out = passing[len(passing) - count :]
         ids = {row.id for row in left_out}
         shown = [row for row in rows if row.id not in ids]
@@ -216,7 +216,7 @@ def _lines(rows: Sequence[Row], cells: Sequence[Sequence[str]], style: Style) ->
 
 
 def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
-    """Explanation of the columns, and the numbers of hidden rows."""
+    """Text below the table that explains its columns and gives the numbers of hidden rows."""
     key = "use: declared / allowable"
     if any(row.binding_requirement not in (None, "quadratic_phase_error") for row in rows):
         key += "; by: requirement that sets the allowable, or for QPE its table, equation or model"
@@ -238,7 +238,7 @@ def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
 
 
 def _limited_by(row: Row) -> str:
-    """Source of the allowable: the binding requirement if it differs from the row's own, else the equation."""
+    """Text that names the requirement that binds a row if it is not the own one of the row, otherwise the equation."""
     binding = binding_words(row)
     if binding:
         return binding if row.binding_requirement == END_OF_IMAGE else binding.split()[0]
@@ -247,10 +247,10 @@ def _limited_by(row: Row) -> str:
 
 @cache
 def _short_reference(equation: str) -> str:
-    """Short name of an equation.
+    """Short name of an equation for a table column.
 
-    `Table II row 4` becomes `II.4`, `Section V, …` becomes `V`, `(25)` stays, an equation of the full model becomes
-    `full`. Other equations have an empty name.
+    `Table II row 4` becomes `II.4`, `Section V, …` becomes `V`, and `(25)` is not changed. An equation of the full
+    model becomes `full`. Other equations have an empty name.
     """
     if equation in ("full model", "first principles"):
         return "full"
@@ -262,7 +262,7 @@ def _short_reference(equation: str) -> str:
 
 
 def _details(mission: MissionFindings, style: Style) -> Iterator[str]:
-    """Reasons of rows that need an explanation. Rows with the same reasons share one paragraph.
+    """Yield paragraphs with the reasons of rows that need an explanation. Rows with the same reasons share one.
 
     With -v every row has a paragraph with its reason, notes and source.
     """

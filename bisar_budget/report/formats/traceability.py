@@ -1,4 +1,4 @@
-"""Every requirement and row for tools that trace them: test cases of JUnit XML, `needs.json` of Sphinx-Needs."""
+"""Write every requirement and row for tools that trace them: JUnit XML, and `needs.json` of Sphinx-Needs."""
 
 import json
 import re
@@ -21,13 +21,15 @@ _NamedNeed = tuple[tuple[str, ...], dict[str, object]]  # name and fields of a n
 
 
 def as_junit(report: Report, style: Style) -> str:
-    """Write a suite per mission with a test case per requirement and row, for GitLab, Jenkins and requirements tools.
+    """Write a test suite for each mission, with a test case for each requirement and row.
 
-    The schema is Jenkins' junit-10, with properties of cases as pytest writes them. A broken requirement is a
-    failure, a row that judges nothing is skipped, an unusable file is an error, a warning passes with a remark in its
-    output. All times are 0, so that reports of equal runs are equal.
+    The report is for GitLab, Jenkins and requirements tools. The schema is Jenkins' junit-10, with properties of test
+    cases as pytest writes them. A broken requirement is a failure, a row that judges nothing is skipped, and an
+    unusable file is an error. A warning passes, with a remark in its output. All times are 0, so that equal runs give
+    equal reports.
 
-    Lines are not indented, and a row without a verdict has only its values as properties: a fleet has 10⁵ rows.
+    To keep the file small (a fleet may have 10⁵ rows), lines are not indented, and a row without a verdict has only
+    its values as properties.
     """
     counts: Counter[str] = Counter()
     suites: list[str] = []
@@ -86,7 +88,7 @@ def _suite_of(mission: MissionFindings, class_name: str, file: str, counts: Coun
 
 
 def _waived_by(judged: MissionFindings | JudgedRequirement | Row) -> str | None:
-    """Ids of the waivers in force, as the file writes them; None without a waiver."""
+    """Ids of the waivers in force, spelled as in the file; None without a waiver."""
     return "; ".join(waiver.id for waiver in judged.waived_by) or None
 
 
@@ -152,7 +154,7 @@ def _row_case(row: Row, mission: MissionFindings, class_name: str, file: str) ->
 
 
 def _outcome(status_name: str, message: str, text: str, line: int | None, file: str) -> Iterator[str]:
-    """Elements of a test case after its properties: failure, skip or remark. A plain pass has no such element."""
+    """Yield the XML element for the outcome of a test case: failure, skip or remark; nothing for a plain pass."""
     status = STATUS[status_name]
     if status.junit == "failure":
         location = f"{file}:{line}: " if line is not None else ""
@@ -166,7 +168,7 @@ def _outcome(status_name: str, message: str, text: str, line: int | None, file: 
 
 
 def _properties(values: Iterable[tuple[str, object]]) -> Iterator[str]:
-    """Elements of the properties that have a value."""
+    """Yield the XML elements of the properties, without missing values."""
     yield "<properties>"
     yield from [_property(name, value) for name, value in values if value is not None]
     yield "</properties>"
@@ -179,12 +181,12 @@ def _property(name: str, value: object) -> str:
 
 @cache
 def _escaped(text: str) -> str:
-    """Text escaped for XML. The cache serves units, equations and sources, which recur in every mission."""
+    """Escape text for XML. Results are cached, because units, equations and sources recur in every mission."""
     return xml_text(text)
 
 
 def _class_name(identity: Identity) -> str:
-    """Dotted name of a mission, by which test tools group: `missions/a.yaml` becomes `missions.a`."""
+    """Dotted name of a mission for grouping in test tools: `missions/a.yaml` becomes `missions.a`."""
     return stem(identity.name).strip("/").replace(".", "_").replace("/", ".")
 
 
@@ -208,7 +210,7 @@ def as_needs(report: Report, style: Style) -> str:
 
 
 def needs_document(version: str, prefix: str, named_needs: Sequence[_NamedNeed]) -> str:
-    """Write needs as `needs.json`. The id of a need is the prefix and the items of its name."""
+    """Write needs as `needs.json`. The id of a need consists of the prefix and the items of its name."""
     names = [name for name, _ in named_needs]
     needs: dict[str, dict[str, object]] = {}
     ids = distinct([identifier(prefix, name) for name in names], names)
@@ -225,12 +227,12 @@ def needs_document(version: str, prefix: str, named_needs: Sequence[_NamedNeed])
 
 
 def identifier(prefix: str, name: tuple[str, ...]) -> str:
-    """Spell a name by the default pattern of Sphinx-Needs, `[A-Z0-9_]{5,}`."""
+    """Make an id from a name that matches the default pattern of Sphinx-Needs, `[A-Z0-9_]{5,}`."""
     return "_".join([prefix, *(re.sub("[^A-Z0-9]+", "_", stem(part).upper()).strip("_") for part in name)])
 
 
 def _unused(identifier: str, needs: Container[str]) -> str:
-    """The identifier, with a number from 2 on if it is used already: a file may be named twice."""
+    """Make an identifier unique. If it is already in `needs`, a number from 2 is appended; a file may occur twice."""
     unique, number = identifier, 2
     while unique in needs:
         unique, number = f"{identifier}_{number}", number + 1
@@ -266,7 +268,7 @@ def _need(title: str, status: str, texts: Sequence[str], *tags: str, link: str |
 
 
 def _origin(line: int | None, mission: MissionFindings, file: str) -> Iterator[str]:
-    """File and line of a value, and changes and overrides from outside the file."""
+    """Yield texts on the origin of a value: file and line, and changes and overrides from outside the file."""
     yield f"{mission.name}, {file}" + (f":{line}" if line is not None else "")
     if mission.changes:
         yield f"Not as the file says: {changes_words(mission.changes)}"

@@ -1,4 +1,4 @@
-"""Verdicts of the images on the limits: text for reading, JSON `bisar-budget/verify/1`."""
+"""Write the verdicts from images at the limits as text and as JSON `bisar-budget/verify/1`."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -65,9 +65,10 @@ def _mission(mission: VerifiedMission, style: Style) -> list[str]:
 
 
 def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
-    """Table of the verdicts, a second table of verdicts with autofocus, and remarks below them.
+    """Make the table of verdicts, a second table of verdicts with autofocus, and remarks below them.
 
-    For a phase, the gating model gives the budget. The next column gives the value of the other model.
+    For a phase, the column `budget` follows from the gating model, and the next column has the value of the other
+    model.
     """
     other_head = next((_OTHER_MODEL_HEADS[row.model] for row in rows), "full")
     heads = ("row", "limit", "budget", other_head, "exact", "image", "verdict")
@@ -83,7 +84,7 @@ def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
 
 
 def reasons_of(rows: Sequence[Verdict]) -> list[str]:
-    """Reasons of verdicts. A reason is written once, after the ids of its rows."""
+    """List the reasons of the verdicts. Each reason is written once, after the ids of its rows."""
     ids: dict[str, list[str]] = {}
     for row in rows:
         for variant, reason in (("", row.reason), (", with autofocus", row.reason_autofocus)):
@@ -93,10 +94,10 @@ def reasons_of(rows: Sequence[Verdict]) -> list[str]:
 
 
 def geometry_remarks(rows: Sequence[Verdict]) -> Iterator[str]:
-    """Remarks below the table of verdicts.
+    """Yield remarks for below the table of verdicts.
 
-    They name the kind of phase in the table, the largest distance between the displacement of an image and that of
-    its gating model, and the largest angle between the smear of an image and (31).
+    They give the kind of phase in the table, the largest distance between the measured displacement and the
+    prediction by the gating model, and the largest angle between the measured smear and the prediction by (31).
     """
     hidden = [row for row in rows if row.of_equal_loss]
     if hidden:
@@ -143,12 +144,15 @@ def _smaller(row: Verdict) -> float | None:
 
 
 def limit(row: Verdict) -> str:
-    """Size of the error in the image."""
+    """Text of the size of the error for which the image was formed."""
     return format_limit(row.boundary_error, row.unit)
 
 
 def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
-    """Budget, predictions by Table II, the full model and exact ranges, and the measurement. Phases are in rad."""
+    """Five table cells of a verdict. Phases are in rad.
+
+    They are the budget, the predictions by Table II, the full model and exact ranges, and the measurement.
+    """
     if row.requirement_db is not None:
         return f"{row.requirement_db:.4g} dB", "-", "-", "-", _decibel(row.measured_db)
     if row.budget_rad is None and row.measured_displacement_m is not None:  # the row has a limit of the displacement
@@ -162,7 +166,10 @@ def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
 
 
 def _by_full(row: Verdict) -> float | None:
-    """Quadratic phase by the full model that the budget limits: that of equal loss where it was measured. [rad]"""
+    """Quadratic phase by the full model that is compared with the budget. [rad]
+
+    It is the quadratic phase of equal peak loss if the image was measured in this way.
+    """
     if row.full_qpe_rad is None or row.measured_equal_loss_qpe_rad is None:
         return row.full_qpe_rad
     return row.equal_loss_qpe_rad
@@ -173,7 +180,7 @@ def _budget(row: Verdict) -> str:
 
 
 def refocused_cells(row: Verdict) -> tuple[str, str, str, str, str]:
-    """Limit with autofocus, budget, residual phase, loss of the refocused peak, verdict."""
+    """Five table cells with autofocus: limit, budget, residual phase, loss of the refocused peak, and verdict."""
     return (
         "-" if row.boundary_autofocus is None else format_limit(row.boundary_autofocus, row.unit),
         _budget(row),

@@ -1,1 +1,1 @@
-"""Words that every format shares, and how text is laid out and escaped."""
+"""Texts that all formats share, and functions that lay out and escape text."""

@@ -28,7 +28,7 @@ _NARROW_ANGLE_DEG = 30.0  # angle between range and Doppler gradients below whic
 
 
 class AboutMission(Protocol):
-    """Findings about a mission, by a check or another study."""
+    """Findings about a mission from a check or another study."""
 
     @property
     def file(self) -> str:
@@ -40,7 +40,7 @@ class AboutMission(Protocol):
 
     @property
     def changes(self) -> tuple[SetValue, ...]:
-        """Values that options put in place of values of the file."""
+        """Values from options that replace values of the file."""
 
     @property
     def overrides(self) -> tuple[Override, ...]:
@@ -48,14 +48,14 @@ class AboutMission(Protocol):
 
 
 def rule_words(mission: MissionFindings) -> str:
-    """Model and rule of combination that judge a mission."""
+    """Text about the model and the rule of combination that judge a mission."""
     return f"{_MODEL_WORDS[mission.model]}, {_COMBINATION_WORDS[mission.combine]}"
 
 
 def overrides_words(mission: AboutMission, *, with_changes: bool = True) -> str:
-    """Settings from outside the file that affect the verdict; empty without any.
+    """Text about the settings from outside the file that affect the verdict; empty if there are none.
 
-    Without `with_changes` values of `--set` are left out.
+    Unless `with_changes` is true, values from `--set` are left out.
     """
     return "; ".join(_overrides(mission, with_changes=with_changes))
 
@@ -69,7 +69,7 @@ def _overrides(mission: AboutMission, *, with_changes: bool) -> list[str]:
 
 
 def overrides_lines(mission: AboutMission) -> list[str]:
-    """Lines of the overrides for a terminal, without `--set`. Overrides that do not fit one line get a line each."""
+    """Lines with the overrides, without `--set`, for a terminal: one line, or one for each override if too long."""
     overrides = _overrides(mission, with_changes=False)
     line = f"Overrides: {'; '.join(overrides)}"
     if len(line) <= TEXT_WIDTH or len(overrides) < 2:
@@ -78,7 +78,7 @@ def overrides_lines(mission: AboutMission) -> list[str]:
 
 
 def file_words(mission: AboutMission) -> str:
-    """File of a mission, with the options that changed its values."""
+    """Text with the file of a mission and the options that changed its values."""
     return (
         f"{printable(mission.file)} {changes_words(mission.changes)}" if mission.changes else printable(mission.file)
     )
@@ -87,7 +87,7 @@ def file_words(mission: AboutMission) -> str:
 def title_lines(
     mission: AboutMission, verdict: str, sgr: str, style: Style, *, more: Sequence[str] = (), remark: str = ""
 ) -> Iterator[str]:
-    """Lines above an answer: the coloured verdict, `more` lines, file and name of the mission, overrides."""
+    """Yield the lines above an answer: coloured verdict, `more` lines, file and name of the mission, overrides."""
     first, *continuation = wrapped(verdict, "  ")
     yield style.coloured(first, sgr)
     yield from continuation
@@ -98,12 +98,15 @@ def title_lines(
 
 
 def document_words(document: Document) -> str:
-    """Number and issue of a document; empty if the file gives neither."""
+    """Text with the number and issue of a document; empty if the file gives neither."""
     return ", ".join(filter(None, (document.number, document.issue and f"issue {document.issue}")))
 
 
 def narrow_gradients(geometry: BistaticGeometry) -> str:
-    """Warning that displacements grow with a narrow angle between the gradients; empty from 30 degrees on."""
+    """Warning that a small angle between range and Doppler gradients enlarges displacements.
+
+    It is empty for angles of 30 degrees or more.
+    """
     angle = float(geometry.gradient_angle)
     if math.degrees(angle) >= _NARROW_ANGLE_DEG:
         return ""
@@ -114,13 +117,13 @@ def narrow_gradients(geometry: BistaticGeometry) -> str:
 
 
 def doubtful_model(mission: MissionFindings) -> str:
-    """Sentence on the doubts about the published model; empty if the model is valid."""
+    """Sentence on why the published model may be invalid for this mission; empty if it is valid."""
     doubt = mission.model_doubt
     return f"{sentence(doubt)}." if doubt else ""
 
 
 def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
-    """Names and texts of the lines on platforms, geometry, resolution, budget, model and scene."""
+    """Yield names and texts of the lines about platforms, geometry, resolution, budget, model and scene."""
     geometry, allocation = mission.geometry, mission.allocation
     is_first = True  # the first squint comes with its explanation
     for name, state in (("Transmitter", geometry.transmitter), ("Receiver", geometry.receiver)):
@@ -178,7 +181,7 @@ def _peak_loss(loss_db: float) -> str:
 
 
 def path_words(path: FlownPath) -> str:
-    """Source of a path, its polynomials, and their distance from the fixes or the orbit of the source."""
+    """Text about a path: its source, its polynomials, and their distance from the fixes or the orbit."""
     text = path.source if path.file is None else f"{path.file}: {path.source}"
     if path.age is not None:
         direction = "old" if path.age >= 0 else "ahead"
@@ -195,7 +198,7 @@ def path_words(path: FlownPath) -> str:
 
 
 def multiple_of_pi(factor: float) -> str:
-    """Write 2 as 2π, 1 as π."""
+    """Write a multiple of π: 2 as `2π`, 1 as `π`."""
     return "π" if factor == 1 else f"{factor:g}π"
 
 

@@ -1,8 +1,8 @@
 """Names of a mission and its findings that do not depend on the current folder or the machine.
 
-Ids of needs, fingerprints and test cases use them. A mission is named by the number of its document, else by its path
-within its repository, else by the name of its file. The path is that of the file itself: a path from the root of the
-repository, a relative path, an absolute path and a symbolic link all give the same name.
+They are used for the ids of needs, fingerprints and test cases. The name of a mission is the number of its document,
+else the path of its file within the repository, else the file name. A relative path, an absolute path and a symbolic
+link to the same file all give the same name.
 """
 
 import os
@@ -19,7 +19,7 @@ _STANDARD_INPUT = "standard input"
 class Identity(NamedTuple):
     """Name of a mission, unique among the files of a run, and the path of its file in reports.
 
-    `shared` are pairs of a requirement id and a row that name findings of several missions of the run.
+    `shared` are the pairs of requirement id and row id that do not identify a finding without the mission name.
     """
 
     name: str
@@ -27,7 +27,10 @@ class Identity(NamedTuple):
     shared: frozenset[tuple[str, str]] = frozenset()
 
     def of(self, subject: str, requirement_id: str | None = None) -> tuple[str, ...]:
-        """Name of a row or requirement: the requirement id of the project, else the mission, and the subject."""
+        """Unique name of a row or requirement: requirement id of the project and `subject`.
+
+        The mission name replaces a missing requirement id, and is inserted after an id in `shared`.
+        """
         if requirement_id is None:
             return self.name, subject
         if (requirement_id, subject) in self.shared:
@@ -36,10 +39,10 @@ class Identity(NamedTuple):
 
 
 def identities(missions: Sequence[MissionFindings | UnusableMission], style: Style) -> list[Identity]:
-    """Identity of every mission of a run. Names do not depend on the order of the missions.
+    """Identities of the missions of a run. The names do not depend on the order of the missions.
 
-    If missions share a document number, their paths follow the number. If files share a path, in different
-    repositories or in none, the path gets parent folders until the paths differ.
+    If several missions have the same document number, the path is appended to the number. If files have the same
+    path, in different repositories or outside any, parent folders are added until the paths differ.
     """
     locations = [_locate(mission.file, style) for mission in missions]
     files = [location.file for location in locations]
@@ -55,14 +58,14 @@ def identities(missions: Sequence[MissionFindings | UnusableMission], style: Sty
 
 
 def digest(*items: str) -> str:
-    """Digest of a name, the same on every machine. File names with half a character have a digest too."""
+    """SHA-256 digest of a name, the same on every machine. File names that are invalid in UTF-8 are accepted."""
     from hashlib import sha256  # OpenSSL takes 5 ms to load; a check to a terminal does not need it
 
     return sha256("\0".join(items).encode(errors="surrogatepass")).hexdigest()
 
 
 def distinct(spellings: Sequence[str], names: Sequence[tuple[str, ...]]) -> list[str]:
-    """Unique spellings of names. A spelling that several names share gets a digest of its name at the end."""
+    """Make the spellings of names unique. If several names have the same spelling, a digest is appended to each."""
     uses = Counter(spelling for spelling, _ in set(zip(spellings, names, strict=True)))
     return [
         spelling if uses[spelling] == 1 else f"{spelling}_{digest(*name)[:8].upper()}"
@@ -76,9 +79,9 @@ def stem(name: str) -> str:
 
 
 def source_path(file: str, style: Style) -> str:
-    """Path of a mission file: within its repository, else below `style.root`, else absolute.
+    """Path of a mission file for a report: relative to its repository, else to `style.root`, else absolute.
 
-    It has forward slashes. Without `style.root` it is the path that was given.
+    It has forward slashes. If `style.root` is empty, the path is returned as given.
     """
     if not style.root or file == "-":
         return file.replace(os.sep, "/")
@@ -103,10 +106,10 @@ class _FileLocation(NamedTuple):
 
 
 def _locate(file: str, style: Style) -> _FileLocation:
-    """Location of a file, and whether a Git work tree contains it.
+    """Find the location of a file, and whether a Git work tree contains it.
 
-    Links are resolved. If the target is outside every work tree, such as in the store of large files that git-annex
-    has in `.git`, the link itself is the file of the repository. A link without a target belongs to a pipe.
+    Links are resolved. If the target is outside every work tree, for example in the store of git-annex in `.git`, the
+    link itself is located. A link without a target, such as that of a pipe, is not resolved.
     """
     if file == "-":
         return _FileLocation(_STANDARD_INPUT, _STANDARD_INPUT)
@@ -125,7 +128,7 @@ def _locate(file: str, style: Style) -> _FileLocation:
 
 
 def _work_tree(folder: str, style: Style) -> str:
-    """Nearest folder, from `folder` upwards, with a `.git`, or GitHub's checkout; empty without one.
+    """Nearest folder, from `folder` upwards, that contains `.git` or is GitHub's checkout; empty if there is none.
 
     In worktrees and submodules `.git` is a file.
     """
@@ -144,13 +147,13 @@ def _below(file: str, folder: str) -> str:
 
 
 def _alike(names: Mapping[str, str]) -> list[str]:
-    """Files that share their name with another file."""
+    """Files that have the same name as another file."""
     uses = Counter(names.values())
     return [file for file, name in names.items() if uses[name] > 1]
 
 
 def _with_distinct_folders(paths: Mapping[str, str]) -> dict[str, str]:
-    """Paths with parent folders before those that several files share, until all differ; absolute paths do differ."""
+    """Add parent folders to equal paths until all paths differ. Absolute paths always differ."""
     names, added = dict(paths), 0
     while alike := _alike(names):
         added += 1
@@ -159,7 +162,7 @@ def _with_distinct_folders(paths: Mapping[str, str]) -> dict[str, str]:
 
 
 def _with_folders(file: str, path: str, count: int) -> str:
-    """Path of a file with `count` further parent folders."""
+    """Path of a file, extended by `count` parent folders."""
     full_path = file.replace(os.sep, "/")
     folders, length = full_path.strip("/").split("/"), path.count("/") + 1 + count
     return "/".join(folders[-length:]) if length <= len(folders) else full_path
@@ -168,7 +171,7 @@ def _with_folders(file: str, path: str, count: int) -> str:
 def _shared_requirements(
     missions: Sequence[MissionFindings | UnusableMission], files: Sequence[str], names: Mapping[str, str]
 ) -> frozenset[tuple[str, str]]:
-    """Pairs of a requirement id and a row that occur in several files, or whose id is the name of a mission too."""
+    """Pairs of requirement id and row id that are in several files or whose requirement id is a mission name."""
     used = {
         (row.requirement_id, row.id, file)
         for mission, file in zip(missions, files, strict=True)

@@ -1,4 +1,4 @@
-"""Words of every format about requirements: status, deciding row, and probability by Monte Carlo."""
+"""Texts about requirements that all formats use: status, deciding row, and probability by Monte Carlo."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -24,10 +24,10 @@ REQUIREMENT_COLUMNS = ("requirement", "allowed", "reached", "use", "status", "de
 
 
 class RequirementLine(NamedTuple):
-    """One line of the table of requirements, in words.
+    """One line of the table of requirements, as texts.
 
-    `decided_by` is the deciding row, or the reason why nothing could be judged. `remark` names the share that `use`
-    refers to, with its reached and allowed values, the gain of autofocus, and the waivers.
+    `decided_by` is the deciding row, or the reason why nothing could be judged. `remark` has the share of the
+    requirement to which `use` refers, with its reached and allowed values, the gain of autofocus, and the waivers.
     """
 
     requirement: JudgedRequirement
@@ -41,7 +41,7 @@ class RequirementLine(NamedTuple):
 
 
 def requirement_id(requirement: JudgedRequirement) -> str:
-    """Id of a requirement in lists that hold rows too, such as `requirement.islr`."""
+    """Id of a requirement, such as `requirement.islr`, for lists that also contain rows."""
     return f"requirement.{requirement.key}"
 
 
@@ -64,9 +64,9 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
 
 
 def use_remarks(requirement: JudgedRequirement) -> Iterator[str]:
-    """Remarks on a use that is not the reached value over the allowed value.
+    """Yield remarks that explain a utilization different from the ratio of reached to allowed value.
 
-    They name the row with the largest use, the share that decides, and the gain of autofocus.
+    They name the row with the largest utilization, the share that decides, and the gain of autofocus.
     """
     if requirement.is_unjudged or requirement.value is None:
         return
@@ -85,7 +85,7 @@ _SHARE_NAMES = {"autofocus": "autofocus pull-in", "scene": "at the scene's edge"
 
 
 def share_words(requirement: JudgedRequirement, share: DecidingShare) -> str:
-    """Owner of the deciding share, with the reached and allowed values: `receiver's share: 24.4 of 31.5 deg`."""
+    """Text about the deciding share and its values, such as `receiver's share: 24.4 of 31.5 deg`."""
     reached, allowed = requirement_size(share.reached, requirement), requirement_limit(share.allowed, requirement)
     number, _, unit = reached.rpartition(" ")
     if number and allowed.endswith(f" {unit}"):  # the unit is written once
@@ -94,7 +94,7 @@ def share_words(requirement: JudgedRequirement, share: DecidingShare) -> str:
 
 
 def share_columns(requirement: JudgedRequirement) -> dict[str, str | float | None]:
-    """Deciding share and gain of autofocus, by the names of columns and properties."""
+    """Values about the deciding share and the gain of autofocus, by the names of columns and properties."""
     share = requirement.share
     return {
         "share_owner": None if share is None else share.owner,
@@ -105,7 +105,7 @@ def share_columns(requirement: JudgedRequirement) -> dict[str, str | float | Non
 
 
 def confidence_words(mission: MissionFindings) -> str:
-    """Confidence with which the requirements of a mission are met, after a space; empty if one fails."""
+    """Confidence at which a mission meets its requirements, as text after a space; empty if a requirement fails."""
     status = STATUS[mission.status]
     return f" {mission.confidence}" if status.is_held and not status.fails else ""
 
@@ -132,9 +132,9 @@ def requirement_finding(requirement: JudgedRequirement, mission: MissionFindings
 
 
 def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
-    """Sentence on the whole mission: every requirement is met, or the number of broken or unjudged ones by kind.
+    """Sentence about the whole mission: every requirement is met, or how many are broken or cannot be judged.
 
-    With `is_brief` the sentence leaves out verbs.
+    With `is_brief` the sentence has no verbs.
     """
     if mission.is_empty:
         return "the file declares no error" + ("" if is_brief else ", so nothing is judged; the allowables follow")
@@ -167,7 +167,7 @@ def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
 
 
 def _waived(mission: MissionFindings, *, is_brief: bool) -> list[str]:
-    """Number of waived requirements, else of waived rows, with the waivers; empty without a waiver."""
+    """Text with the number of waived requirements (or else rows) and the waivers; empty if nothing is waived."""
     counts = [sum(item.status == "waived" for item in judged) for judged in (mission.requirements, mission.rows)]
     count, noun = (counts[0], "requirement") if counts[0] else (counts[1], "row")
     if not count:
@@ -179,7 +179,7 @@ def _waived(mission: MissionFindings, *, is_brief: bool) -> list[str]:
 
 
 def _met(mission: MissionFindings, waived: Sequence[str]) -> str:
-    """Verdict of a mission in which nothing is broken, with its waivers, warnings and autofocus."""
+    """Verdict of a mission that breaks nothing, with a mention of waivers, warnings or autofocus."""
     text = ", ".join(waived) or f"every requirement is judged and met {mission.confidence}"
     if "warn" in mission.statuses:
         return f"{text}, with warnings"
@@ -220,7 +220,7 @@ def is_explained_in_table(row: Row) -> bool:
 
 
 def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
-    """Requirements that are broken or waived without a row of the same status; rows alone would not show them."""
+    """Broken or waived requirements for which no row has the same status, so that the rows do not show them."""
     statuses = {row.id: row.status for row in mission.rows}
     return [
         requirement
@@ -231,7 +231,7 @@ def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
 
 
 def declared_words(kinds: DeclaredKinds) -> str:
-    """Sentence with the number of declared kinds of error, and the kinds not declared, without source or shifted."""
+    """Sentence about the declared kinds of error: their number, and those missing, without source or shifted."""
     text = f"Declared {len(kinds.declared)} of {kinds.in_all} kinds of error"
     if kinds.missing:
         text += f"; not declared: {', '.join(kind_names(kinds.missing))}"
@@ -243,12 +243,12 @@ def declared_words(kinds: DeclaredKinds) -> str:
 
 
 def shifted_names(kinds: DeclaredKinds) -> list[str]:
-    """Kinds of error that a level shifts off their source, each with its level."""
+    """Kinds of error whose stated level shifts them off their data sheet, each with the level."""
     return [f"{''.join(kind_names([error.kind]))} {error.level}" for error in kinds.shifted]
 
 
 def kind_names(kinds: Sequence[str]) -> list[str]:
-    """Kinds of error in words. A kind of both platforms is written once."""
+    """Write kinds of error as texts. A kind that occurs for both platforms is written once."""
     owners: dict[str, list[str]] = {}
     for kind in kinds:
         owner, _, error = kind.rpartition(".")
@@ -264,9 +264,9 @@ _NAME_WIDTH = 33  # characters
 
 
 def probabilities(drawn: MonteCarlo) -> list[str]:
-    """Table of the Monte Carlo result, with warnings and notes.
+    """Make the table of the Monte Carlo result, with warnings and notes.
 
-    It has the probability of each requirement beside sums that need no draws.
+    It has the probability of each requirement, and for comparison sums that need no draws.
     """
     lines = [
         f"Monte Carlo: {drawn.draws:,} draws, seed {drawn.seed}, {drawn.model} model; "
@@ -307,7 +307,7 @@ def _cells(name: str, *cells: str) -> str:
 
 
 def probability_words(probability: float, low: float, high: float) -> str:
-    """Probability and its interval, with the digits that the interval determines."""
+    """Write a probability and its interval, with as many digits as the width of the interval justifies."""
     decimals = _decimals(low, high)
     ends = f"{_percent(low, decimals)} to {_percent(high, decimals)}".replace(" % to", " to")
     return f"holds in {_percent(probability, decimals)} ({ends})"
@@ -318,6 +318,6 @@ def _decimals(low: float, high: float) -> int:
 
 
 def _percent(probability: float, decimals: int) -> str:
-    """Percentage with `decimals` decimals; 0 % and 100 % without."""
+    """Write a probability in percent with `decimals` decimals; 0 % and 100 % have none."""
     text = f"{100 * probability:.{decimals}f}"
     return f"{float(text):.0f} %" if float(text) in (0.0, 100.0) else f"{text} %"

@@ -1,4 +1,4 @@
-"""Words of every format: use of limits, causes, sizes in units of the file, tables of a terminal, escapes."""
+"""Texts that all formats use: utilizations, causes, sizes in the units of the file, terminal tables, escapes."""
 
 import math
 import os
@@ -24,7 +24,7 @@ BINDING_WORDS = {
 def matters(row: Row) -> bool:
     """Whether a row is declared or limits something.
 
-    A passing row along axes that the file does not use does not matter.
+    A passing row along axes other than the axes of the file does not matter.
     """
     if row.status in ("info", "pass"):
         is_declared = (
@@ -35,12 +35,12 @@ def matters(row: Row) -> bool:
 
 
 def binding_words(row: Row) -> str:
-    """Words for the requirement that sets the allowable of a row; empty if the row is about that requirement."""
+    """Name of the requirement that sets the allowable of a row; empty if it is the row's own metric."""
     return "" if row.binding_requirement == row.metric else BINDING_WORDS.get(row.binding_requirement or "", "")
 
 
 def percent(ratio: float) -> str:
-    """Write a ratio in percent. Near 100 % it has the digits that show on which side of 100 % it is."""
+    """Write a ratio in percent. Near 100 %, it has enough digits to show whether it is above or below 100 %."""
     value = 100 * ratio
     if value == 0:
         return "0 %"
@@ -62,12 +62,12 @@ def percent(ratio: float) -> str:
 
 
 def share_percent(fraction: float) -> str:
-    """Write a fraction in percent with three digits. Unlike `percent` it does not mark the side of a limit."""
+    """Write a fraction in percent with three digits. Unlike `percent`, it has no extra digits near 100 %."""
     return "<0.01 %" if 0 < fraction < 1e-4 else f"{100 * fraction:.3g} %"
 
 
 def use_words(use: float | None) -> str:
-    """A utilization in percent; a dash for None."""
+    """Write a utilization in percent; a dash for None."""
     return "-" if use is None else percent(use)
 
 
@@ -77,7 +77,7 @@ def own_id(row: Row) -> str:
 
 
 def measure(row: Row, mission: MissionFindings) -> str:
-    """Declared value, allowable and use of a row, in words."""
+    """Text with the declared value, allowable and utilization of a row."""
     if row.metric == DECLARE:
         return "everything asked for is declared" if row.status == "pass" else "not everything asked for is declared"
     if row.declared is None:
@@ -96,18 +96,18 @@ def measure(row: Row, mission: MissionFindings) -> str:
 
 
 def cause(row: Row) -> str:
-    """Reason of the status of a row, with its notes; may be empty."""
+    """Text with the reason for the status of a row, and its notes; may be empty."""
     return "; ".join([row.reason, *row.notes] if row.reason else row.notes)
 
 
 def finding(row: Row, mission: MissionFindings) -> str:
-    """Sentence with the id of a row, its requirement id, measure and cause."""
+    """Sentence about a row: its id, its requirement id, `measure` and `cause`."""
     reason = cause(row)
     return f"{row.id}{own_id(row)}: {measure(row, mission)}{f'. {sentence(reason)}' if reason else ''}"
 
 
 def counted(count: int, noun: str) -> str:
-    """A count with its noun: `1 fault`, `2 faults`."""
+    """Write a count with its noun, such as `1 fault` or `2 faults`."""
     return f"{count} {noun}{'s' if count != 1 else ''}"
 
 
@@ -115,12 +115,12 @@ _LISTED_COUNT = 3  # waivers whose ids a sentence lists
 
 
 def waiver_names(ids: Sequence[str]) -> str:
-    """Ids of waivers as the file writes them: `waiver receiver.*`, with the number of ids beyond three."""
+    """Text with up to three ids of waivers as in the file, such as `waiver receiver.*`, and the number of others."""
     return f"waiver{'s' if len(ids) > 1 else ''} {_listed_ids(ids)}"
 
 
 def waived_count(count: int, ids: Sequence[str]) -> str:
-    """Number of waived missions, with the waivers: `12 waived (mission.location_error)`."""
+    """Text with a number of waived items and the waivers, such as `12 waived (mission.location_error)`."""
     return f"{count} waived ({_listed_ids(ids)})" if ids else f"{count} waived"
 
 
@@ -130,18 +130,18 @@ def _listed_ids(ids: Sequence[str]) -> str:
 
 
 def dotted(path: KeyPath) -> str:
-    """Write a path of keys as `--set` takes it."""
+    """Write a path of keys in the syntax of `--set`."""
     return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).lstrip(".")
 
 
 def sentence(text: str) -> str:
-    """Text with a capital first letter. Text that begins with the name of a row or a file is unchanged."""
+    """Capitalize the first letter of a text, unless the text begins with the name of a row or a file."""
     first = text.partition(" ")[0].rstrip(",:;")
     return text[:1].upper() + text[1:] if first.replace("-", "").isalpha() else text
 
 
 def dashed(text: str) -> str:
-    """The text, with a lone hyphen replaced by the en dash that pages use for a missing value."""
+    """Replace a text that is only a hyphen by an en dash, the sign for a missing value on pages."""
     return "–" if text == "-" else text
 
 
@@ -159,10 +159,10 @@ def is_noise_level(row: Row) -> bool:
 
 
 def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: str = "nearest") -> str:
-    """Write a number of a row, in the unit of its value in the file; a dash for None.
+    """Write a number of a row in the unit that the file uses for this row; a dash for None.
 
-    A sum of phases has the unit of its requirement. Without a unit in the file the number has a readable prefix.
-    Levels of noise relative to the declared noise have a sign; 0 dB is `as declared`.
+    A sum of phases has the unit of its requirement. If the file has no unit, the number gets an SI prefix that makes
+    it readable. Levels relative to the declared noise have a sign; 0 dB is written as `as declared`.
     """
     if value is None:
         return "-"
@@ -177,15 +177,18 @@ def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: 
 
 
 def row_limit(row: Row, mission: MissionFindings) -> str:
-    """Write the allowable of a row, rounded down, so that it passes when copied into a file.
+    """Write the allowable of a row, rounded down, so that it passes when it is copied into a file.
 
-    Levels of the image (rows of PSLR and ISLR) are rounded to the nearest, since no file states them as an error.
+    Levels of the image (rows of PSLR and ISLR) are rounded to the nearest value, because no file declares them.
     """
     return row_size(row.allowable, row, mission, "nearest" if row.subject.kind in _LEVEL_REQUIREMENTS else "down")
 
 
 def allowable_words(row: Row, mission: MissionFindings) -> str:
-    """The allowable of a row; a dash if the row was not judged, or if its metric has no limit of its own."""
+    """Write the allowable of a row. Without one, write a dash for an unjudged row, else `no limit`.
+
+    Rows about PSLR, ISLR and required declarations have a dash too.
+    """
     if row.allowable is not None:
         return row_limit(row, mission)
     is_open = row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr", DECLARE)
@@ -193,12 +196,12 @@ def allowable_words(row: Row, mission: MissionFindings) -> str:
 
 
 def shown_use(row: Row) -> float | None:
-    """Utilization of a row; None if it has no limit or cannot be judged, also if that is waived."""
+    """Utilization of a row; None if the row has no limit or cannot be judged, even if this is waived."""
     return None if row.allowable is None or row.is_unjudged or row.status == "not_evaluated" else row.utilization
 
 
 def phase_unit(mission: MissionFindings) -> str:
-    """Unit of the quadratic phase requirement."""
+    """Unit of the quadratic phase requirement in the file; degrees if the file states none."""
     lines = (requirement.line for requirement in mission.requirements if requirement.key == "quadratic_phase_error")
     return _file_unit(next(lines, None), "rad") or _PHASE_UNIT
 
@@ -209,12 +212,12 @@ def phase_limit(value: float, mission: MissionFindings) -> str:
 
 
 def requirement_limit(value: float | None, requirement: JudgedRequirement) -> str:
-    """Write the limit of a requirement or of a share. Levels are rounded to the nearest, other limits down."""
+    """Write the limit of a requirement or of a share. Levels in dB are rounded to nearest, other limits down."""
     return requirement_size(value, requirement, "nearest" if requirement.key in _LEVEL_REQUIREMENTS else "down")
 
 
 def requirement_size(value: float | None, requirement: JudgedRequirement, rounding: str = "nearest") -> str:
-    """Write a number of a requirement in the unit of the file; a dash for None."""
+    """Write a number of a requirement in the unit that the file uses for it; a dash for None."""
     if value is None:
         return "-"
     unit = _file_unit(requirement.line, requirement.unit) or (_PHASE_UNIT if requirement.unit == "rad" else "")
@@ -225,7 +228,7 @@ _LEAST_LEVEL_DB = 5e-4  # the level of an echo as strong as its point differs fr
 
 
 def _level(value: float, unit: str) -> float:
-    """The number; 0 for a level that differs from 0 dB by rounding only."""
+    """Return a value; 0 for a level in dB that differs from 0 dB only by rounding."""
     return 0.0 if unit == "dB" and abs(value) < _LEAST_LEVEL_DB else value
 
 
@@ -237,7 +240,7 @@ TEXT_WIDTH = 80
 
 
 def wrapped(text: str, indent: str) -> list[str]:
-    """Break text at spaces before 80 columns. Longer words are not broken, so that paths can be copied."""
+    """Wrap text at spaces to 80 columns. Longer words are not broken, so that paths can be copied."""
     lines = []
     while len(text) > TEXT_WIDTH:
         margin = len(text) - len(text.lstrip(" "))
@@ -252,7 +255,7 @@ def wrapped(text: str, indent: str) -> list[str]:
 
 
 def wrapped_counts(text: str) -> list[str]:
-    """Break `file: 1 FAIL, 2 pass` before 80 columns, after a colon, comma or semicolon."""
+    """Wrap a line such as `file: 1 FAIL, 2 pass` at 80 columns, after a colon, comma or semicolon."""
     joined = text.replace(" ", "\u00a0").replace(",\u00a0", ", ").replace(":\u00a0", ": ").replace(";\u00a0", "; ")
     first, *continuation = (line.replace("\u00a0", " ") for line in wrapped(joined, "  "))
     return [
@@ -262,7 +265,7 @@ def wrapped_counts(text: str) -> list[str]:
 
 
 def spaced(cells: Sequence[str], widths: Sequence[int], sides: str) -> str:
-    """Line of cells in columns of `widths`, each aligned to the left (`<`) or right (`>`) by `sides`."""
+    """Write cells as a line of columns with the given widths, aligned left (`<`) or right (`>`) as in `sides`."""
     return " ".join(f"{cell:{side}{width}}" for cell, width, side in zip(cells, widths, sides, strict=True))
 
 
@@ -272,9 +275,9 @@ def table(rows: Sequence[Sequence[str]], width: int = TEXT_WIDTH) -> list[str]:
 
 
 def aligned(rows: Sequence[Sequence[str]], width: int = TEXT_WIDTH) -> Iterator[list[str]]:
-    """Lines of each row of a table. Names and the last column are aligned to the left, numbers to the right.
+    """Yield the lines of each row of a table. Names and the last column are aligned left, numbers right.
 
-    A name that would make its line longer than `width` columns gets a line of its own, above its numbers.
+    A name that would make its line longer than `width` columns is written on a separate line above its numbers.
     """
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     room = width - sum(widths[1:]) - len(widths) + 1
@@ -300,35 +303,35 @@ _MARKDOWN_NUMBER = re.compile(r"^(\d{1,9})([.)])(?=\s|$)", re.ASCII)  # of a lis
 
 
 def xml_text(text: str) -> str:
-    """Escape for XML elements and attributes. The output of `printable` has no characters that XML forbids."""
+    """Escape text for XML elements and attributes. Characters that XML forbids are made printable."""
     text = printable(text)
     return _XML_SPECIAL.sub(lambda match: _XML[match[0]], text) if _XML_SPECIAL.search(text) else text
 
 
 def _markdown_escape(match: re.Match[str]) -> str:
-    """Escape of a special character: a backslash, which is easy to read, or a character reference elsewhere."""
+    """Escape a special character with a backslash, which is easy to read, or with a character reference."""
     special = match[0]
     return f"\\{special}" if special in r"\*_[]~" else f"&#{ord(special)};"
 
 
 def markdown_text(text: str) -> str:
-    """Escape for Markdown, also in a table or at the start of a line."""
+    """Escape text for Markdown, so that it is also safe in a table or at the start of a line."""
     escaped = _MARKDOWN_SPECIAL.sub(_markdown_escape, printable(text))
     return _MARKDOWN_NUMBER.sub(lambda match: f"{match[1]}&#{ord(match[2])};", escaped)
 
 
 def markdown_row(cells: Iterable[str]) -> str:
-    """A line of a table in Markdown."""
+    """Write the cells as a line of a Markdown table."""
     return f"| {' | '.join(cells)} |"
 
 
 def command_text(text: str) -> str:
-    """Escape the message of a workflow command of GitHub's runner."""
+    """Escape the message of a GitHub workflow command."""
     return printable(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def command_property(text: str) -> str:
-    """Escape a property of a workflow command, which also ends at a colon or a comma."""
+    """Escape a property of a GitHub workflow command, including colons and commas, which would end it."""
     return command_text(text).replace(":", "%3A").replace(",", "%2C")
 
 
@@ -338,7 +341,7 @@ def rst_text(text: str) -> str:
 
 
 def need_text(text: str) -> str:
-    """Escape a field of a need: Sphinx-Needs would call `[[function()]]` and look up `<<variant>>`."""
+    """Escape a field of a need, because Sphinx-Needs would run `[[function()]]` and look up `<<variant>>`."""
     return printable(text).replace("[[", "[ [").replace("<<", "< <")
 
 
@@ -358,7 +361,7 @@ _SIZE_PATTERN = re.compile(
 
 
 def spreadsheet_text(value: str | None) -> str | None:
-    """Put an apostrophe before text that a spreadsheet would run as a formula, also after blanks."""
+    """Put an apostrophe before text that a spreadsheet would run as a formula, even if blanks come first."""
     value = printable(value) if value else value
     is_formula = (
         bool(value)
