@@ -56,7 +56,7 @@ def _words(doubt: InputDoubt) -> str:
 
 
 def _takes(doubt: InputDoubt, old: Platform, new: Platform) -> Iterator[tuple[str, str]]:
-    """Yield the keys that suppress a doubt, each with the reason; nothing if the path has another or better source."""
+    """Yield the keys that suppress a doubt, with reasons; nothing if the path has another or a better one."""
     was, now = old.path, new.path
     if was is None:
         return

@@ -238,7 +238,7 @@ def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
 
 
 def _limited_by(row: Row) -> str:
-    """Text that names the requirement that binds a row if it is not the own one of the row, otherwise the equation."""
+    """Text that names the requirement that binds a row if it is not its own, otherwise the equation."""
     binding = binding_words(row)
     if binding:
         return binding if row.binding_requirement == END_OF_IMAGE else binding.split()[0]
