@@ -68,7 +68,7 @@ class Sampling:
 
     @cached_property
     def centred(self) -> Floats:
-        """Matrix that maps a history to its differences from its mean, and its mean, (samples + 1, samples)."""
+        """Matrix (samples + 1, samples) that maps a history to its deviations from its mean, followed by the mean."""
         return np.concatenate((np.eye(self.places.size) - self.fit[0], self.fit[:1]))
 
     @cached_property

@@ -110,7 +110,7 @@ GATING_MODEL = click.Choice(GATING_MODELS)
 
 
 def model_option(variable: str | None = None) -> _Option:
-    """The option `--model`, which a variable of the environment may replace."""
+    """The option `--model`, whose value may come from an environment variable instead."""
     words = "Model that decides, instead of that of the mission file."
     return click.option("--model", envvar=variable, type=GATING_MODEL, help=words)
 

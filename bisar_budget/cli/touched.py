@@ -73,7 +73,10 @@ def _is_mission(file: str) -> bool:
 
 
 def _reads_any(file: str, paths: set[str]) -> bool:
-    """Whether a mission reads one of `paths`, or names files and cannot be used."""
+    """Whether a mission reads one of `paths`.
+
+    Also true for a mission that cannot be used but names other files: a change of one of these may be the cause.
+    """
     folder, files = folder_of(file), _ReadFiles()
     try:
         data = DISK.content(file, MAX_BYTES, file)

@@ -373,7 +373,7 @@ def center_time(instant: Instant) -> list[SetValue]:
 
 
 def _judged(unjudged: SatellitePass, findings: MissionFindings, mission: Mission, platform: str) -> SatellitePass:
-    """Add the findings of the check at its mid-time to a pass."""
+    """Complete a pass with the findings of the check at the mid-time of the pass."""
     path = getattr(mission.platforms, platform).path
     row, requirement, utilization, reason = _deciding(findings)
     return unjudged._replace(

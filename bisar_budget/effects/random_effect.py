@@ -165,7 +165,7 @@ class RandomError(NamedTuple):
         return self.subject.kind != "other"
 
     def coverage(self, mission: Mission) -> PerCase:
-        """Coverage factor that the effect of the declared size includes."""
+        """Coverage factor included in the effect of the declared size; 1 if `is_covered` is false."""
         return mission.allocation.coverage_factor if self.is_covered else 1.0
 
     @property

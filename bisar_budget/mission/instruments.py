@@ -146,7 +146,7 @@ class LeverArm(NamedTuple):
 
     @staticmethod
     def any_of() -> tuple[str, ...]:
-        """Keys; a lever arm needs at least one."""
+        """Keys of a lever arm, of which at least one is required."""
         return ("arm", "uncertainty")
 
     @staticmethod

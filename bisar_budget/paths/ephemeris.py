@@ -234,7 +234,7 @@ def _step_around(samples: Sequence[Sample], time: Instant) -> float:
 
 
 def usual_step(samples: Sequence[Sample]) -> float:
-    """Median time between two samples; 0 for a single sample. [s]"""
+    """Median time between successive samples; 0 for a single sample. [s]"""
     steps = sorted(after.time.since(before.time) for before, after in pairwise(samples))
     return steps[len(steps) // 2] if steps else 0.0
 

@@ -58,7 +58,7 @@ class Stretch(NamedTuple):
 
 
 class _Sampled:
-    """Samples of an orbit in the axes of a scene, from `start` to `stop`, at most two minutes apart. [s]"""
+    """Samples of an orbit in the axes of a scene, at most two minutes apart, from `start` [s] to `stop` [s]."""
 
     def __init__(self, orbit: Orbit, axes: SceneAxes, origin: Instant, start: float, stop: float) -> None:
         self.orbit, self.start, self.reason = orbit, start, ""

@@ -50,7 +50,10 @@ WARNING_SENTENCES: dict[str, str] = {
 
 @composed
 def fit_changes_allowables(platform: str, acceleration: float, change: float, row_id: str) -> str:
-    """Sentence for a log whose noise makes the acceleration of the path uncertain. [m/s²]"""
+    """Sentence for a flight log whose noise makes the acceleration of the path uncertain.
+
+    `acceleration` is the 1-sigma uncertainty [m/s²], and `change` the largest relative change of allowables.
+    """
     size = format_quantity(acceleration, "m/s^2")
     by = f"by up to {100 * change:.2g} %" if change < 1 else "by a factor of two and more"
     return (

@@ -271,7 +271,7 @@ class _SearchState:
         return np.where(is_narrow, self.high - width, size), is_close | is_narrow
 
     def _by_power(self, every: Indices, low: Indices, high: Indices) -> Floats:
-        """Size at which a power of the size, fitted to two known points, reaches the limit.
+        """Size at which a power law in the size, fitted to two known points, reaches the limit.
 
         The points are those on both sides of the limit. If the lower of these is the start of the path, the two
         points above the limit are used.

@@ -4,9 +4,10 @@ Import this module only where a missing Numba is handled.
 
 Range profiles are refined until a B-spline of two taps (linear) or four taps (cubic) can interpolate them. The
 spectrum is divided by the transform of the spline, which is known in closed form. On a lattice of pixels, the range
-is exact in the middle of each 32 pixels of a line, and expanded to fourth order along these pixels. For other pixels
-it is exact at each pixel. Whole cycles and whole samples are split off in double precision or integers. Single
-precision is used only for the fractions, for any position of the scene and any wavelength.
+is computed exactly in the middle of each run of 32 pixels of a line, and expanded to fourth order along the run. For
+other pixels it is computed exactly at each pixel. Whole cycles and whole samples are split off in double precision or
+integers. Only the fractions are in single precision, which therefore suffices for any position of the scene and any
+wavelength.
 """
 
 import math
@@ -493,10 +494,8 @@ def _sums(points, transmitter, receiver, reference, sums):
 def _boxes(lines: Floats) -> tuple[Floats, Floats]:
     """Boxes that enclose runs of successive points in each line (nx, ny, 3), oriented from first to last point.
 
-    With the boxes, the part of a profile that a patch needs is found in a few steps. With the pixels themselves it
-    would take as long as an image.
-
-    The boxes give the part of a profile that a patch reads in a few steps; the pixels would take as long as an image.
+    The boxes give the part of a range profile that a patch needs in a few steps. Finding it from the pixels
+    themselves would take as long as forming an image.
 
     Returns
     -------

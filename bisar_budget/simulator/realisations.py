@@ -555,7 +555,10 @@ Summed = TypeVar("Summed", np.float64, np.complex128)
 
 
 def _folded(values: NDArray[Summed], count: int) -> NDArray[Summed]:
-    """Sum the values of harmonics 1, 2 … that are the same at `count` moments of their period, (count,)."""
+    """Sum the values of harmonics 1, 2 … that alias to the same harmonic, (count,).
+
+    These harmonics coincide at `count` evenly spaced moments of the period.
+    """
     padded = np.zeros(-(-(values.size + 1) // count) * count, values.dtype)
     padded[1 : values.size + 1] = values
     folded: NDArray[Summed] = padded.reshape(-1, count).sum(axis=0)
