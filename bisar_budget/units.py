@@ -384,7 +384,7 @@ _SHEETS = {
 
 @cache
 def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
-    """Scale, range of sizes, and text after the number, for each prefix of a unit; without a prefix last."""
+    """Scale, smallest and largest size, and suffix, for each prefix of a unit. The unit without a prefix is last."""
     if unit in _SHEETS:
         scale, suffix = _SHEETS[unit]
         return ((scale, 0.0, math.inf, suffix),)

@@ -183,7 +183,7 @@ def caps(mission: Mission) -> Caps:
 
 
 def range_walk_cap(mission: Mission) -> float:
-    """Largest N_pull that counts, f₀/B, as a number or as an array (cases,)."""
+    """Bound f₀/B that range walk sets on N_pull, as a number or as an array (cases,)."""
     return mission.radar.center_frequency / mission.radar.bandwidth
 
 

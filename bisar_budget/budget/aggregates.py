@@ -494,7 +494,7 @@ class JudgedScene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneRow(FamilyRow):
-    """The row for the edge of the scene, in many cases."""
+    """The row that judges the edge of the scene, for many cases at once."""
 
     scene: JudgedScene
 

@@ -310,7 +310,7 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
 
 
 def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
-    """Yield each phase noise or vibration spectrum that the file shifts by a level from the values of its source."""
+    """Yield each phase-noise or vibration spectrum whose source values the file raises or lowers by a level."""
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         oscillator, vibration = platform.oscillator, platform.motion_error.vibration

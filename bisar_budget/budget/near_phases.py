@@ -81,7 +81,7 @@ class NearPhases(NamedTuple):
         """Judge a tone by both its echoes and its phases.
 
         `by_echoes` is the allowable size by the echoes; None if no requirement limits them. Where `is_unknown` is
-        true, the level of the echoes is unknown. A tone whose phases exceed a requirement fails there too.
+        true, the level of the echoes is unknown, but the tone still fails if its phases exceed a requirement.
         """
         limit = self.limit(declared)
         echoes = np.full(declared.shape, math.inf) if by_echoes is None else by_echoes

@@ -151,7 +151,10 @@ def _touched(changed: Sequence[str]) -> list[str]:
 
 
 def _hold_below(folder: str, report: str) -> None:
-    """Refuse a report of settings outside of their folder: a check of somebody's missions writes nowhere else."""
+    """Refuse a report that settings place outside the folder of the settings file.
+
+    A check of missions from another author must not write to any other folder.
+    """
     inside = os.path.join(os.path.realpath(folder), "")
     # A NUL in the name is reported when the report is written.
     if "\0" not in report and not os.path.realpath(report).startswith(inside):

@@ -179,7 +179,7 @@ def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, PerCase]:
 
 
 class OwnPlane(NamedTuple):
-    """Displacement of the image in the full model, whose effects already contain it; see `ImagePlane`."""
+    """Counterpart of `ImagePlane` for the full model, whose effects already contain the displacement of the image."""
 
     is_singular: PerCaseFlag = False
 

@@ -1,7 +1,8 @@
 """Tones of oscillators: spurs, and the part of any tone that the synchronization leaves, by frequency.
 
-Exchanges every T_s sample a tone at f, and straight lines join the samples. These lines contain tones at f + m/T_s
-with sinc²((f + m/T_s)·T_s) of the amplitude. When the lines are subtracted, 1 − sinc²(fT_s) of the amplitude remains
+The exchanges of pulses, one every T_s, sample a tone at frequency f. Between the samples, the phase is interpolated
+linearly. The interpolated phase contains tones at f + m/T_s, whose amplitudes are sinc²((f + m/T_s)·T_s) of that of
+the original tone. When the interpolated phase is subtracted, 1 − sinc²(fT_s) of the amplitude remains
 at f (m = 0). The tones with m ≠ 0 are the frequencies to which the tone is folded. The phases of the folded tones
 depend on the unknown instant of the exchange within its interval. Derived here.
 """

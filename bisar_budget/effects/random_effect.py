@@ -160,7 +160,7 @@ class RandomError(NamedTuple):
     def is_covered(self) -> bool:
         """Whether the declared size or its effect includes the coverage factor.
 
-        It does not for an error that is stated by its effect from elsewhere.
+        False only for an error of the kind `other`, for which the file states an effect determined elsewhere.
         """
         return self.subject.kind != "other"
 

@@ -261,9 +261,9 @@ class SweepResult:
         )
 
     def _later(self) -> "dict[str, Array]":
-        """Make the columns as arrays of Dask, in which each chunk of the sweep is a task.
+        """Make the columns as Dask arrays, with one task for each chunk of the sweep.
 
-        The tasks have copies of all files that the mission names, so that later changes of files have no effect.
+        The tasks hold copies of all files that the mission names, so that later changes to the files have no effect.
         """
         try:
             from dask import array

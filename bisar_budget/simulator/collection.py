@@ -1,4 +1,4 @@
-"""Collection of a mission with any errors, and images of one point, around the place that exact ranges give."""
+"""Simulated collection of a mission with any errors, and images of a point around its place by exact ranges."""
 
 import math
 from collections.abc import Callable, Sequence

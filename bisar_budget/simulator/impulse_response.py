@@ -326,7 +326,7 @@ def _null(power: Floats, top: int, direction: int) -> float:
 
 
 def _vertex(values: Floats, top: int) -> float:
-    """Offset of the extremum of a parabola from a sample; the parabola passes the sample and its neighbours."""
+    """Offset from a sample to the extremum of the parabola through it and its two neighbours. [samples]"""
     before, middle, after = values[top - 1 : top + 2]
     bend = before - 2 * middle + after
     return float((before - after) / (2 * bend)) if bend else 0.0

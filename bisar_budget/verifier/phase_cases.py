@@ -374,7 +374,7 @@ def _of_response(study: Study, images: Responses, reading: ApertureReading) -> V
 
 
 def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
-    """Quadratic phase of equal loss measured in the image of several errors; None without an image. [rad]"""
+    """Measure the equal-loss quadratic phase in the image of several errors; None without an image. [rad]"""
     try:
         images = study.images(study.together(sizes, scale), READ_CELLS)
         return study.equal_loss(images, study.read(images))
