@@ -15,7 +15,7 @@ from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubted_noise import noise_doubts
 from bisar_budget.budget.doubts import input_doubts, missing_settings
 from bisar_budget.budget.fit_noise import MAX_UNSAID_CHANGE_FRACTION, allowable_noise
-from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
+from bisar_budget.constants import LEAST_FALLING_HEIGHT_M, MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
 from bisar_budget.faults import KeyPath, changes_words
@@ -28,6 +28,8 @@ from bisar_budget.phrases import Note
 from bisar_budget.ranges.resolution import Resolution
 
 _SENSITIVITY = "acceleration_sensitivity"
+
+_MIN_ORBIT_SPEED_MPS = 100.0  # over the ground, above 100 km; a geostationary satellite is slower
 
 
 class _Warned(NamedTuple):
@@ -125,7 +127,7 @@ def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
 
 
 def straight_orbits(mission: Mission) -> Iterator[_Warned]:
-    """Warn of platforms that are as fast as a satellite but have no `acceleration`, and give the acceleration to use.
+    """Warn of platforms that are as fast or as high as a satellite but have no `acceleration`, and give its value.
 
     Over an aperture time T, a missing acceleration a moves the true path away from the straight path by aT²/8, for
     example 25 m in 5 s. A file that states an acceleration, including zero, has made the choice.
@@ -133,7 +135,10 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         speed, axes = float(norm(platform.state.velocity)), mission.scene.axes
-        if speed <= MAX_FLIGHT_SPEED_MPS or platform.acceleration is not None or platform.is_of_the_earth:
+        is_in_space = speed > _MIN_ORBIT_SPEED_MPS and platform.state.position[2] > LEAST_FALLING_HEIGHT_M
+        if not (speed > MAX_FLIGHT_SPEED_MPS or (is_in_space and platform.state.fall is None)):
+            continue
+        if platform.acceleration is not None or platform.is_of_the_earth:
             continue
         key = ("platforms", name, "speed" if platform.velocity is None else "velocity")
         from bisar_budget.paths.earth import free_fall  # takes 8 ms; most missions do not need it

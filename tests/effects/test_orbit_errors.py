@@ -239,3 +239,29 @@ def test_an_orbit_that_is_propagated_says_the_same(case: Case, kind: str, axis: 
     want = case.response(kind, axis, SIZES[kind])
     assert abs(row.qpe_full_rad) == pytest.approx(abs(want.quadratic_rad), rel=0.01, abs=2e-5)
     assert math.hypot(*row.displacement_m) == pytest.approx(math.hypot(*want.point), rel=0.01, abs=1e-4)
+
+
+def without_acceleration(**changes: Any) -> Any:
+    document = CASES[0].document(position=["10 m", "0 m", "0 m"])
+    platform = document["platforms"]["transmitter"]
+    for key in ("acceleration", "jerk", "snap"):
+        del platform[key]
+    platform |= changes
+    return check_mission(parse_mission(yaml_text(document)), date(2026, 1, 1))
+
+
+def test_a_deleted_acceleration_is_no_silent_pass() -> None:
+    """The mission fails with its orbit. Without the orbit's acceleration it passed, and nothing was said."""
+    found = without_acceleration()
+    assert found.status == "warn"
+    assert any("but the path is straight" in str(warning) for warning in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("speed", "height", "warns"), [(101.0, 101e3, True), (99.0, 101e3, False), (101.0, 99e3, False)]
+)
+def test_a_straight_path_is_a_satellites_above_100_km_and_100_m_per_s(
+    speed: float, height: float, warns: bool
+) -> None:
+    found = without_acceleration(position=[0.0, -300e3, height], velocity=[speed, 0.0, 0.0])
+    assert any("but the path is straight" in str(warning) for warning in found.warnings) == warns

@@ -112,7 +112,7 @@ def test_a_name_too_long_for_its_line_stands_above_its_numbers() -> None:
 
 @pytest.mark.parametrize("options", [(), ("--all",)], ids=str)
 def test_a_row_stays_on_its_line_where_100_columns_are_there(run, monkeypatch, options) -> None:
-    """Of every example: status and id of a row had a line of their own, its numbers the next."""
+    """Status and id of a row stood on a line of their own, and the numbers on the next, in every example."""
     monkeypatch.setenv("COLUMNS", "100")
     for path in MISSIONS:
         lines = run("check", path, *options).stdout.splitlines()
