@@ -57,7 +57,9 @@ def test_what_the_warning_offers_can_be_pasted(satellite: dict) -> None:
 
 @pytest.mark.parametrize(("speed", "count"), [("2999 m/s", 0), ("3001 m/s", 1)])
 def test_both_sides_of_the_speed(speed: str, count: int) -> None:
-    assert len(warned(platforms__transmitter={**SATELLITE, "velocity": [0, speed, 0]})) == count
+    """Below 100 km the speed alone says that a straight path is a satellite's."""
+    low = {"position": ["35.4 km", 0, "50.5 km"], "velocity": [0, speed, 0]}
+    assert len(warned(platforms__transmitter=low)) == count
 
 
 def test_each_platform_is_warned_of_at_its_velocity() -> None:
