@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from bisar_budget.error_kinds import MotionKind as MotionKind
+    from bisar_budget.error_kinds import register as register
     from bisar_budget.faults import MissionError as MissionError
     from bisar_budget.front.checks import check as check
     from bisar_budget.front.imaging import simulate as simulate
@@ -41,8 +43,9 @@ if TYPE_CHECKING:
     from bisar_budget.mission.model import Mission as Mission
     from bisar_budget.mission.quantities import QuestionError as QuestionError
 
-# By the module that they live in, the names that others use.
+# Public names, by the module that defines them.
 _LIVES = {
+    "error_kinds": ("MotionKind", "register"),
     "faults": ("MissionError",),
     "mission.model": ("Mission",),
     "mission.quantities": ("QuestionError",),

@@ -162,10 +162,10 @@ MUTANTS = (
         (_POINTS_OF_29,),
     ),
     Mutant(
-        "simulate: the clock without coverage factor",
-        _POINT,
-        "[source.declared * term for term in source.clock]",
-        "[source.declared / factor * term for term in source.clock]",
+        "simulate: half of a clock error",
+        "bisar_budget/simulator/flown_errors.py",
+        "tuple(size * float(term)",
+        "tuple(size / 2 * float(term)",
         (f"{_IMAGES}test_the_clock_of_a_simulated_image_has_the_coverage_factor",),
     ),
     Mutant(

@@ -1,12 +1,13 @@
-"""Kinds of error that a mission can declare: declared kinds, missing kinds, kinds that `requirements.declare` names.
+"""Kinds of error that a mission can declare, and the kinds that it must declare by `requirements.declare`.
 
-A kind is declared by any value of it in the file, including zero. An empty section declares no kind. A cause of which
-only one half is given does not declare its kind. Examples are a lever arm without an attitude error that rotates it,
-and an oscillator with a sensitivity to acceleration but without a stated acceleration.
+A kind of error is declared if the file gives any value for it, including zero. An empty section does not declare a
+kind. If the file gives only one half of a cause, the kind is not declared. Examples are a lever arm without an
+attitude error that rotates it, and an oscillator with an acceleration sensitivity but without an acceleration.
 """
 
 from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import TILTS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
+from bisar_budget.error_kinds import registered_names
 from bisar_budget.findings.requirement import DeclaredKinds, ShiftedFigure
 from bisar_budget.findings.row import DECLARE
 from bisar_budget.mission.model import Mission
@@ -26,8 +28,8 @@ DECLARATIONS = subject("mission", DECLARE)  # the row of all required declaratio
 class Missing(NamedTuple):
     """A required error that the file does not declare: the owner and kind of its rows, and its key in the file.
 
-    If the file gives only half of the error, `lacks` names the missing key. Half of an error has no effect on its
-    own.
+    If the file gives only one half of the error, `lacks` describes the missing keys. Half of an error has no effect
+    on its own.
     """
 
     owner: str
@@ -46,7 +48,7 @@ def swings_nothing(platform: Platform) -> bool:
 
 
 def _lacks_an_attitude(mission: Mission, name: str) -> str:
-    """Keys that are missing for a lever arm, joined in one text.
+    """Describe the missing keys of a lever arm; empty if no key is missing.
 
     Attitude errors rotate the full arm. The uncertainty of the arm alone is not enough.
     """
@@ -56,7 +58,7 @@ def _lacks_an_attitude(mission: Mission, name: str) -> str:
 
 
 def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
-    """Keys that are missing for an oscillator.
+    """Describe the missing keys of an oscillator; empty if no key is missing.
 
     Vibration and acceleration sensitivity have an effect only together.
     """
@@ -77,7 +79,7 @@ def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
 
 # ---------------------------------------------------------------------- the table of kinds
 def _whole(mission: Mission, name: str) -> str:
-    """Return an empty text: a kind of error without halves has no missing key."""
+    """Return an empty text, for kinds of error that cannot be stated by half."""
     return ""
 
 
@@ -86,14 +88,22 @@ class _OfPlatform:
     """A kind of error that each platform can have: its key below the platform, and tests of what the file states.
 
     `lacks` returns the missing key without which the platform's statement has no effect, or an empty text if the
-    statement is complete. A kind that is not `is_owed` is listed only if the file states something about it.
+    statement is complete. A statement that `needs_both` halves declares nothing without the other half.
+
+    A kind that is not `is_owed` is listed only if the file states something about it. A platform that does not move
+    owes the kinds that `is_owed_still`. A kind that is not `is_listed` counts as other kinds: a covariance as
+    position and velocity. A direct path makes a kind that `is_clock` superfluous.
     """
 
     key: str
     is_stated: Callable[[Platform], bool]
     has_source: Callable[[Platform], bool]
     lacks: Callable[[Mission, str], str] = _whole
+    needs_both: bool = False
     is_owed: bool = True
+    is_owed_still: bool = False
+    is_listed: bool = True
+    is_clock: bool = False
 
 
 def _is_sourced(figure: str) -> Callable[[Platform], bool]:
@@ -126,6 +136,7 @@ _KINDS_OF_PLATFORMS: Mapping[str, _OfPlatform] = {
         "motion_error.position",
         lambda platform: platform.motion_error.stated("position") is not None,
         _is_sourced("position"),
+        is_owed_still=True,
     ),
     "velocity": _OfPlatform(
         "motion_error.velocity",
@@ -141,6 +152,7 @@ _KINDS_OF_PLATFORMS: Mapping[str, _OfPlatform] = {
         "motion_error.covariance",
         lambda platform: platform.motion_error.covariance is not None,
         _is_sourced("covariance"),
+        is_listed=False,
     ),
     "vibration": _OfPlatform(
         "motion_error.vibration", lambda platform: platform.motion_error.vibration.is_stated, _has_own_source
@@ -158,6 +170,8 @@ _KINDS_OF_PLATFORMS: Mapping[str, _OfPlatform] = {
         lambda platform: platform.oscillator is not None,
         lambda platform: platform.oscillator is not None and bool(platform.oscillator.source),
         _lacks_half_of_a_vibration,
+        is_owed_still=True,
+        is_clock=True,
     ),
     "time_tag": _OfPlatform(
         "motion_error.time_tag",
@@ -170,16 +184,33 @@ _KINDS_OF_PLATFORMS: Mapping[str, _OfPlatform] = {
         lambda platform: platform.motion_error.lever_arm is not None,
         _has_source_of_lever_arm,
         _lacks_an_attitude,
+        needs_both=True,
         is_owed=False,
     ),
 }
 
 
+def _of_platforms() -> Mapping[str, _OfPlatform]:
+    """Kinds of error of platforms, by name: those of this package, and those that packages registered."""
+    return {**_KINDS_OF_PLATFORMS, **{name: _registered(name) for name in registered_names()}}
+
+
+@cache
+def _registered(name: str) -> _OfPlatform:
+    """A registered kind of error: no file owes it."""
+    return _OfPlatform(
+        f"motion_error.registered.{name}",
+        lambda platform: name in platform.motion_error.registered,
+        _has_own_source,
+        is_owed=False,
+    )
+
+
 @dataclass(frozen=True)
 class _OfMission:
-    """A kind of error that no single platform owns, with functions that test whether a mission declares it.
+    """A kind of error that belongs to no single platform, and functions that test what the file states.
 
-    The owner is the clocks, the air, both platforms together, or none.
+    Such errors are those of the clocks, of the atmosphere, of both platforms in common, and of other causes.
     """
 
     owner: str
@@ -187,10 +218,11 @@ class _OfMission:
     has_source: Callable[[Mission], bool]
     missing: Callable[[Mission], list[str]]  # keys that the file should have
     is_owed: Callable[[Mission], bool] = lambda mission: False
+    has_halves: bool = False  # the file may state a part of the kind
 
 
 def _states_clock(mission: Mission) -> bool:
-    """Whether the file states a clock error: one of its terms, or an error that remains after the clock is set."""
+    """Whether the file states a clock error: a term of the timing error, or an error left by synchronisation."""
     sync = mission.synchronization
     setting = () if sync is None else (sync.time_error, sync.frequency_error)
     return any(term is not None for term in (*mission.timing_error, *setting))
@@ -202,14 +234,17 @@ def _key_of_clock(mission: Mission) -> list[str]:
 
 
 def _runs_two_clocks(mission: Mission) -> bool:
-    """Whether both oscillators matter. With a direct path the receiver uses the transmitter's signal as its clock."""
+    """Whether the errors of both oscillators matter.
+
+    They do not with a direct path, because the receiver then uses the transmitter's signal as its clock.
+    """
     return not mission.has_direct_path
 
 
 def _lacking_of_setting(mission: Mission) -> list[str]:
-    """Missing keys of the synchronisation.
+    """List the missing keys of `synchronization`.
 
-    Clocks in holdover need both errors that remain after the clocks are set.
+    Clocks in holdover need both the time error and the frequency error that remain after synchronisation.
     """
     sync = mission.synchronization
     if sync is None:
@@ -219,9 +254,9 @@ def _lacking_of_setting(mission: Mission) -> list[str]:
 
 
 def _legs_without_delay(mission: Mission) -> list[str]:
-    """Missing keys of the air: `propagation`, or the keys of legs without a delay.
+    """List the missing keys of the atmosphere: `propagation`, or the legs without a delay.
 
-    A leg counts only if its elevation is high enough for a zenith delay to apply.
+    A leg needs a delay only if its elevation is high enough for a zenith delay to apply.
     """
     if mission.propagation is None:
         return ["propagation"]
@@ -238,8 +273,9 @@ def _has_source_of_air(mission: Mission) -> bool:
     return all(leg.source for leg in legs if leg is not None)
 
 
+_CLOCK_KIND = "timing"
 _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
-    "timing": _OfMission("clock", _states_clock, lambda mission: True, _key_of_clock, _runs_two_clocks),
+    _CLOCK_KIND: _OfMission("clock", _states_clock, lambda mission: True, _key_of_clock, _runs_two_clocks),
     "terrain": _OfMission(
         "mission",
         lambda mission: mission.scene.height_error is not None,
@@ -258,6 +294,7 @@ _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
         lambda mission: mission.synchronization is not None and bool(mission.synchronization.source),
         _lacking_of_setting,
         _runs_two_clocks,
+        has_halves=True,
     ),
     "propagation": _OfMission(
         "mission",
@@ -265,6 +302,7 @@ _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
         _has_source_of_air,
         _legs_without_delay,
         lambda mission: True,
+        has_halves=True,
     ),
     "other": _OfMission(
         "mission",
@@ -275,29 +313,26 @@ _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
 }
 
 
-_OF_HALVES = ("propagation", "synchronization")  # kinds that the file may state in part
-
-
 # ---------------------------------------------------------------------- declarations of a mission
 def declared_kinds(mission: Mission) -> DeclaredKinds:
-    """List the kinds of error by owner: those that a mission declares, should declare, or gives without a source.
+    """List the kinds of error that a mission declares, those that it should declare, and those without a source.
 
-    A covariance counts as position and velocity. If a direct path provides the clock, there are no timing errors and
-    no oscillators.
+    A covariance counts as position and velocity. With a direct path as the clock, timing errors and oscillators are
+    not listed.
     """
     declared, missing, without_source = list[str](), list[str](), list[str]()
     still = still_platforms(mission)
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
-        for kind, of_platform in _KINDS_OF_PLATFORMS.items():
-            if kind == "covariance" or (kind == "oscillator" and mission.has_direct_path):
+        for kind, of_platform in _of_platforms().items():
+            if not of_platform.is_listed or (of_platform.is_clock and mission.has_direct_path):
                 continue
             is_stated = of_platform.is_stated(platform)
-            if is_stated and (kind != "lever_arm" or not of_platform.lacks(mission, name)):
+            if is_stated and not (of_platform.needs_both and of_platform.lacks(mission, name)):
                 declared.append(f"{name}.{kind}")
                 if not of_platform.has_source(platform):
                     without_source.append(f"{name}.{kind}")
-            elif is_stated or (of_platform.is_owed and (name not in still or kind in ("position", "oscillator"))):
+            elif is_stated or (of_platform.is_owed and (name not in still or of_platform.is_owed_still)):
                 missing.append(f"{name}.{kind}")
     for kind, of_mission in _KINDS_OF_MISSION.items():
         if of_mission.is_stated(mission):
@@ -310,7 +345,7 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
 
 
 def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
-    """Yield each phase-noise or vibration spectrum whose source values the file raises or lowers by a level."""
+    """Yield each phase-noise or vibration spectrum that the file raises or lowers by a level in decibels."""
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         oscillator, vibration = platform.oscillator, platform.motion_error.vibration
@@ -319,7 +354,7 @@ def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
         if oscillator is not None:
             felt = None if oscillator.vibration is None else oscillator.vibration.spectrum_level
             levels.append(("oscillator", "oscillator.level", oscillator.level, oscillator.source))
-            # The vibration that the oscillator feels is the file's own spectrum: the source is about the oscillator.
+            # `oscillator.source` is not the source of the vibration that the oscillator feels.
             levels.append(("oscillator", "oscillator.vibration.spectrum_level", felt, None))
         for kind, key, level, its_source in levels:
             if level:
@@ -327,21 +362,21 @@ def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
 
 
 def still_platforms(mission: Mission) -> list[str]:
-    """Names of the platforms that do not move in the frame of the scene."""
+    """List the names of the platforms that do not move in the frame of the scene."""
     return [name for name in PLATFORMS if getattr(mission.platforms, name).state.is_still]
 
 
 # ---------------------------------------------------------------------- required declarations
 def missing_declarations(mission: Mission, still: Container[str] | None = None) -> list[Missing]:
-    """List the errors that `requirements.declare` requires and the file does not declare, each once.
+    """List the errors that `requirements.declare` requires and the file does not declare, without duplicates.
 
-    A kind of error is declared as follows:
+    The following entries declare a kind of error:
 
-    - position and velocity: also by a covariance;
-    - the clock: by any term of its error;
-    - a vibration: by lines or by noise;
-    - an inertial sensor: by any of its values;
-    - the air: by the delays of each leg.
+    - position and velocity: their own values or a covariance;
+    - the clock: any term of its error;
+    - a vibration: lines or noise;
+    - an inertial sensor: any of its values;
+    - the atmosphere: the delays of each leg.
 
     A platform that does not move needs only its position, and an oscillator if the requirement names the platform. An
     error that both platforms share does not declare the errors of the single platforms.
@@ -365,13 +400,14 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
         owner, dot, kind = asked.rpartition(".")
         if kind in _KINDS_OF_MISSION:
             of_mission = _KINDS_OF_MISSION[kind]
-            if kind in _OF_HALVES or not of_mission.is_stated(mission):
+            if of_mission.has_halves or not of_mission.is_stated(mission):
                 yield from (Missing(of_mission.owner, kind, key) for key in of_mission.missing(mission))
             continue
-        of_platform = _KINDS_OF_PLATFORMS[kind]
+        of_platform = _of_platforms()[kind]
         for name in (owner,) if dot else PLATFORMS:
-            owes = name not in still or kind == "position" or (kind == "oscillator" and bool(dot))
-            if not owes:
+            # A still platform owes an oscillator only if the requirement names the platform.
+            is_owed_still = of_platform.is_owed_still and (bool(dot) or not of_platform.is_clock)
+            if name in still and not is_owed_still:
                 continue
             key = f"platforms.{name}.{of_platform.key}"
             if not of_platform.is_stated(getattr(mission.platforms, name)):
@@ -381,5 +417,6 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
 
 
 def is_asked_for(row_subject: Subject, missing: Missing) -> bool:
-    """Whether a row belongs to a required error that the file does not declare."""
-    return row_subject.owner == missing.owner and (row_subject.kind == missing.kind or missing.kind == "timing")
+    """Whether a row judges a required error that the file does not declare, given the `missing` error."""
+    is_clocks = missing.kind == _CLOCK_KIND  # all rows of the clock belong to it
+    return row_subject.owner == missing.owner and (is_clocks or row_subject.kind == missing.kind)

@@ -1,7 +1,7 @@
 """Missions in which some numbers are arrays with one element for each case.
 
-The functions tell which numbers an array can replace and which cases certainly form an image, and they scale all
-errors below a key.
+The functions of this module find the numbers that an array can replace, and the cases that certainly form an image.
+They also scale all errors below a key.
 """
 
 import math
@@ -41,7 +41,16 @@ from bisar_budget.mission.platforms import (
 )
 from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, least_elevations
 from bisar_budget.mission.quantities import QuestionError
-from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, SectionValue, Triple
+from bisar_budget.mission.readers import (
+    ListOf,
+    OneOf,
+    Quantity,
+    Reader,
+    RegisteredSizes,
+    Section,
+    SectionValue,
+    Triple,
+)
 from bisar_budget.mission.vibrations import Spectrum
 
 # ---------------------------------------------------------------- keys for arrays, and cases that are missions
@@ -51,8 +60,8 @@ SAFETY_FACTOR = 1 + 1e-6  # around a limit of image formation within which a cas
 def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
     """Whether an array can replace a number; `is_stated` tells whether the file states the number.
 
-    An array cannot replace a number that decides more than its own value: a number of an orbit or a log, the position
-    of the scene on the Earth, the orientation of the Earth, an element of a covariance matrix.
+    An array cannot replace a number from which other content of the mission follows. Such numbers belong to an orbit
+    or a log, to the position of the scene on the Earth, to the orientation of the Earth, or to a covariance matrix.
     """
     section, *steps = parts_of(key)
     if section == "platforms":
@@ -79,7 +88,11 @@ def _is_held_of_error(error: MotionError, steps: Sequence[str], is_stated: bool)
         return is_stated and not error.covariance.is_matrix  # an element of a matrix has a twin
     if steps == ["vibration", "spectrum_level"]:
         return error.vibration.spectrum is not None  # the level shifts the spectrum
-    return is_stated or steps[0] == "imu" or tuple(steps) in (("time_tag",), ("lever_arm", "uncertainty"))
+    return (
+        is_stated
+        or steps[0] in ("imu", "registered")
+        or tuple(steps) in (("time_tag",), ("lever_arm", "uncertainty"))
+    )
 
 
 def _is_held_of_path(platform: Platform, name: str, is_stated: bool) -> bool:
@@ -134,9 +147,10 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
 
 
 def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
-    """Whether numbers that depend on each other are certainly valid together, (cases,).
+    """Whether the numbers with joint bounds are certainly valid in each case, (cases,).
 
-    These are the shares, the bandwidth and noise mask of an oscillator, the correlations, and the age of a holdover.
+    Joint bounds exist for the shares, the bandwidth and the noise mask of an oscillator, the correlations, and the
+    age of a holdover.
     """
     is_safe = np.ones(cases, dtype=bool)
     sync = mission.synchronization
@@ -182,8 +196,8 @@ _ACCEPTED_KEYS = (
 def scaled(mission: Mission, key: str, factor: PerCase) -> Mission:
     """Multiply every error of a mission below a key by a factor, and return the changed mission.
 
-    Amplitudes and sigmas are multiplied, also those of parts of the catalogue. Frequencies, correlation times and
-    correlations stay. The factor may be an array (cases,).
+    Amplitudes and sigmas are multiplied, including figures that come from parts of the catalogue. Frequencies,
+    correlation times and correlations are not changed. The factor may be an array (cases,).
 
     Raises
     ------
@@ -218,6 +232,8 @@ def _below(
         below = reader.section if isinstance(reader, ListOf) else reader.component
         inner, count = _below(value[int(child)], below, remaining, factor, key)
         return (*value[: int(child)], inner, *value[int(child) + 1 :]), count
+    if isinstance(reader, RegisteredSizes) and child in value:
+        return {**value, child: value[child] * factor}, int(np.any(value[child]))
     raise QuestionError(f"{key}: the mission has no {child}; {_ACCEPTED_KEYS}")
 
 
@@ -238,6 +254,10 @@ def _scaled(value: SectionValue, reader: Reader[object], factor: PerCase, is_clo
         below_reader = reader.section if isinstance(reader, ListOf) else reader.component
         pairs = [_scaled(entry, below_reader, factor, is_clock) for entry in value]
         return tuple(entry for entry, _ in pairs), sum(inner_count for _, inner_count in pairs)
+    if isinstance(reader, RegisteredSizes):
+        return {name: size * factor for name, size in value.items()}, sum(
+            bool(np.any(size)) for size in value.values()
+        )
     if isinstance(reader, Quantity):
         if reader.dimension in units.LEVELS:
             return value + 20 * np.log10(factor), 1
@@ -252,7 +272,7 @@ def _scaled(value: SectionValue, reader: Reader[object], factor: PerCase, is_clo
 
 
 def _form(reader: Reader[object], value: object) -> Reader[object]:
-    """Find the reader that has read a value: one of the forms of a `OneOf`, otherwise `reader` itself."""
+    """Find the reader that fits a value: one of the alternatives of a `OneOf`, otherwise `reader` itself."""
     if isinstance(reader, OneOf):
         kind = Triple if isinstance(value, tuple) and not hasattr(value, "_fields") else Quantity
         matching = [form for form in reader.forms if isinstance(form, Section) and type(value) is form.kind]

@@ -1,6 +1,6 @@
 """Effects of errors on range history and image, in the published model, the full model and by exact ranges."""
 
-# What other rooms may use.
+# Names that other packages may import.
 __all__ = [
     "air_delays",
     "combined",

@@ -1,12 +1,12 @@
-"""Effects of the errors of many cases according to both models, and the allowable sizes of the errors.
+"""Effects of the declared errors according to both models, and the allowable sizes of the errors, for many cases.
 
-A check is a single case. The published model, Tables I and II and (25) of Rigling & Moses, is linear. The full model
-holds for errors of any size. Its effects are proportional to the error where the second order provably does not
-matter; elsewhere they come from exact ranges. An error has two signs and a bound covers both, so phases and
-allowables belong to the worse sign.
+A check of a mission has a single case. The published model, Tables I and II and (25) of Rigling & Moses, is linear.
+The full model holds for errors of any size. Its effects are taken as proportional to the error where the second order
+provably does not matter; elsewhere they follow from exact ranges. An error may have either sign, and a bound on its
+size covers both signs. Phases and allowables are therefore those of the worse sign.
 
-Errors are stored in blocks, each an array (errors, cases). With one case, all errors are one block. With thousands of
-cases, each error is a block, so that the arrays in use stay in a processor's cache.
+Errors are stored in blocks, whose arrays are (errors, cases). With one case, all errors form one block. With
+thousands of cases, each error is a block of its own, so that the arrays in use stay in a processor's cache.
 """
 
 import math
@@ -41,14 +41,14 @@ from bisar_budget.ranges.point_paths import ROWS, PointPaths, tries_several_size
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
 LIMITING_REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION)  # requirements that limit an error
-END_OF_IMAGE = "end_of_image"  # no requirement: no ground point has the range history of a larger error
+END_OF_IMAGE = "end_of_image"  # not a requirement: for a larger error, no ground point has the range history
 MODELS = ("published", "full")
 OTHER_MODEL = {"published": "full", "full": "published"}
 
-# A larger error is no navigation error: within the aperture it takes the platform farther than this part of its slant
-# range.
+# Largest motion of a platform by a navigation error within the aperture, as a fraction of the slant range. A larger
+# error would not be a navigation error.
 FARTHEST_RANGE_FRACTION = 0.1
-SECOND_ORDER_FRACTION = 0.004  # of a phase, a displacement or a limit; the second order may add it; the aim is 1 %
+SECOND_ORDER_FRACTION = 0.004  # of a phase, displacement or limit, which the second order may add; the aim is 1 %
 FLOOR_RAD, FLOOR_M = 1e-3, 2e-5  # amounts that the second order may always add
 
 _LANES_AT_ONCE_COUNT = 1 << 13  # lanes in a block
@@ -58,11 +58,10 @@ _FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)
 class Declared(NamedTuple):
     """Phases and displacements by errors of a given size, as arrays over cases, or as plain numbers of one case.
 
-    `qpe` and `cubic` are the phases at the aperture edge for the worse sign of the error. They have the sign of the
-    first-order phase of the declared error. [rad] `displacement` is the displacement east and north for the declared
-    sign, `opposite` for the opposite sign. [m] Both are NaN (None in one case) if there is no displacement, because
-    the matrix Q has no inverse or because no ground point has the range history. In the second case the phases are
-    infinite.
+    `qpe` and `cubic` are the quadratic and cubic phase at the aperture edge for the worse sign of the error. [rad]
+    They have the sign of the first-order phase of the declared error. `displacement` is the displacement east and
+    north for the declared sign, and `opposite` that for the opposite sign. [m] Both are NaN (None in one case) if the
+    matrix Q has no inverse or if no ground point has the range history. In the second case the phases are infinite.
 
     `hidden` is the part of the judged phase that band and turn of the line of sight do not resolve. [rad] `rest` is
     the rms phase beyond the cubic for the worse sign. [rad]
@@ -86,15 +85,16 @@ class Declared(NamedTuple):
 
     @property
     def equal_loss(self) -> PerCase:
-        """Quadratic phase that causes the same peak loss as the quadratic and the hidden phase together. [rad]"""
+        """Quadratic phase with the same peak loss as the quadratic and the hidden phase together. [rad]"""
         phase: PerCase = np.hypot(self.qpe, self.hidden)
         return phase
 
     @property
     def farthest(self) -> Any:
-        """Larger of the displacements for the two signs of the error, east and north. [m]
+        """Displacement, east and north, for the sign of the error that moves the image farther. [m]
 
-        If the opposite sign moves the image farther, its displacement is given with reversed sign.
+        If that is the sign opposite to the declared one, its displacement is given with reversed sign. None if there
+        is no displacement.
         """
         if self.displacement is None or self.opposite is None:
             return None
@@ -104,7 +104,7 @@ class Declared(NamedTuple):
         return np.where(is_gone, math.nan, east), np.where(is_gone, math.nan, north)
 
     def of(self, errors: int | Indices | slice) -> "Declared":
-        """Select the effects of some of the errors."""
+        """Select the effects of the errors with the given indices."""
         (x, y), (u, v) = self.displacement, self.opposite
         phases = self.qpe[errors], self.cubic[errors]
         return Declared(
@@ -127,11 +127,11 @@ def point(displacement: tuple[PerCase, PerCase], case: int = 0) -> GroundVector 
 
 
 class Allowed(NamedTuple):
-    """Allowable sizes of errors according to one model; NaN where there is no limit.
+    """Allowable sizes of errors according to one model, (errors, cases); NaN where there is no limit.
 
     `smallest` is the allowable for all requirements, `quadratic` the allowable for the quadratic phase alone.
-    `binding` is the index in `LIMITING_REQUIREMENTS` of the requirement that sets the smallest size. It is the number
-    of these requirements if the image ends at that size, and -1 if no limit exists.
+    `binding` is the index in `LIMITING_REQUIREMENTS` of the requirement that sets the smallest size. If the image
+    ends at that size, `binding` is the length of `LIMITING_REQUIREMENTS`. It is -1 if there is no limit.
     """
 
     smallest: Floats
@@ -140,7 +140,7 @@ class Allowed(NamedTuple):
 
 
 class ImagePlane(NamedTuple):
-    """The matrix Q⁻¹ of each case, which maps constant and linear range error to displacement of the image."""
+    """Inverse of the matrix Q in each case. It maps constant and linear range error to displacement of the image."""
 
     adjugate: tuple[tuple[PerCase, ...], tuple[PerCase, ...]]
     determinant: PerCase
@@ -150,7 +150,7 @@ class ImagePlane(NamedTuple):
         """Displacement on the ground according to (25) with the model's Q; NaN where Q has no inverse. [m]"""
         (a, b), (c, d) = self.adjugate
         scale = size / np.where(self.is_singular, math.nan, self.determinant)
-        # Adding 0.0 turns -0.0, which reads as a claim about a sign, into 0.0.
+        # Adding 0.0 turns -0.0 into 0.0, so that no minus sign is printed.
         return (
             (a * effect.constant + b * effect.linear) * scale + 0.0,
             (c * effect.constant + d * effect.linear) * scale + 0.0,
@@ -162,11 +162,13 @@ _published_ground_inverse: Callable[..., tuple[tuple[PerCase, ...], ...]] = eval
 
 
 def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, PerCase]:
-    """Invert the published Q, (19) and (30), and return the angle between its two gradients. [deg]
+    """Invert the published matrix Q, (19) and (30).
+
+    Returns the inverse, and the angle between the range and the Doppler gradient of Q. [deg]
 
     The published Q takes the slant ranges as constant: its second row is v/R, while the true second row is v⊥/R. It
-    can therefore be singular where the true gradients are not. It also has no inverse where the look vectors at
-    mid-aperture almost cancel on the ground, because it contains no other look vectors.
+    can therefore be singular where the true gradients are not parallel. It also has no inverse where the look vectors
+    at mid-aperture almost cancel on the ground, because it contains no other look vectors.
     """
     ground: list[PerCase] = []
     for path in geometry.both:
@@ -198,12 +200,11 @@ class ErrorBlock:
     declared : (errors, cases)
         Signed sizes, coverage factor included; NaN where the file declares no size.
     effects : mapping of str to Effect
-        Effect of one unit for each model. The full model gives the effect of an error that is small enough to have no
-        second order, scaled to one unit.
+        Effect of one unit for each model. In the full model it is the first-order effect.
     """
 
     def __init__(self, table: "DeclaredErrors", sources: Sequence[ErrorSource]) -> None:
-        # A table holds its blocks: if they held it too, arrays of a sweep would wait for the garbage collector.
+        # A strong reference to the table would form a cycle, and the arrays of a sweep would wait for the collector.
         self.table: DeclaredErrors = weakref.proxy(table)
         self.exact, self.sources, self.cases = table.exact, sources, table.cases
         shape = (len(sources), self.cases)
@@ -224,7 +225,10 @@ class ErrorBlock:
 
     # ---------------------------------------------------------------- small errors
     def per_unit(self, model: str) -> Floats:
-        """Judged phase, cubic phase [rad] and displacement [m] per unit of a small error, (3, errors, cases)."""
+        """First-order effects per unit of each error, (3, errors, cases).
+
+        The effects are the magnitudes of the judged phase [rad], the cubic phase [rad] and the displacement [m].
+        """
         if model not in self._per_unit:
             effect = self.effects[model]
             moved = np.hypot(*self.table.planes[model].displacement(effect, 1.0))
@@ -236,7 +240,7 @@ class ErrorBlock:
 
     @cached_property
     def hidden_per_unit(self) -> Floats:
-        """Hidden phase and rms beyond the cubic per unit of each small error, (2, errors, cases). [rad]"""
+        """First-order hidden phase and rms beyond the cubic per unit of each error, (2, errors, cases). [rad]"""
         phases = np.zeros((2, *self.declared.shape))
         if self.moves:
             remaining = self.left_per_unit(self.moves)
@@ -244,7 +248,10 @@ class ErrorBlock:
         return phases
 
     def left_per_unit(self, indices: Sequence[int]) -> Floats:
-        """Range error at the nodes that remains per unit of some small errors, (errors, nodes, cases). [m]"""
+        """First-order range error at the nodes that remains at the image point, (errors, nodes, cases). [m/unit]
+
+        `indices` are the errors to evaluate.
+        """
         full = self.effects["full"]
         if self.cases == 1:
             lanes = self.paths.lanes.of(self._lane[indices, 0])
@@ -255,7 +262,7 @@ class ErrorBlock:
         return self.exact.left_of_small(range_error, (full.east[indices], full.north[indices]))
 
     def adds(self, size: Floats) -> Floats:
-        """Upper bounds of the second-order part of the effects, (3, errors, cases).
+        """Upper bounds of the second-order part of the effects of errors of the given sizes, (3, errors, cases).
 
         The effects are judged phase [rad], cubic phase [rad] and displacement [m].
         """
@@ -263,11 +270,12 @@ class ErrorBlock:
         return self.table.per_metre * self._grows(size, strays) + self.table.per_stray * strays
 
     def _strays(self, size: Floats) -> Floats:
-        """Upper bound of the displacement that the remaining phase causes. [m]
+        """Upper bound of the distance between the image point and its first-order position, (errors, cases). [m]
 
         An error that moves a platform by r̃ within the aperture changes the direction to the ground by r̃/R. Where
-        this change varies over the aperture like the remaining range error ρ, the phase variance V (see
-        `exact_ranges`) has its minimum beside the first-order image point. The distance is at most H⁻¹⟨r̃/R, ρ⟩.
+        this change varies over the aperture like the remaining range error ρ, the minimum of the phase variance V is
+        displaced from the first-order image point. The distance is at most H⁻¹⟨r̃/R, ρ⟩. `exact_ranges` defines V, H
+        and ⟨ ⟩.
         """
         full, exact, bent = self.effects["full"], self.exact, self._bent(size)
         hidden, beyond_cubic = self.hidden_per_unit
@@ -277,9 +285,9 @@ class ErrorBlock:
         return np.asarray(turns * remaining_m * (1 + exact.band) / exact.matrix.least)
 
     def _bent(self, size: Floats) -> PerCase:
-        """Distance by which the motion of errors deviates from one proportional to their size, (errors, cases). [m]
+        """Largest deviation of the motion by an error from the motion proportional to its size, (errors, cases). [m]
 
-        Only a time tag error has such a deviation. If the direct path is the clock, each metre counts twice.
+        Only a time tag error has such a deviation. If the direct path is the clock, the deviation is doubled.
         """
         tags = [index for index, source in enumerate(self.sources) if source.is_time_tag]
         if not tags:
@@ -290,12 +298,15 @@ class ErrorBlock:
         return bends
 
     def _grows(self, size: Floats, strays: Floats) -> Floats:
-        """Upper bound of the range error that the second order of errors adds. [m]
+        """Upper bound of the range error that the second order of errors adds, (errors, cases). [m]
 
-        The second order of two platforms is −Σ|P⊥(r̃ − x̂)|²/2R, at most |r̃ − x̂|²/R of the nearer platform. With a
-        direct path the second order of the ranges is bounded separately for each platform, because for a distant
-        platform much of it cancels to first order. The second order of the distance between the platforms,
-        |P⊥r̃|²/2D, has the opposite sign, so the sum is not larger than the larger term.
+        With r̃ the motion of a platform, x̂ the displacement of the image and P⊥ the projection across the line of
+        sight, the second order of two platforms is −Σ|P⊥(r̃ − x̂)|²/2R. It is at most |r̃ − x̂|²/R, with the range R
+        of the nearer platform. With a direct path the second order of the ranges is bounded separately for each
+        platform, because for a distant platform much of it cancels to first order. The second order of the distance D
+        between the platforms, |P⊥r̃|²/2D, has the opposite sign, so the sum is not larger than the larger term.
+
+        `strays` is the distance from `_strays`. [m]
         """
         exact, bent = self.exact, self._bent(size)
         shift, moved = size * self.edge + bent, size * self.per_unit("full")[2] + strays
@@ -348,7 +359,7 @@ class ErrorBlock:
         return effects
 
     def _exactly(self, effects: Declared, size: Floats, is_large: Booleans) -> None:
-        """Replace the effects of errors that are too large for the first order by those of exact ranges."""
+        """Replace the effects of the errors marked in `is_large` by the results of exact ranges."""
         sizes = size[is_large]
         points = self.followed(is_large, np.abs(sizes))
         ahead, back = (np.where(sizes > 0, *pair) for pair in (points, points[::-1]))
@@ -359,7 +370,7 @@ class ErrorBlock:
         for kept, row in zip(phases, rows, strict=True):
             largest = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[is_large])
             kept[is_large] = np.where(is_gone, math.inf, largest)
-        # The larger of the judged phases. The larger quadratic phase may have the opposite sign.
+        # The sign with the larger judged phase need not be the sign with the larger quadratic phase.
         gain = np.broadcast_to(self.table.gain, size.shape)[is_large]
         judged = np.maximum(
             *(np.hypot(each[point_paths.QUADRATIC], gain * each[point_paths.HIDDEN]) for each in (ahead, back))
@@ -371,9 +382,10 @@ class ErrorBlock:
             east[is_large], north[is_large] = each[point_paths.EAST], each[point_paths.NORTH]
 
     def followed(self, errors: Booleans, sizes: Floats) -> Floats:
-        """Results of exact ranges for some errors at given sizes, (2, rows, some).
+        """Results of exact ranges for the errors marked in `errors`, at the given sizes (n,).
 
-        The first axis is the positive and the negative sign. The rows are those of `point_paths.ROWS`.
+        Returns an array (2, rows, n). The first axis is the positive and the negative sign. The rows are those of
+        `point_paths.ROWS`.
         """
         lanes = np.concatenate(self._lanes_of(errors))
         both = np.tile(sizes, 2)
@@ -382,9 +394,10 @@ class ErrorBlock:
 
     @cached_property
     def _lane(self) -> Indices:
-        """Lane of each error with positive sign, in each case, (errors, cases).
+        """Index of the lane of each error with positive sign in each case, (errors, cases).
 
-        The lanes of the negative sign follow the lanes of the positive sign.
+        A lane is one error with one sign in one case. The lanes of an error's negative sign follow those of its
+        positive sign.
         """
         first_lane = np.zeros((len(self.sources), 1), dtype=int)
         first_lane[self.moves, 0] = 2 * self.cases * np.arange(len(self.moves))
@@ -396,7 +409,7 @@ class ErrorBlock:
 
     @property
     def paths(self) -> PointPaths:
-        """Paths of the image point for the errors that displace it.
+        """Paths of the image point, as the size grows, for the errors that displace it.
 
         For each error, the positive sign comes before the negative sign.
         """
@@ -415,9 +428,9 @@ class ErrorBlock:
 
     @cached_property
     def quadratic_by_sign(self) -> Floats:
-        """Quadratic phases of the large declared errors for each sign, positive first, (2, errors, cases). [rad]
+        """Exact quadratic phases of the declared errors for each sign, positive first, (2, errors, cases). [rad]
 
-        NaN for errors that are not large and for errors that leave no image.
+        NaN for errors whose first-order effect is sufficient, and for errors that leave no image.
         """
         phases = np.full((2, *self.declared.shape), math.nan)
         is_large = self.is_declared_large
@@ -429,7 +442,7 @@ class ErrorBlock:
     # ---------------------------------------------------------------- allowable sizes
     @cached_property
     def farthest(self) -> Floats:
-        """Largest size at which the search for a limit stops, (errors, cases).
+        """Size of each error at which the search for a limit stops, in the unit of the error, (errors, cases).
 
         A larger path error would not be a navigation error. Infinite for an error that has no effect at any size.
         """
@@ -442,8 +455,8 @@ class ErrorBlock:
                 nearer = np.minimum(reached[0], reached[-1]) if len(reached) > 1 else reached[0]
                 size[index] = FARTHEST_RANGE_FRACTION * nearer / self.edge[index]
             else:
-                # A clock takes no platform anywhere. No range sum is shorter than the distance of the platforms, and
-                # this distance is at least the sum less twice the nearer range: by then an image has ended.
+                # A clock error moves no platform. No range sum is shorter than the distance between the platforms,
+                # which is at least the range sum less twice the nearer range. At this size no image is left.
                 course = self.exact.clock_course(source.clock or ())
                 size[index] = 2 * np.minimum(slant[0], slant[1]) / np.abs(course).max(axis=0)
         return size
@@ -480,7 +493,7 @@ class ErrorBlock:
         return Allowed(smallest, quadratic if is_complete else smallest, binding)
 
     def ends_image(self, size: Floats) -> Booleans:
-        """Mark the errors for which the image ends at the allowable size that was found."""
+        """Mark the errors for which the image ends at the given allowable size, found by an earlier search."""
         ends_there = np.zeros(size.shape, dtype=bool)
         if self._follows is not None:
             sizes = size[self.moves]
@@ -500,15 +513,17 @@ class ErrorBlock:
     def _searched(self, limit: Floats, small: Floats, required: Sequence[int], *, is_complete: bool) -> Floats:
         """Smallest sizes, of either sign, at which errors reach their limits, (3, errors, cases).
 
-        Infinite where no size reaches the limit. `small` are the sizes if all effects were proportional to the
-        errors. The search ends at the size that moves the platform by more than a tenth of the slant range, or by
-        more than the declared error does. It also ends at the size that another limit allows, except for the
-        quadratic phase if `is_complete`. The limit that is most likely to bind is searched first.
+        Infinite where no size reaches the limit. `small` are the sizes according to the first-order effects.
+        `required` are the indices of the requirements that have a limit.
+
+        The search ends at the size that moves the platform by more than a tenth of the slant range, or at the
+        declared size if that is larger. It also ends at the size that another limit allows, except for the quadratic
+        phase if `is_complete`. The limit that is most likely to bind is searched first.
         """
         most = np.fmax(self.farthest, np.abs(self.declared))
         smallest = np.full(small.shape, math.inf)
         searches = list[LimitSearches]()
-        # A few searches run together.
+        # If there are few searches, they run together.
         is_together = tries_several_sizes(2 * len(required) * self.declared.size, self.table.is_complete)
         for turn in np.array(required)[np.argsort(small[required], axis=0, kind="stable")]:
             of, first = (np.take_along_axis(sizes, turn[None], axis=0)[0] for sizes in (limit, small))
@@ -540,13 +555,13 @@ class ErrorBlock:
 
 
 def _less(shift: Vectors, velocity: Vectors, tag_s: Floats) -> Vectors:
-    """Shift of a time tag error less the shift along the velocity, `tag_s`·velocity. [m]"""
+    """Shift by a time tag error less its first-order part `tag_s`·velocity. [m]"""
     (x, y, z), (u, v, w) = shift, velocity
     return (x - tag_s * u, y - tag_s * v, z - tag_s * w)
 
 
 class DeclaredErrors:
-    """Errors of cases that need the same number of nodes.
+    """Errors of cases that need the same number of nodes, with their effects and allowable sizes.
 
     Parameters
     ----------
@@ -610,7 +625,10 @@ class DeclaredErrors:
         return np.full(self.cases, value, dtype=float)
 
     def lanes(self, *errors: ErrorSource, signs: Sequence[float] = (1.0,)) -> Lanes:
-        """Lanes of errors of one unit, ordered by error, then sign, then case."""
+        """Unit errors as lanes, ordered by error, then sign, then case.
+
+        A lane is one error with one sign in one case. `signs` are the signs of each error.
+        """
         orders = [self._order(error) for error in errors]
         courses = np.array([self._course(error, order) for error, order in zip(errors, orders, strict=True)])
         at_nodes = np.moveaxis(courses[:, None] * np.array(signs)[:, None, None], 2, 0)
@@ -624,7 +642,7 @@ class DeclaredErrors:
         return Lanes(case, at_nodes.reshape(len(at_nodes), -1), moves, directions, order, tags)
 
     def _of_lanes(self, values: Any, signs: int) -> Any:
-        """Repeat values (..., errors, cases) for each sign of an error, (..., lanes).
+        """Repeat values (..., errors, cases) for each of `signs` signs, (..., lanes).
 
         A value for a single error in a single case is shared by all lanes and becomes (..., 1).
         """
@@ -634,9 +652,9 @@ class DeclaredErrors:
         return np.broadcast_to(values[..., None, :], (*more, errors, signs, self.cases)).reshape(*more, -1)
 
     def edge_of(self, error: ErrorSource) -> PerCase:
-        """Position error at the aperture edge per unit of an error.
+        """Position error at the aperture edge per unit of an error. [m/unit]
 
-        For an error of both platforms it is the larger of both. It is 0 for a clock error.
+        For an error of both platforms it is the larger of the two position errors. It is 0 for a clock error.
         """
         if not error.is_time_tag and error.shifts is None:
             return self.edge.get(error.unit, 0.0)
@@ -644,9 +662,9 @@ class DeclaredErrors:
         return farthest
 
     def bent(self, error: ErrorSource, size: Floats) -> Floats:
-        """Deviation of a time tag's shift from a shift along the velocity, for the worse sign, (cases,). [m]
+        """Deviation of the shift by a time tag error from a shift along the velocity, worse sign, (cases,). [m]
 
-        The deviations of the platforms are added.
+        For an error of both platforms, the deviations of both are added.
         """
         times, bend = self.exact.times, np.zeros(self.cases)
         for platform in error.platforms:
@@ -658,18 +676,19 @@ class DeclaredErrors:
         return bend
 
     def _order(self, error: ErrorSource) -> int:
-        """Power of slow time with which a position error grows.
+        """Power of slow time in proportion to which the position error of a platform grows.
 
-        It is -1 for a clock error, and 0 for an error whose motion is given at the nodes.
+        It is -1 for an error that moves no platform, and 0 for an error whose motion is given at the nodes.
         """
         if not error.platforms:
             return -1
         return 0 if error.is_time_tag or error.shifts is not None else list(self.edge).index(error.unit)
 
     def _course(self, error: ErrorSource, order: int) -> Floats:
-        """Position error at the nodes per unit of an error, (nodes, cases).
+        """Position error at the nodes per unit of an error, (nodes, cases). [m/unit]
 
-        For an error that moves no platform it is the range error.
+        For an error that moves no platform it is the range error. For an error whose motion is given at the nodes it
+        is 1.
         """
         exact = self.exact
         if order >= 0:
@@ -697,27 +716,29 @@ class DeclaredErrors:
         return self._does[key]
 
     def is_large(self, error: ErrorSource) -> Booleans:
-        """Cases in which the effects of a declared error are not proportional to its size."""
+        """Cases in which the effects of a declared error may not be proportional to its size."""
         block, index = self.block_of(error)
         return np.asarray(block.is_declared_large[index])
 
     def quadratic_by_sign(self, error: ErrorSource) -> Floats:
-        """Quadratic phases of a large declared error for each sign, positive first, (2, cases). [rad]
+        """Exact quadratic phases of a declared error for each sign, positive first, (2, cases). [rad]
 
-        NaN where the error is not large or leaves no image.
+        NaN where the first-order effect is sufficient or the error leaves no image.
         """
         block, index = self.block_of(error)
         return block.quadratic_by_sign[:, index]
 
     def doubts(self, model: str, is_over: PerCaseFlag) -> PerCaseFlag:
-        """Cases in which a model that does not gate gives reason for doubt.
+        """Cases in which the model that does not gate makes a result doubtful.
+
+        `is_over` marks the cases in which a limit is exceeded in that model.
 
         With a direct path the published model never does, because it does not include the direct path.
         """
         return False if model == "published" and self.has_direct_path else is_over
 
     def degeneracy(self, model: str, case: int = 0) -> Note:
-        """Note on why a model has no displacement in a case; empty if it has one."""
+        """Note on why the image has no displacement in a model in a case; empty if it has one."""
         if model == "full" or not plain(self.planes[model].is_singular, case):
             return NOTHING
         degrees = plain(self.published_angle_deg, case)
@@ -727,9 +748,9 @@ class DeclaredErrors:
 
 
 def _motions(errors: Sequence[ErrorSource]) -> tuple[Floats, Floats]:
-    """Flags of the platforms that each error moves, (2, errors, 1), and directions of the motion, as in `Lanes`.
+    """Platforms that each error moves, and the directions of the motion, in the form that `Lanes` uses.
 
-    The directions are (2, 3, nodes, errors, cases).
+    Returns flags, 1 for a platform that is moved, (2, errors, 1), and directions, (2, 3, nodes, errors, cases).
     """
     ways = [
         (platform, index, error.way_of(platform))
@@ -748,7 +769,7 @@ def _motions(errors: Sequence[ErrorSource]) -> tuple[Floats, Floats]:
 
 
 class Model:
-    """One model of a single case, for questions about one error at a time.
+    """One model of a single case, which evaluates one error at a time.
 
     Its methods take and return plain numbers. A missing value is None.
     """
@@ -756,7 +777,7 @@ class Model:
     def __init__(self, errors: DeclaredErrors, name: str) -> None:
         self.errors, self.exact, self.name = errors, errors.exact, name
         self.is_published = name == "published"
-        self.is_blind = self.is_published and errors.has_direct_path  # to the direct path
+        self.is_blind = self.is_published and errors.has_direct_path  # it does not include the direct path
         self.plane, self.degeneracy = errors.planes[name], errors.degeneracy(name)
 
     def effect(self, source: ErrorSource) -> Effect | FullEffect:
@@ -764,11 +785,14 @@ class Model:
         return source.effect if self.is_published else source.full
 
     def displacement(self, effect: Effect | FullEffect, size: float) -> GroundVector | None:
-        """Displacement on the ground by (25) with the Q of the model; None where Q has no inverse. [m]"""
+        """Displacement on the ground, east and north, by an error of a given size, from its first-order effect. [m]
+
+        In the published model it follows from (25). None where Q has no inverse.
+        """
         return point(self.plane.displacement(effect, size))
 
     def equation(self, source: ErrorSource) -> str:
-        """Name of the equation or table from which the effect follows."""
+        """Name of the equation or table from which the effect of an error follows."""
         return source.equation if self.is_published or not source.is_motion else "full model"
 
     def no_limit(self, source: ErrorSource) -> Note:
@@ -778,7 +802,7 @@ class Model:
         return phrases.note("no-size-reaches-the-limit") if source.is_motion else phrases.note("no-quadratic-phase")
 
     def does(self, source: ErrorSource, size: float) -> Declared:
-        """Effect of an error of a given size."""
+        """Effect of an error of a given size, in the unit of the error."""
         block, index = self.errors.block_of(source)
         sizes = np.full(block.declared.shape, math.nan)
         sizes[index] = size
@@ -805,26 +829,29 @@ class Model:
         return self.allowed(source, [limit if name == requirement else None for name in LIMITING_REQUIREMENTS])[0]
 
     def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
-        """Size at which an error would reach a limit if its effects were proportional to it.
+        """Size at which an error would reach a limit according to its first-order effect.
 
-        Infinite if the error has no such effect.
+        Infinite if the error has no effect on the limited quantity.
         """
         block, index = self.errors.block_of(source)
         per_unit = float(block.per_unit(self.name)[LIMITING_REQUIREMENTS.index(requirement), index, 0])
         return limit / per_unit if per_unit else math.inf
 
     def hidden_per_unit(self, source: ErrorSource) -> float:
-        """Hidden phase per unit of a small error; 0 in the published model. [rad/unit]"""
+        """First-order hidden phase per unit of an error; 0 in the published model. [rad/unit]"""
         block, index = self.errors.block_of(source)
         return 0.0 if self.is_published else float(block.hidden_per_unit[0, index, 0])
 
     def ends_image(self, source: ErrorSource, size: float) -> bool:
-        """Whether the image ends at an allowable size that was found. Always false in the published model."""
+        """Whether the image ends at the given allowable size, found by an earlier search.
+
+        Always false in the published model.
+        """
         block, index = self.errors.block_of(source)
         return not self.is_published and bool(block.ends_image(np.full(block.declared.shape, size))[index, 0])
 
     def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
-        """Whether the effects of an error are proportional to its size up to a limit."""
+        """Whether the effects of an error are proportional to its size up to the size that reaches a limit."""
         block, index = self.errors.block_of(source)
         requirement_index = LIMITING_REQUIREMENTS.index(requirement)
         per_unit = block.per_unit(self.name)[requirement_index]
@@ -835,12 +862,12 @@ class Model:
 
     # ---------------------------------------------------------------- by exact ranges
     def is_small(self, source: ErrorSource, size: float) -> bool:
-        """Whether the effects of an error are proportional to its size, by the second-order bounds."""
+        """Whether the effects of an error of a given size are proportional to it, by the second-order bounds."""
         block, index = self.errors.block_of(source)
         return not block.is_large(np.full(block.declared.shape, size))[index, 0]
 
     def at(self, source: ErrorSource, size: float) -> ExactEffect | None:
-        """Phases and displacement of an error of a signed size by exact ranges; None without an image point."""
+        """Phases and displacement by an error of a signed size, from exact ranges; None without an image point."""
         block, index = self.errors.block_of(source)
         is_asked = np.zeros(block.declared.shape, dtype=bool)
         is_asked[index] = True
@@ -849,20 +876,17 @@ class Model:
         return None if math.isnan(east) else ExactEffect((east, north), *phases)
 
     def largest_range_error(self, source: ErrorSource) -> float:
-        """Largest range error at the nodes per unit of an error, before displacement is removed. [m/unit]"""
+        """Largest magnitude of the range error at the nodes at the scene centre, per unit of an error. [m/unit]"""
         return float(np.abs(self.exact.range_error(self.errors.lanes(source))).max())
 
     def left_over(self, source: ErrorSource, size: float, point: GroundVector) -> Sequence[float]:
-        """Range error at the nodes that remains at a ground point. [m]"""
+        """Range error at the nodes that an error of a given size leaves at a ground point. [m]"""
         remaining = self.exact.left_over(self.errors.lanes(source), np.array([size]), point)
         range_error: list[float] = remaining[:, 0].tolist()
         return range_error
 
     def left_over_small(self, source: ErrorSource, size: float) -> Sequence[float]:
-        """Range error at the nodes that remains at the displaced point of a small error. [m]
-
-        The effects of the error are taken as proportional to its size.
-        """
+        """Range error at the nodes that an error of a given size leaves at its image point, to first order. [m]"""
         east, north = self.displacement(source.full, size) or (0.0, 0.0)
         by_east, by_north = self.exact.slopes
         remaining = size * self.exact.range_error(self.errors.lanes(source)) + east * by_east + north * by_north

@@ -13,6 +13,7 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.arrays import PerCase, PerCaseFlag
+from bisar_budget.error_kinds import ErrorKind, Motion, MotionKind, SourceKind, kind_of
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import (
     BistaticGeometry,
@@ -33,15 +34,16 @@ MOTION = ("position", "velocity", "acceleration")  # kinds of error that a platf
 
 
 class Subject(NamedTuple):
-    """Subject of a row or an error. The function `subject` creates it with its id, so that no code parses an id.
+    """Subject of a row or an error: owner, kind and axis. The function `subject` creates it with its id.
 
-    `owner` owns the share of the budget that the error uses: transmitter, receiver, clock, or mission if no part of
-    the system owns the error. `kind` is position, velocity, acceleration, time_tag, vibration, timing, propagation,
-    dispersion, terrain, other, specification, or the name of a sum.
+    Code reads these fields and never parses an id. `owner` owns the share of the budget that the error uses:
+    transmitter, receiver, clock, or mission if no part of the system owns the error. `kind` is position, velocity,
+    acceleration, time_tag, vibration, timing, propagation, dispersion, terrain, other, specification, or the name of
+    a sum.
 
     `axis` is the axis of `frame`, the term of the clock, the name of a declared value of a sensor or of the air, the
-    name of an error from elsewhere, the specified key, or the sort of a vibration. `entry` is the index of the error
-    in a list of the file.
+    name of an error determined elsewhere, the specified key, or the type of a vibration. `entry` is the index of the
+    error in a list of the file.
     """
 
     id: str
@@ -51,23 +53,16 @@ class Subject(NamedTuple):
     frame: str = "scene"
     entry: int | None = None
 
+    @property
+    def facts(self) -> ErrorKind:
+        """The kind itself, with all that is known about it."""
+        return kind_of(self.kind)
+
 
 @cache
 def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: int | None = None) -> Subject:
     """Create the subject of an error or a sum, with the id that the contract defines."""
-    if kind in ("timing", "other", "specification"):  # kinds with one possible owner
-        parts = [kind, axis]
-    elif kind == "propagation":  # one air over both legs, or one leg
-        parts = [kind, "" if owner == "mission" else owner, axis]
-    elif kind == "dispersion":
-        parts = ["propagation", kind]
-    elif owner == "clock":
-        parts = ["timing", kind]
-    elif owner == "mission" and kind in (*MOTION, "time_tag", "random"):
-        parts = ["common", kind, axis]
-    else:
-        parts = [owner, kind, axis, "" if entry is None else str(entry)]
-    return Subject(".".join(filter(None, parts)), owner, kind, axis, frame, entry)
+    return Subject(kind_of(kind).row_id(owner, axis, entry), owner, kind, axis, frame, entry)
 
 
 PLATFORMS = ("transmitter", "receiver")
@@ -77,7 +72,10 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of an error that is no motion
 
 
 def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: str) -> tuple[Note, ...]:
-    """Notes on values of parts that the file overrides: those named in `figures`, or all if none is named."""
+    """Notes on values of parts, such as sensors, that the file overrides.
+
+    Only the values named in `figures` are included, or all values if none is named.
+    """
     return tuple(
         phrases.note("overrides-a-part", key=f"platforms.{platform}.{figure.key}", text=figure.text, part=figure.part)
         for figure in overridden
@@ -118,9 +116,10 @@ class ErrorSource(NamedTuple):
     the error. It is None for any other error.
 
     `shifts` are the motions of both platforms over the aperture per unit of the error, (nodes, cases) for each axis.
-    [m] They are set if a platform is in free fall, where the error follows the dynamics of the orbit. `rates` are
-    then the velocities at mid-aperture of position errors in `ric`, which have no velocity relative to the stars.
-    [m/s] Both are None otherwise.
+    [m] They are set for a registered kind of error, and if a platform is in free fall, where the error follows the
+    dynamics of the orbit. In free fall `rates` are the velocities at mid-aperture of position errors in `ric`, which
+    have no velocity relative to the stars. [m/s] Both are None otherwise. `is_registered` marks an error of a
+    registered kind, which moves its platform by `shifts` whether the platform is in free fall or not.
     """
 
     subject: Subject
@@ -139,6 +138,7 @@ class ErrorSource(NamedTuple):
     of_receiver: Vectors | None = None
     shifts: tuple[VectorArrays, VectorArrays] | None = None
     rates: tuple[Vectors, Vectors] | None = None
+    is_registered: bool = False
 
     @property
     def id(self) -> str:
@@ -190,7 +190,7 @@ class ErrorSource(NamedTuple):
 
     @property
     def is_motion(self) -> bool:
-        """Whether the error moves platforms or the clock; not for a pure phase error, which displaces nothing."""
+        """Whether the error moves platforms or shifts the clock. It is false for a pure phase error."""
         return self.unit != "rad"
 
     @property
@@ -202,18 +202,30 @@ class ErrorSource(NamedTuple):
         return self.subject.kind == "time_tag"
 
     @property
+    def kind(self) -> SourceKind:
+        """The kind of the error, with all that is known about it."""
+        facts = self.subject.facts
+        assert isinstance(facts, SourceKind)
+        return facts
+
+    @property
+    def motion(self) -> Motion | None:
+        """Motion of the platform per unit, which a registered kind of error states; None for any other kind."""
+        return self.kind.motion if self.is_registered and isinstance(self.kind, MotionKind) else None
+
+    @property
     def is_covered(self) -> bool:
         """Whether the declared size includes the coverage factor.
 
         It does not for terrain and for a pure phase error.
         """
-        return self.subject.kind in (*MOTION, "time_tag") or self.clock is not None
+        return self.kind.is_covered
 
     @property
     def is_heard(self) -> bool:
         """Whether the data contain the error.
 
-        A clock error is contained unless the synchronization removes all of it.
+        They do not contain a clock error that the synchronization removes completely.
         """
         return self.clock is None or any(map(np.any, self.clock))
 
@@ -224,7 +236,7 @@ class ErrorSource(NamedTuple):
 
     @property
     def is_position(self) -> bool:
-        """Whether the error is in the measured path of a platform, or of both platforms."""
+        """Whether the error is one of the measured path of one platform or of both platforms."""
         return self.is_motion and self.clock is None
 
     @property
@@ -239,7 +251,7 @@ class ErrorSource(NamedTuple):
     @property
     def is_common(self) -> bool:
         """Whether the paths of both platforms share the error."""
-        return self.owner == "mission" and self.subject.kind in (*MOTION, "time_tag")
+        return self.owner == "mission" and bool(self.kind.common_id_form)
 
 
 # ---------------------------------------------------------------------- pieces of a range error, (26) to (29)
@@ -247,9 +259,10 @@ PRINTED, TRUE = "v/R as printed, ranges held", "v⊥/R, lines of sight as they t
 
 
 class LinePiece(NamedTuple):
-    """A piece of the range error, approximated by a line.
+    """Piece of a range error, approximated by a straight line.
 
-    `time` is its centre τ_i from mid-aperture [s]. `value` (27) [m] and `slope` (28) [m/s] are those at this time.
+    `time` is the centre τ_i of the piece, counted from mid-aperture. [s] `value` (27) [m] and `slope` (28) [m/s] are
+    the range error of the line and its rate at this time.
     """
 
     time: float

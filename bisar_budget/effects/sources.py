@@ -24,8 +24,9 @@ from bisar_budget.effects.effect import (
     override_notes,
     subject,
 )
+from bisar_budget.error_kinds import MotionKind, kind_of
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, VectorArrays, Vectors
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, VectorArrays, Vectors, dot
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
@@ -88,6 +89,7 @@ class ErrorListing:
         yield from self._of_clock()
         yield from self._of_both_platforms()
         yield from self._of_time_tags()
+        yield from self._of_registered_kinds()
         yield from self._of_terrain()
         yield from self._stated_elsewhere()
 
@@ -496,6 +498,39 @@ class ErrorListing:
         times = self.exact.times
         u, v, w = (np.broadcast_to(component, times.shape) for component in path.at(times)[1])
         return (u, v, w)
+
+    def _of_registered_kinds(self) -> Iterator[ErrorSource]:
+        """Errors of the kinds that packages register, each by the motion that its kind states.
+
+        The published model projects the motion on the line of sight of mid-aperture and takes its Legendre orders.
+        """
+        exact = self.exact
+        for platform_index, name in enumerate(PLATFORMS):
+            error: MotionError = getattr(self.mission.platforms, name).motion_error
+            path = self.geometry.both[platform_index]
+            for key, value in error.registered.items():
+                kind = kind_of(key)
+                assert isinstance(kind, MotionKind)
+                x, y, z = (np.broadcast_to(moved, exact.times.shape) for moved in kind.motion(path, exact.times))
+                along_look = -dot(path.look, (x, y, z))
+                orders = np.einsum("fn,nc->fc", exact.fit, along_look)
+                orders = np.where(
+                    np.abs(orders) > VECTOR_ROUNDING_FRACTION * np.abs(along_look).max(axis=0), orders, 0
+                )
+                yield ErrorSource(
+                    subject=subject(name, key),
+                    unit=kind.unit,
+                    declared=value * self.factor,
+                    path=("platforms", name, "motion_error", "registered", key),
+                    effect=Effect(orders[0], orders[1] / exact.half, exact.k * orders[2], exact.k * orders[3]),
+                    full=exact.effect(exact.along(platform_index, (x, y, z))),
+                    direction=NOWHERE,
+                    equation=kind.equation,
+                    no_limit=phrases.note("no-quadratic-term-of-registered", kind=key),
+                    evidence=error.source,
+                    shifts=((x, y, z), (x, y, z)),
+                    is_registered=True,
+                )
 
     def _of_terrain(self) -> Iterator[ErrorSource]:
         """Error of a scene that is higher than the processor assumes.

@@ -10,13 +10,23 @@ from functools import cache
 
 import yaml
 
+from bisar_budget.error_kinds import motion_kinds
 from bisar_budget.faults import Changed, InvalidValueError, KeyPath, Problem, SetNumber, SetValue, shown
 from bisar_budget.mission.model import MISSION
-from bisar_budget.mission.readers import INVALID, ListOf, OneOf, Reader, Section, did_you_mean, is_index
+from bisar_budget.mission.readers import (
+    INVALID,
+    ListOf,
+    OneOf,
+    Reader,
+    RegisteredSizes,
+    Section,
+    did_you_mean,
+    is_index,
+)
 from bisar_budget.mission.tree import MAX_BYTES, NULLS, Content, Tree
 
 _ACCEPTED_CHANGE = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
-_MAX_KEY_CHARACTERS = 500  # a path of the schema has a tenth
+_MAX_KEY_CHARACTERS = 500  # ten times the longest path of the schema
 # Sections whose keys have dots: ids of rows, or whole paths.
 _WITH_DOTTED_KEYS = (("requirement_ids",), ("specifications",), ("allocation", "specify"))
 
@@ -62,7 +72,7 @@ def apply_changes(tree: Tree, changes: Sequence[SetValue]) -> None:
     Raises
     ------
     UnusableError
-        The tree has so many or such faults that reading it further makes no sense. The fault is in the tree.
+        The tree has too many faults, or a fault after which it cannot be read further. The tree contains the fault.
     """
     for change in changes:
         if takes_out(change):
@@ -72,7 +82,7 @@ def apply_changes(tree: Tree, changes: Sequence[SetValue]) -> None:
 
 
 def takes_out(change: SetValue) -> bool:
-    """Whether an option removes a key: its value is a null of YAML, as in `--set requirements.islr=null`."""
+    """Whether an option removes a key, that is, sets it to a YAML null: `--set requirements.islr=null`."""
     return not isinstance(change, SetNumber) and change.text in NULLS and change.text != ""
 
 
@@ -192,7 +202,7 @@ def _value(tree: Tree, change: SetValue, path: KeyPath) -> Content:
         tree.fault(None, path, f"is not valid YAML: {reason}", given=shown(change.text))
     except yaml.reader.ReaderError as error:
         tree.fault(None, path, f"is not text: {error.reason}")
-    except UnicodeEncodeError:  # an argument of other bytes, which Python keeps as surrogates
+    except UnicodeEncodeError:  # Python keeps the bytes of an argument that is not UTF-8 as surrogates
         tree.fault(None, path, "is not text: its bytes are not UTF-8", given=shown(change.text))
     return INVALID
 
@@ -205,9 +215,10 @@ def _forget(tree: Tree, path: KeyPath) -> None:
 
 
 # ---------------------------------------------------------------------- hints for unknown keys
-_MAX_PATH_CHARACTERS = 200  # of a path that is compared with known paths
-_MAX_HINT_PATH_COUNT = 4  # in a hint; a key of more sections has no hint
-# Smallest similarity of a misspelt key to a key of its section: if another section has the key as it is, and if not.
+_MAX_PATH_CHARACTERS = 200  # of an unknown path; only these are compared with known paths
+_MAX_HINT_PATH_COUNT = 4  # in a hint; a key that occurs in more sections gets no hint
+# Smallest similarity at which an unknown key counts as a misspelt key of its section. A key that exists in another
+# section needs the first ratio, and any other key the second ratio.
 _KNOWN_KEY_SIMILARITY_RATIO, _UNKNOWN_KEY_SIMILARITY_RATIO = 0.8, 0.6
 
 
@@ -218,7 +229,7 @@ def all_keys() -> tuple[str, ...]:
 
 
 def _below(reader: Reader[object], path: str) -> Iterator[str]:
-    """Paths of all keys below a path."""
+    """Yield the paths of all keys that a reader knows; `path` is the path of the reader's own value."""
     if isinstance(reader, OneOf):
         for form in reader.forms:
             yield from _below(form, path)
@@ -229,6 +240,8 @@ def _below(reader: Reader[object], path: str) -> Iterator[str]:
             here = f"{path}.{name}" if path else name
             yield here
             yield from _below(key.reader, here)
+    elif isinstance(reader, RegisteredSizes):
+        yield from (f"{path}.{name}" for name in motion_kinds())
 
 
 def nearest_keys(path: str) -> str:
@@ -240,7 +253,7 @@ def nearest_keys(path: str) -> str:
     path = path[:_MAX_PATH_CHARACTERS]
     steps = parts_of(path)
     meant = _spelt_right(steps)
-    if meant and meant != ".".join(steps):  # equal if the key belongs to another form of the section
+    if meant and meant != ".".join(steps):  # they are equal if the key belongs to another form of the section
         return f"Did you mean {meant!r}?"
     section, missing = _split(_names(path))
     prefix = f"{section}." if section else ""
@@ -256,11 +269,11 @@ def nearest_keys(path: str) -> str:
 
 
 def section_hint(path: str, near: str) -> str:
-    """Hint that names the sections with the last key of a path; `near` is the hint for a key with a similar name.
+    """Hint for an unknown path: the sections that have its last key, or else the hint `near`.
 
-    The result is `near` if the key resembles a key of its own section, or if no section has the key. Otherwise the
-    hint names the sections whose path has most keys in common with this path. It is empty if there are more than
-    `_MAX_HINT_PATH_COUNT` of them.
+    `near` is a hint that names a similar key. It is returned if the key resembles a key of its own section, or if no
+    section has the key. Otherwise the hint names the sections whose path begins with the most keys of this path. It
+    is empty if there are more than `_MAX_HINT_PATH_COUNT` such sections.
     """
     *above, name = _names(path[:_MAX_PATH_CHARACTERS]) or [""]
     sections = [key.split(".")[:-1] for key in all_keys() if key.rpartition(".")[2] == name]
@@ -338,7 +351,7 @@ ACCEPTED_ERRORS = (
 def is_error(key: str) -> bool:
     """Whether a key states the size of an error.
 
-    It is in a section of errors, and is not an interval, a frequency or a similar number.
+    These are the keys in sections of errors, except for intervals, frequencies and similar numbers.
     """
     steps = parts_of(key)
     return any(step in _ERROR_KEYS for step in steps[:3]) and steps[-1] not in _NO_SIZES
@@ -346,7 +359,7 @@ def is_error(key: str) -> bool:
 
 def name_of_error(key: str) -> str:
     """Name of an error in rows, such as `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
-    return ".".join(step for step in parts_of(key) if step not in ("platforms", "motion_error"))
+    return ".".join(step for step in parts_of(key) if step not in ("platforms", "motion_error", "registered"))
 
 
 def report_specified(tree: Tree) -> None:

@@ -31,8 +31,8 @@ from bisar_budget.mission.readers import (
 MOTION_KINDS = ("position", "velocity")
 MATRIX_SIZE = 6
 
-# Matrices are written with finite digits. Six decimals of a correlation leave an element wrong by 5e-7 and, five
-# of them in a row, an eigenvalue by 2.5e-6 (Weyl).
+# Files have rounded matrices. With six decimals, each correlation is wrong by up to 5e-7. With five correlations in
+# each row, an eigenvalue is then wrong by up to 2.5e-6 (Weyl's inequality).
 _ELEMENT_TOLERANCE_FRACTION = 1e-6
 EIGENVALUE_TOLERANCE_FRACTION = 2.5e-6
 
@@ -53,18 +53,18 @@ class Covariance(NamedTuple):
     pairs: tuple[str, ...] = ()
 
     def of(self, kind: str) -> Vector:
-        """Sigmas of the position errors or of the velocity errors along the axes of the frame; `kind` names which."""
+        """Sigmas along the axes of the frame, for the `kind` "position" [m] or "velocity" [m/s]."""
         first = 3 * MOTION_KINDS.index(kind)
         a, b, c = self.sigmas[first : first + 3]
         return (a, b, c)
 
     def block(self, kind: str) -> list[tuple[float, ...]]:
-        """Correlations (3, 3) among the position errors or among the velocity errors; `kind` names which."""
+        """Correlation matrix (3, 3) of the three errors of a `kind`, "position" or "velocity"."""
         first = 3 * MOTION_KINDS.index(kind)
         return [row[first : first + 3] for row in self.correlation[first : first + 3]]
 
     def path(self, kind: str, axis: int) -> KeyPath:
-        """Path, below `covariance` in the file, of the sigma of an error."""
+        """Path of a sigma, relative to `covariance` in the file; in the matrix form, the path of its variance."""
         index = 3 * MOTION_KINDS.index(kind) + axis
         return (index, index) if self.is_matrix else (kind, axis)
 
@@ -177,7 +177,7 @@ class _MatrixReader(Reader[Covariance]):
 
 
 def _excesses(rows: Sequence[Sequence[float]], sigmas: Sequence[float]) -> Iterator[Problem]:
-    """Yield a problem for each element that is larger than the product of its sigmas."""
+    """Yield a problem for each covariance whose absolute value exceeds the product of its two sigmas."""
     for i in range(MATRIX_SIZE):
         for j in range(i):
             most = sigmas[i] * sigmas[j]
@@ -308,7 +308,10 @@ COVARIANCE = either(dict, _SigmasReader(Sigmas), _MatrixReader())
 
 
 def misplaced_axes(covariance: Covariance, frame: str) -> Iterator[Problem]:
-    """Yield a problem for each pair with an axis that the frame does not have; paths are below `motion_error`."""
+    """Yield a problem for each correlated pair with an axis that the frame does not have.
+
+    The paths of the problems are relative to `motion_error`.
+    """
     for pair in covariance.pairs:
         for name in pair.split("-"):
             axis = name.strip().partition(".")[2]

@@ -20,9 +20,9 @@ Node = Any
 
 
 def with_values(text: str, changes: Sequence[SetValue]) -> str:
-    """Replace values in the text of a valid mission file; the new values are texts as in a file.
+    """Replace values in the text of a valid mission file; each new value is a text as in a mission file.
 
-    Missing sections are added. An option with a null removes its key.
+    Missing sections are added. A null as the new value removes the key.
     """
     is_of_dos = "\r\n" in text
     text = text.replace("\r\n", "\n")
@@ -61,20 +61,23 @@ def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
 
 
 def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
-    """Yield changes that let the file of a mission name the same files after it is moved to a folder."""
+    """Yield the changes of file names that a mission file needs after it is moved to another folder.
+
+    With these changes it names the same files as before.
+    """
     for key, name in (*path_files(mission), *_named_part_files(mission)):
         if os.path.isabs(name):
             continue
         file = os.path.realpath(os.path.join(folder_of(mission.file), name))
         try:
             name = os.path.relpath(file, os.path.realpath(folder))
-        except ValueError:  # on another drive
+        except ValueError:  # Windows: the file is on another drive
             name = file
         yield SetValue(key, json.dumps(name.replace(os.sep, "/"), ensure_ascii=False))
 
 
 def _named_part_files(mission: Mission) -> Iterator[tuple[str, str]]:
-    """Yield the keys under which a mission names files of parts, and the names; parts of a catalogue are left out."""
+    """Yield key and file name of each part that a mission names by a path, and not by its name in the catalogue."""
     for owner, platform in mission.platforms._asdict().items():
         sensor = platform.motion_error.sensor
         key = f"platforms.{owner}.motion_error.sensor"
@@ -156,14 +159,14 @@ def _end_of_key(node: Node, name: str) -> int:
 
 
 def _replaced(text: str, node: Node, value: str, end_of_key: int) -> str:
-    """Replace a node in a text by a value; comments within a node of several lines stay."""
+    """Replace a node in a text with a value; comments inside a node that spans several lines are kept."""
     start, end = node.start_mark.index, node.end_mark.index
     if isinstance(node, yaml.ScalarNode):
         is_apart = start == 0 or text[start - 1].isspace()
         return f"{text[:start]}{'' if is_apart else ' '}{value}{text[end:]}"
     if node.flow_style:
         return f"{text[:start]}{value}{text[end:]}"
-    # A node of several lines: the value goes behind the colon, and the comments of its lines go below.
+    # The node spans several lines: the value is put after the colon, and the comments of these lines below it.
     colon = text.index(":", end_of_key)
     end = len(text[:end].rstrip(" "))  # the next line keeps its indent
     head, _, inside = text[colon + 1 : end].partition("\n")

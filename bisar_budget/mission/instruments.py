@@ -1,4 +1,7 @@
-"""Figures of data sheets: inertial sensors, position noise, oscillators, synchronisation. Values are SI, 1 sigma."""
+"""Data-sheet figures of inertial sensors, position noise, oscillators and synchronisation, as sections of the file.
+
+Values are in SI units, 1 sigma.
+"""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -39,7 +42,7 @@ _VELOCITY_WALK = Triple(Quantity(units.VELOCITY_RANDOM_WALK, ge=0, le=1e3), or_s
 _ANGLE_WALK = Triple(Quantity(units.ANGLE_RANDOM_WALK, ge=0, le=1e2), or_scalar=True)
 
 
-# Figures that a mission states, and a part of the catalogue.
+# Figures that a mission file may state itself or take from a part of the catalogue.
 AccelerometerBias = Annotated[Vector | None, Key(_BIAS, "Residual bias in flight.")]
 AccelerometerScaleFactor = Annotated[
     Vector | None,
@@ -106,7 +109,7 @@ class Imu(NamedTuple):
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file states a figure. A zero is stated."""
+        """Whether the file states a figure. A zero counts as stated."""
         return any(getattr(self, kind) is not None for kind in IMU_KINDS)
 
 
@@ -125,7 +128,8 @@ class GaussMarkov(NamedTuple):
 class LeverArm(NamedTuple):
     """From the navigation's reference to the antenna's phase centre, in the platform's own axes.
 
-    The axes are along, cross and up of the velocity, and turn with it. A fixed platform has the axes of the scene.
+    The axes point along the velocity, horizontally across it, and up; they turn with the velocity. For a fixed
+    platform, they are the axes of the scene.
     """
 
     arm: Annotated[
@@ -315,9 +319,9 @@ class Oscillator(NamedTuple):
 
     @property
     def mask_at_frequency_of_part(self) -> Overridden | None:
-        """Noise figure of a part that is replaced by a mask without a frequency; None if there is none.
+        """Noise figure of a part that a mask in the file replaces, if the mask states no frequency; otherwise None.
 
-        The mask then applies at the frequency of the part.
+        Such a mask applies at the frequency of the part.
         """
         return next((figure for figure in self.overridden if figure.frequency), None)
 
@@ -328,7 +332,10 @@ class Oscillator(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues, or_else: str = _OR_SENSOR) -> Iterator[Problem]:
-        """Require exactly one form of noise, and possible slopes of a mask; `or_else` names what else is accepted."""
+        """Require exactly one form of noise, and slopes of the mask that an oscillator can have.
+
+        `or_else` is added to the message about missing noise, and names other accepted keys.
+        """
         forms = [form for form in OSCILLATOR_NOISE_FORMS if values.get(form) is not None]
         accepted = f"accepted: one of {', '.join(OSCILLATOR_NOISE_FORMS)}"
         for form in forms[1:]:

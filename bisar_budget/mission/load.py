@@ -1,6 +1,6 @@
-"""Reader of mission files: a plain tree with positions (`tree`), then a `Mission`, or faults with their lines.
+"""Reader of mission files: it parses a file to a plain tree with positions (see `tree`), and this to a `Mission`.
 
-Every text gives a `Mission` or a `MissionError`.
+For any file, the result is either a `Mission`, or a `MissionError` with all faults and their lines.
 """
 
 import os
@@ -15,8 +15,8 @@ from bisar_budget.mission.readers import INVALID, Invalid
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
 from bisar_budget.resources import UnreadableError, held, special_file, standard_input
 
-# `changes`, `parts` and `paths` are imported by the functions that need them, because most missions do without. In an
-# environment without bytecode their compilation takes 40 ms, a fifth of the start of a check.
+# `changes`, `parts` and `paths` are imported in the functions that need them, because most missions do not need them.
+# Without cached bytecode, their compilation takes 40 ms, a fifth of the start of a check.
 _Find = Callable[[str], tuple[str, bytes]]
 
 
@@ -196,7 +196,7 @@ def _with_hint(fault: Fault) -> Fault:
 
 
 def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
-    """Add a hint to a fault that names the options, because without them there may be no fault."""
+    """Add a hint that names the options to a fault, because the file may have no such fault without them."""
     return (
         fault if fault.option else fault._replace(hint=sentences(fault.hint, f"Read with {changes_words(changes)}"))
     )
@@ -253,6 +253,6 @@ def named_by(mission: Mission, also: Sequence[SetValue] = ()) -> Named:
     model = mission.allocation.model  # --model may replace an invalid model of the file
     parse_mission(mission.data, mission.file, model, read_and_record, mission.changes, find)
     for change in also:
-        with suppress(MissionError):  # no mission with this value; reported when the value is used
+        with suppress(MissionError):  # an invalid value is reported when it is used
             parse_mission(mission.data, mission.file, model, read_and_record, (*mission.changes, change), find)
     return Named(tuple(sorted(paths.items())), tuple(sorted(parts.values())))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from bisar_budget import units
 from bisar_budget.arrays import PerCase
 from bisar_budget.constants import GATING_MODELS, SPEED_OF_LIGHT_MPS
+from bisar_budget.error_kinds import motion_kind
 from bisar_budget.faults import Changed, KeyPath, ParserEvent, Place, Problem, SetValue, changes_words, shown, upwards
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.json_types import Definitions, JsonObject
@@ -150,7 +151,7 @@ class EarthOrientation(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require values that belong together, or a table."""
+        """Require either a table, or UT1 - UTC with both coordinates of the polar motion or neither."""
         figures = [key for key in values if key != "file" and values[key] is not None]
         if values.get("file") is not None:
             if figures:
@@ -162,7 +163,7 @@ class EarthOrientation(NamedTuple):
 
     @property
     def orientation(self) -> Orientation:
-        """Orientation of the Earth from the stated values; a pole that is not stated has its usual doubt."""
+        """Orientation of the Earth from the stated values; an unknown pole has its usual uncertainty."""
         x, y = self.polar_motion_x, self.polar_motion_y
         pole, doubt = UNKNOWN.pole, UNKNOWN.pole_doubt
         if x is not None and y is not None:
@@ -241,6 +242,9 @@ class Requirements(NamedTuple):
                 *DECLARABLE,
                 *_OF_ONE_PLATFORM,
                 accepted=f"{', '.join(DECLARABLE)}; of one platform receiver.imu and the like",
+                is_more=lambda word: (
+                    motion_kind(word.removeprefix("transmitter.").removeprefix("receiver.")) is not None
+                ),
             ),
             "Errors that the file must declare, for both platforms or for one (receiver.imu); a missing error is "
             "not_evaluated. A zero declares; a still platform has to declare only its position. A covariance "
@@ -256,7 +260,7 @@ def least_age(averaging: PerCase, aperture_time: PerCase) -> PerCase:
 
 
 def _unset_clocks(values: SectionValues) -> Iterator[Problem]:
-    """Yield problems of clocks that are set before or during the aperture.
+    """Yield problems of a synchronisation without a direct path.
 
     The problems are an averaging time that overlaps with the aperture, and clock errors that are stated twice.
     """
@@ -291,7 +295,7 @@ def _unset_clocks(values: SectionValues) -> Iterator[Problem]:
 def least_bandwidth(aperture_time: PerCase) -> PerCase:
     """Smallest useful bandwidth of an oscillator's noise: one cycle per aperture. [Hz]
 
-    With a smaller bandwidth, no noise of the oscillator counts.
+    A smaller bandwidth would exclude all noise of the oscillator.
     """
     return 1 / aperture_time
 
@@ -332,7 +336,7 @@ class Shares(NamedTuple):
         return self.transmitter if owner == "transmitter" else self.receiver
 
     def includes(self, owner: str, of: str) -> bool:
-        """Whether the errors of an owner count against the share of `of`; all errors count against `mission`."""
+        """Whether the errors of `owner` count against the share of `of`; all errors count if `of` is `mission`."""
         return of in ("mission", owner) or (owner == "clock" and of == "receiver" and self.clock is None)
 
     @staticmethod
@@ -539,7 +543,7 @@ class Mission(NamedTuple):
         return notebook.page(title, notebook.table(("", ""), rows), file)
 
     def __eq__(self, other: object) -> bool:
-        """Whether two missions have equal values from the same file; `places` follow from `data`."""
+        """Whether two missions have equal fields; `places` are not compared, because they follow from `data`."""
         return isinstance(other, Mission) and tuple(self._replace(places={})) == tuple(other._replace(places={}))
 
     def __ne__(self, other: object) -> bool:
@@ -554,7 +558,7 @@ class Mission(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require paths and a collection that form an image, and distinct names of other errors."""
+        """Require paths and a collection that form an image, and distinct names in `other_errors`."""
         platforms: Platforms | None = values.get("platforms")
         if platforms is not None and not any(platform.is_of_the_earth for platform in platforms):
             collection, synchronization = values.get("collection"), values.get("synchronization")
@@ -592,9 +596,9 @@ class Mission(NamedTuple):
 
     @property
     def gating_model(self) -> str:
-        """The model that gates, which is the full model if there is a direct path.
+        """Name of the model whose results decide whether rows pass.
 
-        The published model has no direct path.
+        If there is a direct path, it is the full model, because the published model does not include a direct path.
         """
         return "full" if self.has_direct_path else self.allocation.model
 
@@ -639,7 +643,7 @@ def has_instruments(mission: Mission) -> bool:
 
 
 def has_random_errors(mission: Mission) -> bool:
-    """Whether a mission has sensors, clocks, propagation delays, or other errors than a quadratic phase error."""
+    """Whether a mission has sensors, clocks or propagation delays, or other errors beyond a quadratic phase."""
     return (
         has_instruments(mission)
         or mission.propagation is not None
@@ -648,7 +652,7 @@ def has_random_errors(mission: Mission) -> bool:
 
 
 def flies_on_earth(mission: Mission) -> bool:
-    """Whether paths of a mission depend on files, or on the position of the scene on the Earth."""
+    """Whether a mission has a scene on the Earth, paths that need one or come from files, or errors in `ric` axes."""
     common = mission.common_motion_error
     return (
         mission.scene.is_on_earth

@@ -88,7 +88,7 @@ _POSITION_TEXT = "1 sigma east, north, up; a single value means each axis."
 _NOISE_TEXT = "Position errors that change within an aperture: the residual noise."
 _GNSS_KINDS = ("position", "velocity", "random")
 _SUFFIXES = (".yaml", ".yml")
-_MAX_FOLDER_FILES = 1000  # parts that are read of one folder
+_MAX_FOLDER_FILES = 1000  # parts that are read from one folder
 
 
 class ImuPart(NamedTuple):
@@ -340,7 +340,10 @@ def _without_figure(values: Mapping[str, object], figures: Sequence[str]) -> Ite
 
 
 def _without_source(root: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
-    """Yield a problem if sources are given by figure, and a figure of the file, valid or not, has no source."""
+    """Yield a problem if the file states a source for each figure, but not for all figures.
+
+    Invalid figures need a source too. `root` is the content of the file.
+    """
     source = root.get("source")
     if not isinstance(source, dict):
         return
@@ -354,7 +357,7 @@ def _without_source(root: Mapping[str, object], figures: Sequence[str]) -> Itera
 
 
 def _is_not_zero(figure: object) -> bool:
-    """Whether a figure is stated and not zero, because no sensor is without error."""
+    """Whether a figure is stated and is not zero. A part needs such a figure, because every sensor has errors."""
     if isinstance(figure, GaussMarkov):
         return _is_not_zero(figure.sigma)
     if isinstance(figure, tuple | list):
@@ -381,7 +384,7 @@ def folders(beside: str, files: Files = DISK) -> list[str]:
 
 
 def catalogue(places: Sequence[str], files: Files = DISK) -> dict[str, str]:
-    """File of each part by its name; a part hides the parts of the same name in later folders."""
+    """Map the name of each part in the given folders to its file; the first folder that has the name counts."""
     part_file_by_name: dict[str, str] = {}
     for folder in places:
         for file in part_files(folder, files)[:_MAX_FOLDER_FILES]:
@@ -444,7 +447,10 @@ def _file_of(name: str, beside: str, files: Files) -> str:
 
 
 def with_parts(mission: Mission, find: Find, report: Report) -> Mission | Invalid:
-    """Add the figures of its parts to a mission; returns `INVALID` after a report. `find` raises `PartError`."""
+    """Add the figures of the named parts to a mission; returns `INVALID` after a report.
+
+    `find` finds the file of a part, and may raise `PartError`.
+    """
     is_valid, taken = True, list[TakenFigure]()
     platforms = mission.platforms
     for name, platform in platforms._asdict().items():
@@ -501,7 +507,7 @@ def _parts_of(
             if kind not in kinds:
                 raise PartError(f"is an {kind}" if kind != "gnss" else "is a GNSS receiver")
         except PartError as error:
-            # Faults of the part's file name the file and what it accepts.
+            # If the part's file has faults, they state its name and the accepted values.
             accepted = "" if error.faults else f"accepted: parts of the kind {' or '.join(kinds)}"
             for problem in map(str, error.args):
                 report(here, Problem(problem, accepted, error.hint, names_value=bool(error.faults)))

@@ -74,14 +74,14 @@ Beside = Callable[[str], bytes]  # name of a file in a mission to the content of
 
 _FILE_KEYS = (*ORBIT_FORMATS, "file", "accuracy")  # keys of orbits and trajectories that name files
 _MAX_FILE_BYTES = 500_000_000
-_KEPT_LOG_COUNT = 2  # the logs of a mission that is read again and again, such as by `solve`
-_logs: dict[tuple[object, ...], Log] = {}  # by the hash of the file and the keys that decide how it is read
-_KEPT_PATH_COUNT = 256  # cases of a sweep have the same path where nothing that decides it changes
-_paths: dict[tuple[object, ...], FlownPath] = {}  # by all values that decide them
+_KEPT_LOG_COUNT = 2  # both logs of a mission that is read repeatedly, as in `solve`
+_logs: dict[tuple[object, ...], Log] = {}  # by the hash of the file and by the keys that affect its reading
+_KEPT_PATH_COUNT = 256  # cases of a sweep share a path if the sweep changes nothing that affects it
+_paths: dict[tuple[object, ...], FlownPath] = {}  # by all values that affect the path
 _MAX_ORBIT_RADIUS_M = 4.1e8  # beyond the Moon
 _ROUNDED_CORRELATION_FRACTION = 1e-6  # a correlation this small is a rounding error of turned axes
-_MAX_DOUBT_FRACTION = 0.1  # of the slant range; with a larger doubt of the orbit the geometry is unknown
-_DOUBTED_RESIDUAL_M = 1.0  # a log with a larger residual is doubted, like an ephemeris
+_MAX_DOUBT_FRACTION = 0.1  # of the slant range; with a larger uncertainty of the orbit the geometry is unknown
+_DOUBTED_RESIDUAL_M = 1.0  # a larger residual of a log counts as an error of the path, like that of an ephemeris
 _ACCEPTED_SCENE = "accepted: scene.latitude, scene.longitude and scene.height"
 
 
@@ -237,12 +237,12 @@ def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
     """Add the axes of the `ric` frame to a path, for a scene on the Earth; unchanged if these axes are undefined."""
     try:
         return replace(state, radial=axes.radial(state.position, state.velocity))
-    except ZeroDivisionError:  # at rest against the stars, on the Earth's axis: no plane
+    except ZeroDivisionError:  # without motion relative to the stars there is no orbital plane
         return state
 
 
 def with_dynamics(state: PlatformState, axes: earth.SceneAxes | None, *, is_orbit: bool = False) -> PlatformState:
-    """Add the dynamics of its errors to a path, if it is an orbit or is in free fall."""
+    """Add the free-fall dynamics of state errors to a path, if it is an orbit or is in free fall."""
     return replace(state, fall=of_scene(axes) if is_orbit else fall_of(state, axes))
 
 
@@ -260,7 +260,7 @@ class _OrbitFile(NamedTuple):
     object : str, optional
         Name or number of the object, if the file has several.
     is_planned : bool
-        Whether the orbit is a plan, without doubts.
+        Whether the orbit is planned. It then has no uncertainty from its age and interpolation.
     """
 
     form: str
@@ -294,7 +294,7 @@ def _form_of(route: OrbitSource) -> str:
 def orbits_of(mission: Mission, route: OrbitSource, read: Beside) -> Callable[[Instant], Orbit]:
     """Return a function that takes the instant of mid-aperture and returns the orbit of a mission.
 
-    Of several element sets or segments of an ephemeris, the nearest is used. Both functions raise `PathFileError`.
+    If a file has several element sets or segments, the nearest one is used. Both functions may raise `PathFileError`.
     The orientation of the Earth is taken at noon of the day, because UT1 - UTC changes by only a millisecond per day.
     """
     orbit_file = _OrbitFile.of(route, read)
@@ -400,7 +400,7 @@ def _stated_of_orbit(orbit: Orbit, center: Instant, axes: earth.SceneAxes, name:
 
 
 def _hold_to_range(doubt: PathDoubt, slant_range: float, doubts: Sequence[str], remedy: str, name: str) -> None:
-    """Refuse an orbit whose doubt is more than a tenth of the slant range, because the geometry is then unknown."""
+    """Refuse an orbit whose uncertainty exceeds a tenth of the slant range [m], because its geometry is unknown."""
     if not doubt.size <= _MAX_DOUBT_FRACTION * slant_range:
         lengths = (slant_range, _MAX_DOUBT_FRACTION * slant_range, doubt.size)
         slant_range_text, largest, size = (format_quantity(length, "m", 4) for length in lengths)
@@ -443,7 +443,7 @@ def _log_path(
     if fitted.stretch > needed:
         try:
             hold_to_motion(times, log.places, fitted.stretch, route.file)
-        except PathFileError:  # outside of the needed stretch, an impossible fix does not refuse the log
+        except PathFileError:  # an impossible fix outside the needed stretch does not make the log unusable
             fitted = smoothed(times, log.places, aperture_time)
     words = log.words + {SMOOTHED: ", smoothed by the processor", RAW: ", used as it is by the processor"}.get(
         route.processed or "", ""
@@ -509,7 +509,7 @@ def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]
         sigmas = np.nan_to_num(log.sigmas[near])
         largest = filled_sigmas(sigmas.max(axis=0))
         unstated = np.logical_not((sigmas > 0).all(axis=1))
-        if largest.any():  # 0 is not known
+        if largest.any():  # 0 means unknown
             yield StatedAccuracy(f"solution {file}", diagonal((largest**2).tolist()))
     if log.typical_sigmas is not None:
         usual = np.where(unstated, np.nan_to_num(log.typical_sigmas[near]), 0.0)
@@ -535,7 +535,7 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
     covariance_of_source = diagonal([stated.total**2] * 3) if stated.covariance is None else stated.covariance
     along = block_turned(np.array(covariance_of_source), axes)
     if error.frame == "ric" and state.fall is not None and len(along) == 6:
-        along = with_rate(along, axes @ np.array(state.fall.rotation))  # velocities in `ric` are against the stars
+        along = with_rate(along, axes @ np.array(state.fall.rotation))  # `ric` velocities are relative to the stars
     kinds = MOTION_KINDS[: len(along) // 3]
     sigmas = np.sqrt(np.diag(along))
     is_complete = error.covariance is None and error.position is None and error.velocity is None

@@ -56,6 +56,7 @@ from bisar_budget.mission.readers import (
     Quantity,
     Reader,
     Reference,
+    RegisteredSizes,
     Report,
     Section,
     SectionValues,
@@ -76,17 +77,18 @@ if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
 
 MIN_BASELINE_M = 1.0  # between platforms with a direct path
-# Largest relative motion in half an aperture over the least baseline; up to it a fit through 16 nodes is accurate.
+# Largest ratio of the relative motion in half an aperture to the smallest baseline. Up to this ratio, a fit through
+# 16 nodes is accurate.
 MAX_TRAVEL_RATIO = 3
 
-_LEVEL_FRACTION = 1e-3  # of the speed; a smaller speed over the ground has no direction
-# In halves of the aperture time. Between neighbours, a 32nd apart, a distance is hardly smaller than at them.
+_LEVEL_FRACTION = 1e-3  # of the speed; the direction of a smaller horizontal speed counts as undefined
+# In units of half the aperture time. The steps of 1/32 are so small that the minimum of a distance is not missed.
 _FINE_APERTURE_TIMES = np.linspace(-1, 1, 65)[:, None]
 
 FRAMES = Choice("scene", "track", "look", "ric")
 TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)
 # Copies of `paths.path_formats`, whose import would load all readers in every check.
-SMOOTHED, RAW = "smoothed", "raw"  # path that a processor flies with a log
+SMOOTHED, RAW = "smoothed", "raw"  # path that a processor uses: the log smoothed, or its raw fixes
 _LOG_FORMAT_NAMES = ("csv", "sbet", "pos", "nmea", "gpx", "ulog")
 PART_REFERENCES = either(list, TextList(), Reference())
 
@@ -140,6 +142,10 @@ class MotionError(NamedTuple):
     lever_arm: Annotated[
         LeverArm | None, Key(LEVER_ARM, "From the navigation's reference to the antenna's phase centre.")
     ] = None
+    registered: Annotated[
+        Mapping[str, float],
+        Key(RegisteredSizes(), "Errors whose kinds installed packages register, by the name of the kind."),
+    ] = {}
     source: Source = None
     of_parts: tuple[tuple[str, str], ...] = ()
     overridden: tuple[Overridden, ...] = ()
@@ -163,7 +169,10 @@ class MotionError(NamedTuple):
             yield from misplaced_axes(covariance, values["frame"])
 
     def stated(self, kind: str) -> Vector | None:
-        """Position, velocity or acceleration error along the axes of the frame; for a covariance, its sigmas."""
+        """Stated error of a `kind` along the axes of the frame, or the sigmas of the covariance; None if not stated.
+
+        `kind` is "position" [m], "velocity" [m/s] or "acceleration" [m/s²].
+        """
         if self.covariance is not None and kind != "acceleration":
             return self.covariance.of(kind)
         error: Vector | None = getattr(self, kind)
@@ -408,7 +417,7 @@ class Way:
 
     @property
     def own(self) -> tuple[str, ...]:
-        """Required keys that belong to no other way."""
+        """Required keys that no other way of stating a path has."""
         return tuple(key for key in self.keys if key != "speed")
 
 
@@ -475,12 +484,12 @@ class FlownPath(NamedTuple):
     doubts : tuple of str
         Warnings for reports.
     doubt_m, doubt_of : float, str
-        Distance of the true path that the source allows for [m], and its cause: the age of elements, the
-        interpolation of an ephemeris, or the residual of a smoothed log.
+        Uncertainty of the path, which is the distance of the true path from it [m], and its cause: the age of
+        elements, the interpolation of an ephemeris, or the residual of a smoothed log.
     is_doubted : bool
-        Whether the doubt counts as an error where the mission file declares no position error.
+        Whether this uncertainty counts as an error if the mission file declares no position error.
     is_planned : bool
-        Whether an orbit is the plan. Errors that its source cannot know do not count then.
+        Whether the orbit is planned. Its age and interpolation then do not count as errors.
     accuracy : tuple of str, optional
         File that states errors of the path, and its SHA-256.
     orientation : tuple of str, optional
@@ -525,12 +534,12 @@ class FlownPath(NamedTuple):
 
     @property
     def largest_doubt_m(self) -> float:
-        """Largest distance of the true path: the doubt of the source, or its stated accuracy if larger. [m]"""
+        """Largest distance of the true path from this path: `doubt_m`, or the stated accuracy if it is larger. [m]"""
         return max([self.doubt_m, *(accuracy.position_m for accuracy in self.stated)])
 
     @property
     def beside(self) -> Mapping[str, tuple[str, str] | None]:
-        """Other files on which the path depends, with their SHA-256, by what they contain."""
+        """Names and SHA-256 of the accuracy file and the Earth orientation table; None for an unused file."""
         return {"accuracy": self.accuracy, "earth_orientation": self.orientation}
 
 
@@ -579,7 +588,7 @@ class Platform(NamedTuple):
                 yield from platform.without_image(values.get("motion_error"))
 
     def without_image(self, error: MotionError | None) -> Iterator[Problem]:
-        """Yield problems of a path that forms no image, and of errors whose frame is undefined."""
+        """Yield a problem for a platform within 1 m of the scene centre, or for an error whose frame is undefined."""
         state = self.state
         if state.slant_range < 1:
             at_key: KeyPath = ("slant_range",) if self.slant_range is not None else (self.way,)
@@ -592,7 +601,7 @@ class Platform(NamedTuple):
 
     @property
     def way(self) -> str:
-        """First key of the way in which the file states the path."""
+        """Key that identifies how the file states the path, such as `orbit` or `slant_range`."""
         firsts = [way.keys[0] for way in WAYS]
         return next((key for key in firsts if getattr(self, key) is not None), firsts[-1])
 
@@ -615,7 +624,7 @@ class Platform(NamedTuple):
                 position=self.position, velocity=self.velocity, acceleration=acceleration, bends=bends
             )
             return _with_fall(state)
-        # A file without position and velocity has these.
+        # The reader requires these keys if position and velocity are missing.
         assert self.slant_range is not None
         assert self.azimuth is not None
         assert self.elevation is not None
@@ -634,7 +643,7 @@ class Platform(NamedTuple):
 
 
 def _with_fall(state: PlatformState) -> PlatformState:
-    """Add the dynamics of its errors to a path that is in free fall over a scene without a place on the Earth."""
+    """Add free-fall dynamics of state errors to a path in free fall, for a scene without a place on the Earth."""
     if not np.any(np.asarray(state.position[2]) > LEAST_FALLING_HEIGHT_M):
         return state
     from bisar_budget.paths.free_fall import fall_of  # takes 8 ms; most missions have no satellite
@@ -643,7 +652,7 @@ def _with_fall(state: PlatformState) -> PlatformState:
 
 
 def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: bool) -> Problem | None:
-    """Problem of stated keys that are not one complete way to state a path; None if they are."""
+    """Problem if the given keys are not exactly one complete way to state a path; otherwise None."""
     ways = [way for way in WAYS if any(key in way.own for key in given)] or WAYS[-1:]
     known_keys = (*ways[0].keys, *ways[0].optional)
     foreign = [key for key in given if key not in known_keys]
@@ -733,7 +742,7 @@ def has_body_axes(state: PlatformState, half: PerCase, margin: float = 1.0) -> B
     is_level = np.hypot(u, v).min(axis=0) > margin * _LEVEL_FRACTION * fastest
     goes_on = (u[1:] * u[:-1] + v[1:] * v[:-1] > 0).all(
         axis=0
-    )  # else the platform stops and turns back between two times
+    )  # otherwise the platform stops and turns back between two times
     return np.asarray((is_level & goes_on) | state.is_still)
 
 
@@ -787,11 +796,10 @@ def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
 
 
 def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
-    """Slow times at which a platform can be lowest. [s]
+    """Yield slow times in the aperture at which the height of a platform can be smallest. [s]
 
-    These are the ends of the aperture, and the time at which the platform stops sinking.
-
-    For a path that is no quadratic polynomial, the times have steps of 1/64 of the aperture.
+    For a quadratic path, these are the ends of the aperture, and the time at which the platform stops sinking. For
+    any other path, they are times over the whole aperture, in steps of 1/64 of it. `half` is half the aperture time.
     """
     yield from (-half, half)
     if not state.is_quadratic:

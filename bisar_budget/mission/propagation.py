@@ -15,13 +15,13 @@ from bisar_budget.mission.readers import Key, Quantity, Section, SectionValues, 
 
 DELAYS = ("zenith_delay", "zenith_electron_content")
 _CORRELATION_TIME_KEY = "correlation_time"
-LEAST_ELEVATION_DEG = 3.0  # at a lower elevation, a delay does not follow from the delay at the zenith
-AIR_TOP_M = 80e3  # few free electrons are lower, and little air is higher
+LEAST_ELEVATION_DEG = 3.0  # at lower elevations, the zenith delay does not determine the slant delay
+AIR_TOP_M = 80e3  # few free electrons are below this height, and little air is above it
 
 _ZENITH_DELAY = Quantity(units.LENGTH, ge=0, le=1e3)
 _CONTENT_QUANTITY = Quantity(units.ELECTRON_CONTENT, ge=0, le=1e20)
-_CORRELATION_TIME = Quantity(units.TIME, gt=0, ge=1e-6, le=1e9)  # as of any Gauss-Markov error
-_COARSE_APERTURE_TIMES = np.linspace(-1.0, 1.0, 9)[:, None]  # in halves of the aperture time
+_CORRELATION_TIME = Quantity(units.TIME, gt=0, ge=1e-6, le=1e9)  # the same bounds as for other Gauss-Markov errors
+_COARSE_APERTURE_TIMES = np.linspace(-1.0, 1.0, 9)[:, None]  # in units of half the aperture time
 
 
 class LegDelay(NamedTuple):
@@ -81,7 +81,7 @@ class Propagation(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Refuse delays of both legs together with delays of one leg, no delay at all, and a time without a delay."""
+        """Refuse common delays beside separate delays, no delay at all, and a correlation time without a delay."""
         if not values.keys() >= {*DELAYS, _CORRELATION_TIME_KEY, *Platforms._fields}:
             return
         of_both = [delay for delay in DELAYS if values[delay] is not None]
@@ -179,7 +179,7 @@ def least_elevations(
 
 
 def too_low(propagation: Propagation, platforms: Platforms, aperture_time_s: float) -> Iterator[Problem]:
-    """Yield a problem for each delay on a leg that runs along the ground."""
+    """Yield a problem for each delay on a leg whose elevation falls below `LEAST_ELEVATION_DEG`."""
     paths = dict(zip(Platforms._fields, platforms.geometry.both, strict=True))
     for name, delay, least in least_elevations(propagation, paths, aperture_time_s):
         (degrees,) = least.tolist()

@@ -1,7 +1,7 @@
-"""Numbers of a mission by their keys: reader, value and unit of a number in the file, and its field in a mission.
+"""Access to the numbers of a mission by key: to read a number with its unit from the file, or to replace it.
 
-Callers give values in the forms that a file accepts: texts, or numbers in SI. Quantities of other packages are
-accepted too.
+Values may have the forms that a file accepts, which are texts, or be numbers in SI units. Quantities of astropy and
+pint are accepted too.
 """
 
 import functools
@@ -49,7 +49,7 @@ from bisar_budget.mission.tree import Content, Tree, read_tree
 from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.units import Dimension, parse_quantity
 
-ANSWER_DIGITS = 8  # of values in answers: both sides of a crossing stay within 1e-6
+ANSWER_DIGITS = 8  # of values in answers; rounding up and rounding down differ by less than 1e-6 of a value
 _DECADE_RATIO = 10.0
 Measured = Any
 """A quantity of astropy or pint, which need not be installed, or its magnitude: a number or an array."""
@@ -102,9 +102,9 @@ class Number(NamedTuple):
         return self.dimension.scales.get(self.unit) or (1.0, 1.0)
 
     def text(self, value: float, *, is_up: bool | None = None) -> str:
-        """Text of a value in SI in the number's unit with `ANSWER_DIGITS` digits.
+        """Text of a value with `ANSWER_DIGITS` digits in the number's unit; `value` is in SI units.
 
-        It is rounded up or down for `is_up` true or false, and to the nearest for None.
+        The value is rounded up if `is_up` is true, down if it is false, and to the nearest if it is None.
         """
         factor, divisor = self.scale
         number = value / factor * divisor
@@ -114,7 +114,10 @@ class Number(NamedTuple):
         return f"{number:.{ANSWER_DIGITS}g}{' ' if self.unit else ''}{self.unit}"
 
     def said_like(self, between: str | None) -> "Number":
-        """The number with the unit of a range's upper end, if the file has no value whose unit could be used."""
+        """The number with the unit of the end `B` of a range `A..B`.
+
+        It is unchanged if the file has a value, or if `B` has no unit of the number.
+        """
         unit = units.unit_behind((between or "").rpartition("..")[2])
         unit = unit if unit in self.dimension.scales else units.normal_unit(unit)
         return self._replace(unit=unit) if self.value is None and unit in self.dimension.scales and unit else self
@@ -161,7 +164,7 @@ def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool
     key : str
         Path of the key.
     of_all : str
-        Words for what else is accepted, in the message for a key with three numbers.
+        Words for other accepted keys, which are added to the message about a key with three numbers.
     is_for_each : bool
         Whether the number is meant for each axis. The value is then the largest of the three in the file.
 
@@ -190,10 +193,11 @@ def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool
 
 
 def choices_of(tree: JsonObject, key: str, text: str) -> Choices | None:
-    """The key as one with words, if a word can be its value; None for a key with a number, or with anything else.
+    """Description of a key that accepts words, with its present value; None for a key that accepts no word.
 
-    `text` is the new value. For shares of a budget it is the rule, and for parts it may be a list. Raises
-    `QuestionError` if the key does not exist.
+    `text` is the new value, which decides between the forms of a key: shares of a budget may also be a rule, which
+    is a word, and parts may be a list. Raises `QuestionError` if the key does not exist, or if the file has a list
+    and `text` is a single word.
     """
     reader, value = _reader_and_value(tree, key)
     reader = form_of(reader, [] if text.startswith("[") else text)
@@ -209,7 +213,10 @@ def choices_of(tree: JsonObject, key: str, text: str) -> Choices | None:
 
 
 def as_number(key: str, reader: Quantity, value: object) -> Number:
-    """A number with the unit of its text; `value` is the value in the file, None if there is none."""
+    """Make the `Number` of a key from its value in the file, with the unit of the file or else the usual unit.
+
+    `value` is None if the file has no value.
+    """
     dimension = reader.dimension
     number = parse_quantity(value, dimension) if isinstance(value, str) else value if type(value) is float else None
     unit = units.unit_behind(value) if isinstance(value, str) else ""
@@ -220,7 +227,10 @@ def as_number(key: str, reader: Quantity, value: object) -> Number:
 
 
 def _reader_and_value(tree: JsonObject, key: str) -> tuple[Reader[object], Content]:
-    """Reader of a key, and the value in the file, None if there is none. The reader may have several forms."""
+    """Reader of a key, which may have several forms, and the value in the file or None.
+
+    Raises `QuestionError` if the key does not exist.
+    """
     reader: Reader[object] = MISSION
     value: Content = tree
     steps = parts_of(key)
@@ -275,8 +285,8 @@ class Range(NamedTuple):
 def range_of(number: Number, between: str | None) -> Range:
     """Read a range `A..B`.
 
-    If `between` is None, the range is two decades around the value in the file, and for angles all that the key
-    accepts.
+    If `between` is None, the range extends by one decade, or by 20 dB for a level, to each side of the value in the
+    file. For a direction, it is then the full circle, and for an elevation or a latitude, all accepted values.
 
     Raises
     ------
@@ -341,7 +351,7 @@ _CURVE_ABSCISSAS: Mapping[str, Dimension] = {
 
 
 def with_number(mission: Mission, key: str, number: SectionValue) -> Mission:
-    """Set the value of a key in a mission to a number, or to an array over cases."""
+    """Set the value of a key in a mission to a number, or to an array (cases,)."""
     changed_mission: Mission = _with_value(mission, parts_of(key), number)
     return changed_mission
 
@@ -364,6 +374,8 @@ def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue)
         below = _OMITTED_SECTIONS[name]()
     if below is None and name in _TRIPLES:
         below = ()
+    if name == "registered":
+        return value._replace(registered={**below, remaining[0]: number})
     return value._replace(**{name: _with_value(below, remaining, number)})
 
 
@@ -409,6 +421,8 @@ def _value_below(value: SectionValue, steps: Sequence[str]) -> SectionValue:
     if isinstance(value, Covariance):
         return _element(value, steps)
     name, *remaining = steps
+    if isinstance(value, dict):
+        return value.get(name)
     if name.isdigit():
         return _value_below(value[int(name)], remaining) if int(name) < len(value) else None
     if name in _CURVE_ABSCISSAS:
@@ -426,10 +440,10 @@ def _point(curve: SectionValue, name: str, point: str) -> PerCase | None:
 
 
 def _element(covariance: Covariance, steps: Sequence[str]) -> float | Vector | None:
-    """Sigma of one axis, or all three sigmas, of a covariance; None for a correlation, which is no size."""
+    """Sigma of one axis, or of all three axes, in a covariance; None for a correlation, which is no size."""
     kind, *axis = steps
     if kind not in MOTION_KINDS:
-        return None  # a correlation is no size
+        return None
     return covariance.of(kind)[int(axis[0])] if axis else covariance.of(kind)
 
 
@@ -458,7 +472,9 @@ def with_specifications(mission: Mission, tree: Tree) -> Mission:
 
 
 def largest_at(mission: Mission, number: Number) -> PerCase | None:
-    """Size that a mission states for an error, the largest of three axes; None if it states none.
+    """Size that a mission states for an error; None if it states none.
+
+    For a triple, the size is the largest absolute value of the three axes.
 
     If a spectrum has no stated level, its level is 0 dB.
     """

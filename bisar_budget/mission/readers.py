@@ -12,9 +12,11 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sized
 from enum import Enum
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Final, Generic, NamedTuple, TypeGuard, TypeVar
 
 from bisar_budget import units
+from bisar_budget.error_kinds import MotionKind, motion_kind, motion_kinds
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.resources import docstring
@@ -48,8 +50,8 @@ _POINT = "A decimal is written with a point, a comma separates"
 _MAX_TEXT_CHARACTERS = 500
 _MAX_ENTRY_COUNT = 1000  # of a list of sections
 _MAX_POINTS = 100  # of a curve
-_MAX_NAME_COUNT = 8  # of a list of names; a platform has no more parts
-_MAX_ID_COUNT = 4000  # of a mapping by row ids; the longest lists make fewer rows
+_MAX_NAME_COUNT = 8  # of a list of names; no platform needs more parts
+_MAX_ID_COUNT = 4000  # of a mapping by row ids; even the longest lists give fewer rows
 _MAX_WILDCARD_COUNT = 20  # of a pattern; an id has four parts, and fifty wildcards take a second
 # Controls, line separators, lone surrogates, byte order mark, and the marks that turn the reading direction.
 _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\u202a-\u202e\u2066-\u2069]")
@@ -134,7 +136,7 @@ class Quantity(Reader[float]):
             if not holds
         )
         bound_text = format_quantity(bound, self.dimension.si)
-        if self.dimension is units.ANGLE:  # three digits of a radian are not 90 deg
+        if self.dimension is units.ANGLE:  # in degrees, because 1.57 rad would not look like 90 deg
             bound_text = f"{math.degrees(bound):.6g} deg"
         raise InvalidValueError(f"must be {words} {bound_text}", hint=self._unit_hint(self._text(value)))
 
@@ -148,7 +150,7 @@ class Quantity(Reader[float]):
         if not text or not text[-1].isdigit():
             return ""
         if self.dimension.usual:
-            return ""  # of such dimensions only a zero is read without a unit
+            return ""  # in such a dimension, only a zero may have no unit
         if "%" in self.dimension.units:
             return f"A bare number is a ratio: {text} is {100 * float(text):.6g} %"
         return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
@@ -305,16 +307,19 @@ class Glob(Text):
 
 
 class Choice(Reader[str]):
-    """One of a few words; `accepted` lists words for messages, by default all."""
+    """One of a few words; `accepted` lists words for messages, by default all.
+
+    `is_more` tells whether a word that is not in the list is accepted too.
+    """
 
     is_word = True
 
-    def __init__(self, *names: str, accepted: str = "") -> None:
-        self.names, self.accepted = names, accepted or ", ".join(names)
+    def __init__(self, *names: str, accepted: str = "", is_more: Callable[[str], bool] = lambda word: False) -> None:
+        self.names, self.accepted, self.is_more = names, accepted or ", ".join(names), is_more
 
     def leaf(self, value: object) -> str:
         """Return the word; refuse unknown words, with a hint at the nearest known word."""
-        if isinstance(value, str) and value in self.names:
+        if isinstance(value, str) and (value in self.names or self.is_more(value)):
             return value
         near = did_you_mean(value, self.names)
         raise InvalidValueError("is not a known choice", f"accepted: {self.accepted}", near)
@@ -346,10 +351,10 @@ class YesNo(Reader[bool]):
 
 
 class Words(Reader[tuple[str, ...]]):
-    """A list of known words, each at most once."""
+    """A list of known words, each at most once; the arguments are those of `Choice`."""
 
-    def __init__(self, *names: str, accepted: str) -> None:
-        self.word: Reader[str] = Choice(*names, accepted=accepted)
+    def __init__(self, *names: str, accepted: str, is_more: Callable[[str], bool] = lambda word: False) -> None:
+        self.word: Reader[str] = Choice(*names, accepted=accepted, is_more=is_more)
         self.problem = Problem("must be a list", f"accepted: some of {accepted}")
         self.fewest, self.most = 0.0, math.inf
 
@@ -479,7 +484,7 @@ class SizeMap(Reader[dict[str, object]]):
     """A mapping from keys of errors to single sizes. The reader of each key reads the size of that key later."""
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, object] | Invalid:
-        """Read the keys and their sizes as they are; refuse sizes that are lists or mappings."""
+        """Read the keys and their sizes without conversion; refuse sizes that are lists or mappings."""
         if not _is_few(value, dict, "must be a mapping of keys of errors to sizes", path, report):
             return INVALID
         nested = [key for key, size in value.items() if isinstance(size, dict | list)]
@@ -491,6 +496,52 @@ class SizeMap(Reader[dict[str, object]]):
         """JSON Schema: object of quantities."""
         size = {"type": ["string", "number"]}
         return {"type": "object", "additionalProperties": size, "maxProperties": _MAX_ID_COUNT}
+
+
+class RegisteredSizes(Reader[dict[str, float]]):
+    """Sizes of errors whose kinds packages register (`error_kinds.register`), by the name of the kind."""
+
+    def read(self, value: object, path: KeyPath, report: Report) -> dict[str, float] | Invalid:
+        """Read the size of each kind; a problem is reported at its own path."""
+        if not isinstance(value, dict):
+            report(path, Problem("must be a mapping of kinds to sizes", f"accepted: {self._accepted()}"))
+            return INVALID
+        sizes: dict[str, float | Invalid] = {}
+        for name, size in value.items():
+            reader = self.below(name)
+            if reader is None:
+                near = did_you_mean(name, tuple(motion_kinds()))
+                problem = Problem(
+                    "is no registered kind of error", f"accepted: {self._accepted()}", near, is_of_key=True
+                )
+                report((*path, name), problem)
+                sizes[name] = INVALID
+            else:
+                sizes[name] = read_part(reader, size, (*path, name), report)
+        return sizes if has_valid_values(sizes) else INVALID
+
+    @staticmethod
+    def _accepted() -> str:
+        return ", ".join(motion_kinds()) or "none; no installed package registers a kind of error"
+
+    def below(self, step: str) -> Quantity | None:
+        """Reader of the size of a kind; None if no package registers the kind."""
+        kind = motion_kind(step)
+        return None if kind is None else _size_of_kind(kind)
+
+    def schema(self, definitions: Definitions) -> JsonObject:
+        """JSON Schema: object of the registered kinds."""
+        properties: JsonObject = {
+            name: {"description": kind.description, "allOf": [_size_of_kind(kind).schema(definitions)]}
+            for name, kind in motion_kinds().items()
+        }
+        return {"type": "object", "properties": properties, "additionalProperties": False}
+
+
+@cache
+def _size_of_kind(kind: MotionKind) -> Quantity:
+    """Reader of the size of a registered kind of error."""
+    return Quantity(kind.dimension, ge=-1e9, le=1e9)
 
 
 _WEIGHT = Quantity(units.RATIO, gt=0, ge=1e-6, le=1e6)
@@ -527,10 +578,10 @@ class Weights(Reader[dict[str, float]]):
 class Section(Reader[T_co]):
     """A mapping with known keys, read into a `NamedTuple`; an unknown key is an error.
 
-    The method `problems(values)` of a section yields problems between its values. It gets the valid values with
-    defaults, so that a fault in one value does not hide a problem between two valid values. An empty section or list
-    that is no fault counts as absent: it declares nothing and hides nothing. A section needs at least one of the keys
-    that its `any_of()` lists; `problems` and the schema check it.
+    The method `problems(values)` of a section yields contradictions between its values. It gets the valid values with
+    defaults, so that a fault in one value does not hide a contradiction between two valid values. An optional section
+    or list that is valid and empty counts as absent. A section needs at least one of the keys that its `any_of()`
+    lists; `problems` and the schema check this.
     """
 
     def __init__(self, kind: Callable[..., T_co]) -> None:
@@ -655,7 +706,7 @@ class OneOf(Reader[T_co]):
         self.pick, self.forms = pick, forms
 
     def read(self, value: object, path: KeyPath, report: Report) -> T_co | Invalid:
-        """Read the value by the reader of its form."""
+        """Read the value with the reader of its form."""
         return self.pick(value).read(value, path, report)
 
     def schema(self, definitions: Definitions) -> JsonObject:
@@ -774,7 +825,7 @@ def did_you_mean(word: object, known_words: tuple[str, ...]) -> str:
 
 
 # ---------------------------------------------------------------------- bounds
-# Real values stay far inside these bounds, and squares stay finite.
+# Real values are far inside these bounds, and the squares of all accepted values are finite.
 RADAR_FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
 VIBRATION_FREQUENCY = Quantity(units.FREQUENCY, gt=0, le=1e9)
 DURATION = Quantity(units.TIME, gt=0, ge=1e-6, le=1e6)
@@ -791,7 +842,8 @@ LATITUDE = Quantity(units.ANGLE, ge=-math.pi / 2, le=math.pi / 2)
 HEIGHT = Quantity(units.LENGTH, ge=-1e4, le=1e9)
 ELEVATION = Quantity(units.ANGLE, ge=0, le=math.pi / 2)
 PHASE = Quantity(units.ANGLE, ge=-1e6, le=1e6)
-# A response with a turn of phase at the aperture edge has no mainlobe. 45 without a unit would be seven turns.
+# A phase error of a full turn at the aperture edge leaves no mainlobe. The bound also refuses 45 without a unit,
+# which would be seven turns.
 PHASE_REQUIREMENT = Quantity(units.ANGLE, gt=0, ge=1e-6, le=2 * math.pi)
 SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
 SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)

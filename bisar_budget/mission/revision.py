@@ -14,9 +14,9 @@ from bisar_budget.mission.paths import reader_of
 from bisar_budget.mission.tree import MAX_BYTES
 from bisar_budget.resources import DISK, UnreadableError
 
-# Modes of an entry that is a commit of another repository, and of a link.
+# Modes of tree entries: a submodule, and a symbolic link.
 _SUBMODULE, _LINK = b"160000", b"120000"
-# Variables that a hook leaves behind. With them git would read another repository, or from another top.
+# Git sets these variables for hooks. With them, git would use another repository or another top folder.
 _VARIABLES_OF_HOOKS = ("GIT_DIR", "GIT_WORK_TREE", "GIT_COMMON_DIR", "GIT_NAMESPACE", "GIT_PREFIX")
 
 
@@ -53,7 +53,7 @@ class Revision:
             self.top, refusal = _top(_existing(near)[0])
         if not self.top:
             raise RevisionError(f"{near} {refusal or 'is not in a git repository'}")
-        # What starts with a dash would be an option to git.
+        # Git would take a name that starts with a dash as an option.
         is_known, commit, _ = (
             (False, b"", "")
             if name.startswith("-")

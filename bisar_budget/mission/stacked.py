@@ -27,7 +27,7 @@ def picked(mission: Mission, cases: NDArray[np.intp]) -> Mission:
 
 
 def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.intp]]]:
-    """Combine all missions of one shape into one mission whose numbers are arrays; yield it with their indices.
+    """Combine missions of the same shape into one mission of arrays; yield each with the indices of its missions.
 
     Missions have the same shape if they differ only in numbers, not in keys, words or lengths of lists. A number that
     differs between the missions becomes an array (missions,), and a number that is the same in all of them stays a
@@ -46,7 +46,7 @@ def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.i
 
 
 def _next_of(numbers: Iterator[PerCase], leaf: object) -> object:
-    """The next number in place of a leaf that is a number; a word is unchanged."""
+    """Replace a leaf that is a number by the next of `numbers`; return any other leaf unchanged."""
     return next(numbers) if isinstance(leaf, float) else leaf
 
 

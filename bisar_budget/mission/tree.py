@@ -217,7 +217,7 @@ class Tree:
     def _mapping(self, next_event: Callable[[], ParserEvent], path: KeyPath, *, is_flow: bool) -> dict[str, Content]:
         """Read the keys and values of a mapping whose first event has been read already."""
         mapping: dict[str, Content] = {}
-        split: dict[str, list[str]] = {}  # by key: texts that commas of a flow mapping separate from its value
+        split: dict[str, list[str]] = {}  # by key: parts of its value, split at the commas of a flow mapping
         name = ""
         while type(event := next_event()) is not MappingEndEvent:
             mark = event.start_mark
@@ -239,7 +239,7 @@ class Tree:
             self.keys[here] = event
             name = "" if _NUMERAL.match(key) else key
             if type(item) is ScalarEvent and item.tag is None and item.value not in NULLS:
-                self.values[here] = item  # as `node` would; a short cut for most values
+                self.values[here] = item  # the same as in `node`; a faster path for most values
                 mapping[key] = item.value
             else:
                 mapping[key] = self.node(next_event, item, here)
@@ -289,7 +289,7 @@ def read_tree(data: bytes | str, file: str, file_kind: str = "mission") -> Tree:
         problem = f"is not valid YAML: {', '.join(filter(None, (error.context, error.problem)))}"
         if "maximum nesting depth" in (
             error.problem or ""
-        ):  # of libyaml, which scans ahead of the events that are read
+        ):  # libyaml scans ahead, and reports this before `node` does
             problem = TOO_DEEP
         tree.fault(mark, (), problem)
         raise MissionError(file, tuple(tree.faults)) from None

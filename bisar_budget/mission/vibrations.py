@@ -63,7 +63,7 @@ _ALONG = "along the line of sight; a vector: along each axis"
 
 
 def _of_all(value: float | Vector, number: float) -> float | Vector:
-    """Multiply an amplitude, a single one or one for each of three axes, by a number."""
+    """Multiply an amplitude, which is a single value or one value per axis, by a number."""
     if isinstance(value, tuple):
         a, b, c = value
         return a * number, b * number, c * number
@@ -178,7 +178,7 @@ _SPECTRA = (
 
 
 def _form_of_spectrum(value: object) -> Reader[Spectrum]:
-    """Reader of a spectrum of the dimension that most of its points have; acceleration if both have equally many."""
+    """Reader of a spectrum of displacement if most points have such units, and otherwise of acceleration."""
     texts = [item for item in value.values() if isinstance(item, str)] if isinstance(value, dict) else []
     accelerations, displacements = (
         sum(bool(given_unit(text, reader.ordinate.dimension.si)) for text in texts) for reader in _SPECTRA

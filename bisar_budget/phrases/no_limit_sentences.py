@@ -5,6 +5,7 @@ NO_LIMIT_SENTENCES: dict[str, str] = {
     "no-component": "no quadratic term: the platform's {cause} has no component along {axis}",
     "no-common-component": "no quadratic term: the platforms' {cause} have no component along {axis}, or cancel",
     "no-quadratic-term-of-time-tag": "a straight path is displaced along itself: no quadratic term",
+    "no-quadratic-term-of-registered": "no quadratic term: {kind} has no such motion along the line of sight",
     "no-quadratic-term-of-clock": "no quadratic term: the clock's {term} term has another order (Table I row 1)",
     "no-quadratic-term-of-setting": "no quadratic term: a {kind} between the clocks moves the image (Table I row 1)",
     "aging-is-followed": "the clocks are synchronised: aging has no effect",

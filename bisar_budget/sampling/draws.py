@@ -4,9 +4,10 @@ For small errors the full model is linear: the effect of a draw is the sum of st
 If a sample of draws shows that exact ranges give another result, every draw is computed by exact ranges.
 
 Draws are divided into chunks of a fixed size. The random numbers of a chunk depend only on the seed, on the name of
-the variable and on the number of the chunk, so that any process can make them. A piece of the draws returns counts
-and sums of squares, and sums of squares are joined without rounding. The result therefore does not depend on who made
-the pieces, or in which order. Memory does not grow with the number of draws.
+the variable and on the number of the chunk, so any process can make them. A chunk consists of one or more pieces.
+The result of a piece is a set of counts and sums of squared errors, and the sums of all pieces are added without
+rounding. The result of all draws therefore does not depend on which processes computed the pieces, or in which order.
+Memory does not grow with the number of draws.
 """
 
 import math
@@ -29,23 +30,23 @@ from bisar_budget.ranges.exact_ranges import NO_SHIFTS, ExactRanges, ImagePoints
 if TYPE_CHECKING:
     from bisar_budget.workers import MapBlocks
 
-# Draws held at once, the same for every number of draws: results depend on the seed alone. All that is summed are
-# a few megabytes and stay in a cache.
+# Number of draws that are in memory at once. It does not depend on the total number, so that results depend on the
+# seed alone. The sums of a block take a few megabytes and stay in the cache of a processor.
 BLOCK_DRAWS = 1 << 15
-CHUNK_DRAWS = 1 << 22  # draws of one stream; a second or so
-EXACT_PIECE_DRAWS = 1 << 18  # of a chunk, which it divides, where each draw goes through exact ranges: as long
-_LINEARITY_DRAWS = 512  # that decide whether exact ranges are needed
-_LINEARITY_TOLERANCE_FRACTION = 0.01  # of a limit
+CHUNK_DRAWS = 1 << 22  # draws of one random stream, which take about a second
+EXACT_PIECE_DRAWS = 1 << 18  # draws of a piece with exact ranges; divides a chunk, and takes about as long
+_LINEARITY_DRAWS = 512  # size of the sample that decides whether exact ranges are needed
+_LINEARITY_TOLERANCE_FRACTION = 0.01  # accepted error of the linear model, as a fraction of a limit
 _AFTER_BYTES = 256
-_MIN_COMPILED_DRAWS = 1 << 30  # normal numbers; then Numba saves more seconds than it takes
+_MIN_COMPILED_DRAWS = 1 << 30  # for fewer normal draws, compiling takes more time than Numba saves
 
 
 class Variable(NamedTuple):
-    """One standard random variable, with mean 0 and variance 1, and its effects.
+    """One random variable with mean 0 and variance 1, and its effects.
 
     `of` is the id of the error, or of the covariance, to which the variable belongs. `parts` are the errors that the
     variable causes, each with its size for a value of 1, in the unit of the error. `parts` is empty for random
-    errors, which are known by their effects only. `effects` are the quadratic and cubic phase at the aperture edge
+    errors, because only their effects are known. `effects` are the quadratic and cubic phase at the aperture edge
     [rad], and the displacement east and north [m], for a value of 1.
     """
 
@@ -58,11 +59,12 @@ class Variable(NamedTuple):
 
 
 class HeldSum(NamedTuple):
-    """A requirement that draws are compared with: its limit, and the errors and effects that it sums.
+    """A requirement with which the draws are compared: its limit, and the errors and effects that are summed for it.
 
     `owners` are the owners of the summed errors, and `columns` are the indices of the summed effects. `limit` is in
     `unit`. The limit of a quadratic phase error includes the `gain` of autofocus. Autofocus does not correct hidden
-    phases, so hidden phases are multiplied by `gain` before the comparison.
+    phases, which the bandwidth and the turn of the line of sight do not resolve. Hidden phases are therefore
+    multiplied by `gain` before the comparison.
     """
 
     id: str
@@ -81,7 +83,7 @@ class DrawsPiece(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """All data for the draws of a mission, so that other processes can compute pieces of them.
+    """All data that a process needs to compute pieces of the draws of a mission.
 
     `name` is the name of the mission. `is_exact` tells whether every draw is computed by exact ranges. `chunk` is
     the number of draws of a chunk, which has one random stream for each variable.
@@ -130,7 +132,10 @@ def drawing_of(
     is_exact = bool(variables and judged) and _needs_exact_ranges(drawing)
 
     def counts(variable: Variable) -> bool:
-        """Whether a variable has an effect on any requirement; leaving it out does not change other streams."""
+        """Whether a variable has an effect on any requirement.
+
+        Other variables can be left out, because every variable has its own random stream.
+        """
         if is_exact and variable.parts:
             return any(size for _, size in variable.parts)
         return any(variable.effects[column] for requirement in judged for column in requirement.columns)
@@ -174,7 +179,7 @@ def shared_out(drawing: Drawing, mapped: "MapBlocks") -> Iterator[tuple[DrawsPie
 
 
 def tally_of(drawing: Drawing, piece: DrawsPiece) -> Tally:
-    """Draw one piece; for processes that draw no other pieces of the drawing."""
+    """Draw the errors of one piece and count its draws, in a process that keeps no state between pieces."""
     return Drawer(drawing).tally(piece)
 
 
@@ -184,7 +189,8 @@ class Sums:
     If `adds` is set, the quadratic phase is summed by owner and the other effects for the whole mission, and `square`
     can be called. If `keeps_motion` is set, the errors are summed by owner for exact ranges, and `exact_square` can
     be called. `motion` are then position, velocity and acceleration errors of both platforms, (2, 3, 3, draws).
-    `tags` are time tags of both platforms (2, draws), and `clock` are clock coefficients (4, draws). `alone` are
+    `tags` are time tags of both platforms (2, draws), `registered` are errors of registered kinds with their sizes
+    (draws,), and `clock` are clock coefficients (4, draws). `alone` are
     effects of random errors: quadratic and cubic phase, displacement east and north (4, draws).
     """
 
@@ -197,6 +203,7 @@ class Sums:
         self.tags: dict[str, Floats] = {}
         self.clock: dict[str, Floats] = {}
         self.alone: dict[str, Floats] = {}
+        self.registered: dict[str, list[tuple[ErrorSource, Floats]]] = {}
         self._exact: dict[tuple[str, ...], ImagePoints] = {}
         self._scaled = np.empty(size)
         self._square = np.empty(size)
@@ -207,6 +214,7 @@ class Sums:
         for kept in (self.phases.values(), self.totals.values(), *(each.values() for each in by_name)):
             for sums in kept:
                 sums.fill(0.0)
+        self.registered.clear()
         self._exact.clear()
 
     def add(self, variable: Variable, drawn: Floats) -> None:
@@ -227,6 +235,8 @@ class Sums:
             tags = self._kept(self.tags, owner, (2,))
             for platform in source.platforms:
                 tags[platform] += size * drawn
+        elif source.is_registered:
+            self.registered.setdefault(owner, []).append((source, size * drawn))
         elif source.is_position:
             motion = self._kept(self.motion, owner, (2, 3, 3))
             for platform in source.platforms:
@@ -248,9 +258,9 @@ class Sums:
         return where[owner]
 
     def square(self, judged: HeldSum) -> Floats:
-        """Squared error that a requirement limits, by the linear model, (draws,).
+        """Compute the square of the error that a requirement limits, by the linear model, (draws,).
 
-        The next call overwrites the array.
+        The unit is the unit of the requirement, squared. The next call overwrites the returned array.
         """
         square = self._square
         if judged.columns == (0,):
@@ -268,7 +278,10 @@ class Sums:
         return square
 
     def exact_square(self, judged: HeldSum) -> Floats:
-        """Squared error that a requirement limits, by exact ranges, (draws,); NaN for draws without an image."""
+        """Compute the square of the error that a requirement limits, by exact ranges, (draws,).
+
+        The unit is the unit of the requirement, squared. The value is NaN for draws without an image.
+        """
         owners = judged.owners
         if owners not in self._exact:
             self._exact[owners] = self._by_exact_ranges(owners)
@@ -297,19 +310,25 @@ class Sums:
                 shifts[platform] = [
                     shift + late_shift for shift, late_shift in zip(shifts[platform], late, strict=True)
                 ]
+        for source, sizes in (pair for owner in owners for pair in self.registered.get(owner, ())):
+            for platform in source.platforms:
+                moved = [component * sizes for component in source.way_of(platform)]
+                shifts[platform] = [
+                    shift + of_source for shift, of_source in zip(shifts[platform], moved, strict=True)
+                ]
         return followed(self.exact, clock_powers @ clock, shifts, np.zeros(self.size, dtype=int))
 
 
 def _sum(by_owner: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
-    """Sum of the arrays of several owners; `nothing` if none of these owners has an array."""
+    """Add the arrays of several owners; returns `nothing` if none of these owners has an array."""
     of_owners = [by_owner[owner] for owner in owners if owner in by_owner]
     return sum(of_owners[1:], of_owners[0]) if of_owners else nothing
 
 
 class Drawer:
-    """Computes pieces of draws.
+    """A drawing with the state of its random streams, from which pieces of the draws are computed.
 
-    A piece that comes after the last computed piece in the same chunk continues the random streams of that piece.
+    If a piece comes after the last computed piece in the same chunk, the random streams of that piece are continued.
     """
 
     def __init__(self, drawing: Drawing) -> None:
@@ -330,13 +349,13 @@ class Drawer:
         for start in range(piece.start, piece.stop, BLOCK_DRAWS):
             size = min(BLOCK_DRAWS, piece.stop - start)
             if sums is None or sums.size != size:
-                sums = None  # the room of the others
+                sums = None  # frees the memory of the previous sums first
                 sums = Sums(drawing, size, adds=not drawing.is_exact, keeps_motion=drawing.is_exact)
             self._draw(sums)
             together = np.ones(size, dtype=bool)
             for index, requirement in enumerate(drawing.judged):
                 square = sums.exact_square(requirement) if drawing.is_exact else sums.square(requirement)
-                # What has no image holds nothing: it is not a number.
+                # The square of a draw without an image is NaN, so such a draw does not meet the requirement.
                 holds_in_draw = square <= (requirement.limit * (1 + UTILIZATION_TOLERANCE_FRACTION)) ** 2
                 holds[index] += int(np.count_nonzero(holds_in_draw))
                 if drawing.is_exact:
@@ -373,10 +392,10 @@ class Drawer:
 
 
 def _needs_exact_ranges(drawing: Drawing) -> bool:
-    """Whether exact ranges differ from the linear model in any draw of a sample, by more than 1 % of a limit.
+    """Whether exact ranges differ from the linear model by more than 1 % of a limit in any draw of a sample.
 
     Exact ranges include the hidden phase, which the linear model does not have. A hidden phase that changes a total
-    by more than this fraction therefore also requires exact ranges.
+    by more than 1 % of a limit therefore also requires exact ranges.
     """
     sums = Sums(drawing, _LINEARITY_DRAWS, adds=True, keeps_motion=True)
     drawn = np.empty(_LINEARITY_DRAWS)
@@ -396,7 +415,7 @@ def _fill_normal(generator: np.random.Generator, out: Floats) -> None:
 
 @cache
 def _compiled() -> Callable[[np.random.Generator, Floats], None]:
-    """Function that fills an array with normal draws, compiled by Numba if possible, otherwise by NumPy.
+    """Choose the function that fills an array with normal draws: compiled by Numba if possible, otherwise NumPy's.
 
     Numba is not used if it is not installed, if there is little memory, or if it cannot store compiled code.
     """
@@ -412,9 +431,9 @@ def _compiled() -> Callable[[np.random.Generator, Floats], None]:
 
 
 def _fill_each(generator: np.random.Generator, out: Floats) -> None:
-    """Fill an array with normal draws; Numba compiles this function.
+    """Fill an array with normal draws, in a loop that Numba compiles.
 
-    The draws are the same as those of NumPy, to the last bit, and take two thirds of the time.
+    The draws are identical to those of NumPy, to the last bit, and take two thirds of the time.
     """
     for index in range(out.size):
         out[index] = generator.standard_normal()
@@ -424,9 +443,9 @@ class _Stream:
     """Random stream of one variable in one chunk.
 
     Each variable has its own stream, so that a further error in the file does not change the draws of other errors.
-    The stream of the first chunk is seeded with the seed and the id of the variable. Streams of later chunks are
-    children of this stream. The key of a child is above all byte values, so that it never equals the stream of
-    another variable with a longer id.
+    The stream of the first chunk is seeded with the seed of the drawing and the bytes of the variable's id. Later
+    chunks use child streams with an additional key. This key is larger than any byte, so that a child stream never
+    equals the stream of another variable with a longer id.
     """
 
     def __init__(
@@ -450,7 +469,7 @@ class _Stream:
         out -= 0.5
         if self._distribution == "uniform":
             out *= math.sqrt(12)
-        else:  # a bound: as often below zero as not
+        else:  # a bound: full size, with either sign equally often
             np.copysign(1.0, out, out=out)
 
     def skip(self, count: int, buffer: Floats) -> None:
@@ -467,19 +486,19 @@ class _Stream:
 
 
 # ---------------------------------------------------------------------- eigenvectors
-_JACOBI_ROUNDS = 30  # of a Jacobi method: convergence is quadratic, a 6 x 6 takes about five
+_JACOBI_ROUNDS = 30  # convergence is quadratic: a 6 x 6 matrix needs about five rounds
 
 
 def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[list[float]]]:
-    """Eigenvalues of a symmetric matrix (n, n), and its unit eigenvectors as columns, without a particular order.
+    """Compute the eigenvalues of a symmetric matrix (n, n), and its unit eigenvectors as columns, in any order.
 
-    The method is Jacobi's rotations. LAPACK may return other eigenvectors for equal eigenvalues, and the same seed
-    would then give other draws.
+    Jacobi's method is used. For equal eigenvalues LAPACK may return different eigenvectors on different machines, and
+    the same seed would then give different draws.
     """
     n = len(matrix)
     a = [list(row) for row in matrix]
     v = [[float(i == j) for j in range(n)] for i in range(n)]
-    # Below this an element moves no eigenvalue by more than rounding does.
+    # A smaller element changes the eigenvalues by less than rounding does.
     negligible = 1e-17 * max((abs(x) for row in a for x in row), default=0.0)
     for _ in range(_JACOBI_ROUNDS):
         is_done = True

@@ -2,8 +2,8 @@
 
 The result shows whether root-sum-square and worst case describe the sum of errors well. All declared errors are drawn
 at once, their effects by the full model are added, and the magnitude of the sum is compared with the requirement. For
-small errors a draw is a sum of standard variables times effects; for large errors exact ranges compute it (`draws`).
-A covariance gives six variables, one along each eigenvector of its correlation matrix.
+small errors the sum is linear in standard variables; for large errors it is computed from exact ranges (see the
+module `draws`). A covariance gives six variables, one along each eigenvector of its correlation matrix.
 
 Errors are drawn from the distributions themselves. The coverage factor, which turns sigmas into bounds, is not
 applied. Vibration is not drawn, because its amplitude is declared and its limits concern paired echoes.
@@ -29,16 +29,16 @@ from bisar_budget.phrases import Note
 from bisar_budget.sampling.draws import HeldSum, Share, Variable, drawing_of, eigensystem, in_turn, joined
 
 CONFIDENCE_LEVEL = 0.95
-DOMINANT_FRACTION = 0.5  # of the variance: beyond, a sum has the shape of that one error, whatever the others are
+DOMINANT_FRACTION = 0.5  # of the variance; an error with a larger share determines the distribution of the sum
 _QUANTILE_SIGMA = 1.959963984540054  # of the standard normal at 97.5 %
-_SURE_QUANTILE_SIGMA = 3.2905267314919255  # at 99.95 %: a warning is not to be chance
-_MATERIAL_FRACTION = 0.1  # of the probability to fail: a difference that is sure but smaller changes nobody's mind
+_SURE_QUANTILE_SIGMA = 3.2905267314919255  # at 99.95 %, so that a warning is hardly ever due to chance
+_MATERIAL_FRACTION = 0.1  # of the probability of failure; a smaller difference is not worth a warning
 
-_SIGMA_DIGITS = 9  # of sampled sigmas: further ones differ between processors, and mean nothing
+_SIGMA_DIGITS = 9  # of sampled sigmas; further digits differ between processors
 _VARIABLE_SUFFIXES = ("", ".cubic", ".east", ".north")  # variables of a random error, beside its quadratic phase
-_HIDDEN_FRACTION = 0.1  # of the quadratic phase: a hidden phase of a tenth adds half a percent
-_VARIANCE_ROUNDING_FRACTION = 1e-12  # of a variance: what rounding leaves of one that others account for
-_CIRCLE_NODES = 4096  # of a mean over a circle of a smooth function
+_HIDDEN_FRACTION = 0.1  # of the quadratic phase; a hidden phase of a tenth adds half a percent to the total
+_VARIANCE_ROUNDING_FRACTION = 1e-12  # of a variance; a smaller remainder is a rounding error
+_CIRCLE_NODES = 4096  # number of angles for the mean of a smooth function on a circle
 
 
 def monte_carlo(
@@ -102,7 +102,7 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
         members = [singles.pop(row_id) for row_id in group.ids]
         values, vectors = eigensystem([[float(rho) for rho in row] for row in group.correlation])
         for index, value in enumerate(values):
-            # To six decimals a correlation matrix may have an eigenvalue just below zero.
+            # Correlations that are rounded to six decimals may have an eigenvalue just below zero.
             scale = math.sqrt(max(0.0, value)) / factor
             members_and_sizes = [(s, (s.declared or 0.0) * vectors[i][index] * scale) for i, s in enumerate(members)]
             yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", members_and_sizes, full)
@@ -119,14 +119,14 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
 def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
     """Yield the independent variables of a random error of a sensor, a clock or the air.
 
-    They are the columns of the Cholesky factor of its covariance of quadratic phase, cubic phase and displacement
-    east and north. The first variable has the quadratic phase with all correlated effects, and each further variable
-    has what the variables before it leave over. An error without the coverage factor is a bound: its effects are
-    drawn with their full size and a random sign.
+    Their effects are the columns of a Cholesky factor. It factors the covariance of four effects: quadratic phase,
+    cubic phase, and displacement east and north. The first variable has the quadratic phase and all effects that are
+    correlated with it. Each further variable has the remaining part of the next effect. An error to which the
+    coverage factor does not apply is a bound: its effects are drawn with their full size and a random sign.
     """
     if not error.declared or error.full.covariance is None or error.counted_in:
         return
-    size = error.declared / (factor if error.is_covered else 1.0)  # that of an oscillator is in its effects
+    size = error.declared / (factor if error.is_covered else 1.0)  # for an oscillator its effects contain the size
     distribution = "normal" if error.is_covered else "bound"
     covariance = np.array(error.full.covariance) * size**2
     scale = np.diagonal(covariance).copy()
@@ -159,9 +159,9 @@ def _variable(
 def _requirements(
     mission: Mission, allocation: Allocation, variables: Sequence[Variable], *, is_placed: bool
 ) -> Iterator[HeldSum]:
-    """Requirements of `check` to which declared errors contribute.
+    """Yield the requirements of `check` to which declared errors contribute.
 
-    The location error is included only with `is_placed`: then all errors have known displacements.
+    `is_placed` tells whether the displacements of all errors are known. Without it the location error is left out.
     """
     present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
@@ -185,7 +185,7 @@ def _requirements(
 
 
 class _Predictions:
-    """Results that need no draws: combined errors as in `check`, variances, and normal probabilities."""
+    """Results that need no draws: combined errors as in `check`, variances, and probabilities of a normal sum."""
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
         self.together = Together(analysis.errors, "full", (), (), analysis.random, analysis.groups)
@@ -207,7 +207,10 @@ class _Predictions:
         return float(size[0]) if math.isfinite(size[0]) else None
 
     def variances(self, judged: HeldSum) -> dict[str, float]:
-        """Variance that each error or covariance adds to a requirement's sum, by its id; unit of the sum, squared."""
+        """Compute the variance that each error or covariance adds to the sum of a requirement, by its id.
+
+        The unit is the unit of the requirement, squared.
+        """
         by_error: dict[str, float] = {}
         for variable in self.variables:
             if variable.owner in judged.owners:
@@ -289,7 +292,7 @@ def _requirement(
 
 
 def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
-    """Warnings about a requirement for which root-sum-square or a normal distribution does not describe the sum."""
+    """Yield a warning if root-sum-square or a normal distribution does not describe the sum for a requirement."""
     # A covariance, which is no single variable, is always normal.
     if requirement.dominant_share > DOMINANT_FRACTION and not predictions.is_normal(requirement.dominant):
         yield (
@@ -309,12 +312,15 @@ def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Pred
 
 
 def _hides_phase(error: RandomError) -> bool:
-    """Whether the phase of an error that band and turn hide exceeds a tenth of its quadratic phase."""
+    """Whether the hidden phase of an error exceeds a tenth of its quadratic phase.
+
+    The hidden phase is the part of the phase that the bandwidth and the turn of the line of sight do not resolve.
+    """
     return bool(np.any(error.full.hidden > _HIDDEN_FRACTION * np.abs(error.full.quadratic)))
 
 
 def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: bool) -> Iterator[Note]:
-    """Notes on errors that are drawn by a convention of this program, and on errors that are not drawn."""
+    """Yield notes on errors that are drawn by a convention of this program, and on errors that are not drawn."""
     if is_exact:
         yield phrases.note("drawn-through-exact-ranges")
     if mission.gating_model != "full":

@@ -1,9 +1,10 @@
-"""Images of point scatterers with motion errors, formed from exact ranges. The package needs NumPy."""
+"""Simulated images of point scatterers with motion errors, formed from exact ranges. The package needs NumPy."""
 
-# What other rooms may use.
+# Modules that other packages may import.
 __all__ = [
     "autofocus",
     "collection",
+    "flown_errors",
     "image_formation",
     "impulse_response",
     "phase_history",

@@ -1,13 +1,13 @@
-"""Autofocus of a complex image: phase gradient, map drift, and the rotation they need in a bistatic image.
+"""Autofocus of a complex image by phase gradient or map drift, and the rotation that a bistatic image needs for it.
 
 Motion errors smear an image along y′, across the bistatic look direction. Both estimators therefore take an image in
-the rotated frame (x′, y′), with x′ along the first axis. An image in (x, y) is rotated to that frame and back, as in
-Section VI of Rigling & Moses.
+the rotated frame (x′, y′), with x′ along the first axis. An image in (x, y) is first rotated to that frame and later
+rotated back, as in Section VI of Rigling & Moses.
 
-Sources: Wahl, Eichel, Ghiglia & Jakowatz, "Phase Gradient Autofocus - A Robust Tool for High Resolution SAR
-Phase Correction", IEEE Trans. AES 30 (1994); Jakowatz & Wahl, "Eigenvector method for maximum-likelihood
-estimation of phase errors in SAR imagery", JOSA A 10 (1993); map drift: Carrara, Goodman & Majewski, Spotlight
-Synthetic Aperture Radar, chapter 6.
+Sources: Wahl, Eichel, Ghiglia & Jakowatz, "Phase Gradient Autofocus - A Robust Tool for High Resolution SAR Phase
+Correction", IEEE Trans. AES 30 (1994); Jakowatz & Wahl, "Eigenvector method for maximum-likelihood estimation of
+phase errors in SAR imagery", JOSA A 10 (1993); map drift: Carrara, Goodman & Majewski, Spotlight Synthetic Aperture
+Radar, chapter 6.
 """
 
 import math
@@ -23,12 +23,12 @@ from bisar_budget.simulator.phase_history import Complexes, Floats
 Indices = NDArray[np.int64]
 
 _MAX_AUTOFOCUS_ITERATIONS = 40
-_PADDING_FACTOR = 2  # side of a padded image over the side of the image: a rotated image does not wrap around
-_SUPPORT_FRACTION = 0.1  # of the strongest aperture sample; weaker samples are leakage of a finite image
-_MIN_GAP_FRACTION = 0.05  # of the sampling band; an oversampled image leaves at least this much of it empty
-_BLOCK_ROWS = 16  # range lines corrected at once, for the cache
-_DRIFT_TOLERANCE_RAD = 1e-3  # at the aperture edge
-_CORRELATION_SIGMA = 6.0  # least correlation of a drift; the highest of many of speckle is at about 4 sigma
+_PADDING_FACTOR = 2  # ratio of the sides of padded and given image, so that a rotated image does not wrap around
+_SUPPORT_FRACTION = 0.1  # fraction of the strongest aperture sample; weaker samples are leakage of a finite image
+_MIN_GAP_FRACTION = 0.05  # smallest empty part of the sampling band in an oversampled image
+_BLOCK_ROWS = 16  # range lines that are corrected at once, so that they fit into the cache
+_DRIFT_TOLERANCE_RAD = 1e-3  # largest last change of the phase at the aperture edge
+_CORRELATION_SIGMA = 6.0  # smallest accepted correlation peak; the highest peak of pure speckle is at about 4 sigma
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ class PhaseGradientSettings:
     false_alarm_probability : float
         Probability that clutter alone shows a target anywhere in the image.
     clutter_floor_ratio : float
-        Lower bound of the clutter power of a line, as a ratio to the peak power of the image. Weaker values are
-        rounding, not clutter.
+        Lower bound of the clutter power of a line, as a ratio to the peak power of the image. Lower powers come from
+        rounding, not from clutter.
     smear_fraction : float
-        Level that bounds the mean response, as a fraction of its peak.
+        Level at which the mean response is considered to end, as a fraction of its peak.
     shrink_factor : float
-        Smallest ratio of the window of an iteration to the window of the iteration before.
+        Smallest ratio of the window widths of an iteration and of the iteration before.
     narrowest_cells : int
         Half width of the last window. [cells]
     bridge_cells : int
@@ -132,7 +132,7 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
         return Focused(image=image.copy(), phase=phase)
     spectrum = np.fft.fft(image[rows] / np.sqrt(level)[:, None], axis=1)
     band = aperture_band(spectrum)
-    samples = 1 << (band.size - 1).bit_length()  # of a range line, from one to two per cell
+    samples = 1 << (band.size - 1).bit_length()  # samples of a range line: one to two per resolution cell
     aperture = spectrum[:, band] * (samples / image.shape[1])
     phase[band] = _common_phase(aperture, samples, _threshold(image.size))
     return Focused(image=_corrected(image, phase), phase=phase)
@@ -141,9 +141,9 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
 def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
     """Estimate a quadratic, or quadratic and cubic, phase error from the drift between sub-aperture images.
 
-    The phase over a sub-aperture is mainly a slope, which shifts its image. The cross-correlation of the images'
-    powers along y′, summed over range lines, measures the shifts. The estimate is repeated until the images no longer
-    drift.
+    The phase error over a sub-aperture is mainly linear, which shifts the image of the sub-aperture. The
+    cross-correlation of the images' powers along y′, summed over range lines, measures the shifts. The estimate is
+    repeated until the images no longer drift.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
     Raises
     ------
     ValueError
-        As for `phase_gradient_autofocus`, or another number of sub-apertures.
+        As for `phase_gradient_autofocus`, or `sub_apertures` is neither 2 nor 3.
 
     Notes
     -----
@@ -183,7 +183,7 @@ def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
     shapes = np.stack((aperture_place**2, aperture_place**3)[: sub_apertures - 1], axis=1)
     segments = np.array_split(np.arange(band.size), sub_apertures)
     pairs = [(a, b) for a in range(sub_apertures) for b in range(a + 1, sub_apertures)]
-    # Slope per sample of each shape over each sub-aperture, by a straight line fitted to it.
+    # Slope per sample of each polynomial over each sub-aperture, from a fitted straight line.
     slopes = np.array([np.polyfit(segment, shapes[segment], 1)[0] for segment in segments])
     model = np.array([slopes[b] - slopes[a] for a, b in pairs])
     coefficients = np.zeros(shapes.shape[1])
@@ -200,7 +200,7 @@ def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
     return Focused(image=_corrected(image, total), phase=total)
 
 
-# Algorithms by their names in the mission file. Map drift uses three sub-apertures, to see a cubic phase too.
+# Algorithms by their names in the mission file. Map drift uses three sub-apertures, to estimate a cubic phase too.
 ALGORITHMS: dict[str, Callable[[Complexes], Focused]] = {
     "pga": phase_gradient_autofocus,
     "map_drift": partial(map_drift, sub_apertures=3),
@@ -299,12 +299,12 @@ def _threshold(pixels: int) -> float:
 
 
 def _range_lines(image: Complexes) -> tuple[Indices, Floats]:
-    """Indices of the range lines that have a target, strongest first, and the clutter power of each line."""
+    """Indices of the range lines that contain a target, strongest first, and the mean clutter power of each."""
     power = image.real**2 + image.imag**2
     peak = power.max(axis=1)
     if not peak.max():
         return np.zeros(0, dtype=np.int64), peak[:0]
-    # A median does not see targets. The median of an exponential distribution is ln 2 times the mean.
+    # A few targets hardly change a median. The median of an exponential distribution is ln 2 times its mean.
     level = np.median(power[:, :: max(1, power.shape[1] // 256)], axis=1) / math.log(2)
     level = np.maximum(level, _PGA.clutter_floor_ratio * peak.max())
     ratio = peak / level
@@ -314,9 +314,9 @@ def _range_lines(image: Complexes) -> tuple[Indices, Floats]:
 
 
 def _common_phase(aperture: Complexes, line_samples: int, threshold: float) -> Floats:
-    """Phase over the band that is common to all range lines, by iterated phase gradient autofocus, (count,). [rad]
+    """Estimate the phase over the band that is common to all range lines, by phase gradient autofocus. [rad]
 
-    `aperture` is the spectrum of range lines whose clutter power is 1.
+    `aperture` is the spectrum of range lines that are scaled to a clutter power of 1. The result is (count,).
     """
     count = aperture.shape[1]
     per_cell = line_samples / count
@@ -410,7 +410,7 @@ def _centred(aperture: Complexes, column: Indices, samples: int) -> Complexes:
 def _phasors(angle: Floats, count: int) -> Complexes:
     """Phasors exp(j · angle · n) for n = 0 … count - 1, (angles, count).
 
-    They are products of coarse and fine steps, so that few exponentials are computed.
+    They are computed as products of coarse and fine steps, which needs only a few exponentials.
     """
     fine = np.exp(1j * np.outer(angle, np.arange(32)))
     coarse = np.exp(1j * np.outer(angle, np.arange(0, count, 32)))
@@ -465,16 +465,16 @@ def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -
 
 
 def _drifts(aperture: Complexes, segments: list[Indices], pairs: list[tuple[int, int]]) -> Floats | None:
-    """Differences of the phase slope between pairs of sub-apertures, per aperture sample.
+    """Differences of the phase slope between pairs of sub-apertures, (pairs,). [rad] per aperture sample
 
     None if the images of the sub-apertures do not correlate.
     """
-    samples = 2 * aperture.shape[1]  # a power has twice the band
+    samples = 2 * aperture.shape[1]  # the power of an image has twice its bandwidth
     powers = [
         np.fft.fft(np.abs(np.fft.ifft(aperture[:, segment], samples, axis=1)) ** 2, axis=1) for segment in segments
     ]
     for power in powers:
-        power[:, 0] = 0  # the mean correlates everywhere
+        power[:, 0] = 0  # the mean correlates at every shift
         power /= np.linalg.norm(power)
     # Speckle of disjoint sub-apertures is independent between cells and between lines.
     least_correlation = _CORRELATION_SIGMA / math.sqrt(aperture.shape[0] * segments[-1].size)
@@ -499,28 +499,31 @@ def _drifts(aperture: Complexes, segments: list[Indices], pairs: list[tuple[int,
 def rotated(image: Complexes, look_azimuth: float) -> Complexes:
     """Rotate an image in (x, y) to the frame (x′, y′) of (10), by three shears.
 
-    A shear is a phase ramp in one dimension.
+    Each shear is a phase ramp in the spectrum along one axis, computed by FFT. It is therefore exact for a
+    band-limited image.
 
     Source: Unser, Thévenaz & Yaroslavsky, "Convolution-based interpolation for fast, high-quality rotation of
-    images", IEEE Trans. Image Processing 4 (1995); the shears here are by FFT, so exact for a band-limited image.
+    images", IEEE Trans. Image Processing 4 (1995).
 
     Parameters
     ----------
     image : (n, n) ndarray
-        Baseband image, x along the first axis, equal spacing, about sample n // 2 of each axis. Exact if its
-        spectrum lies within 0.35 cycles per sample of zero: beyond, the shears alias.
+        Baseband image with x along the first axis and equal spacing of both axes. It is rotated about sample n // 2
+        of each axis. The result is exact if its spectrum lies within 0.35 cycles per sample of zero. Beyond that, the
+        shears alias.
     look_azimuth : float
         Direction of x′. [rad]
 
     Returns
     -------
     (m, m) ndarray
-        All of the image with a margin of zeros, m = 2 n rounded up to even, same spacing, about sample m // 2.
+        The whole rotated image with a margin of zeros, m = 2 n. It has the same spacing, and its centre is sample
+        m // 2 of each axis.
 
     Raises
     ------
     ValueError
-        The image is not square or the azimuth not finite.
+        The image is not square, or the azimuth is not finite.
     """
     if image.ndim != 2 or image.shape[0] != image.shape[1]:
         raise ValueError(f"rotation takes a square image (got shape {image.shape})")
@@ -533,19 +536,19 @@ def rotated(image: Complexes, look_azimuth: float) -> Complexes:
 
 
 def scene_axes(image: Complexes, look_azimuth: float, count: int) -> Complexes:
-    """Rotate an image in (x′, y′), from `rotated`, back to (x, y), and return its middle (count, count)."""
+    """Rotate an image in (x′, y′), made by `rotated`, back to (x, y), and return its middle part (count, count)."""
     start = image.shape[0] // 2 - count // 2
     return _turned(image, -look_azimuth)[start : start + count, start : start + count]
 
 
 def _turned(image: Complexes, angle_rad: float) -> Complexes:
-    """Image with its axes rotated by an angle: by exact quarter turns, then by shears for at most 45°."""
+    """Rotate an image by an angle: exact quarter turns first, then shears for the remaining angle of at most 45°."""
     if not math.isfinite(angle_rad):
         raise ValueError(f"the look azimuth must be a finite angle (got {angle_rad} rad)")
     quarters = round(angle_rad / (math.pi / 2))
     shear_angle = angle_rad - quarters * math.pi / 2
     for _ in range(quarters % 4):
-        # new(x′, y′) = old(−y′, x′); an even side has no partner for its first sample, which is margin.
+        # new(x′, y′) = old(−y′, x′). The first sample of an even side has no counterpart; it is margin.
         image = np.roll(image.T[:, ::-1], 1, axis=1)
     # old(x, y) with x = x′cos − y′ sin, y = x′ sin + y′ cos, split into x-, y- and x-shears.
     image = _sheared(image, -math.tan(shear_angle / 2), axis=0)

@@ -1,4 +1,4 @@
-"""Simulated collection of a mission with any errors, and images of a point around its place by exact ranges."""
+"""Simulated collection of a mission with arbitrary errors, and images of a point near its displaced position."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -37,25 +37,25 @@ from bisar_budget.simulator.phase_history import (
 )
 
 OVERSAMPLING_FACTOR = 2.5  # samples of an image per resolution cell
-CUT_CELLS = 48  # resolution cells of a cross-range cut; fewer blur the aperture by over 1 % of a phase under a taper
-RANGE_CELLS = 8  # of a chip
+CUT_CELLS = 48  # resolution cells of a cross-range cut; with fewer, a phase under a taper is wrong by over 1 %
+RANGE_CELLS = 8  # resolution cells of a chip in range
 MAX_CELLS = 1024
-MAX_CONTRIBUTION_COUNT = 1 << 21  # of pulses to pixels, which the reading of an image holds at once
+MAX_CONTRIBUTION_COUNT = 1 << 21  # products of pulses and pixels that are in memory at once when an image is measured
 
 _MAX_SPECTRUM_CELLS = (
-    1.5  # width of a spectrum over the bandwidth: half of the width that three samples per cell hold
+    1.5  # ratio of a spectrum's width to the bandwidth: half of the ratio that three samples per cell allow
 )
-_MIN_CHIP_FREQUENCY_COUNT = 64  # half of them for the response itself
+_MIN_CHIP_FREQUENCY_COUNT = 64  # half of them are for the response itself
 _BYTES_PER_PIXEL = 16 * 16  # two images, their grid, and the arrays that form or refocus one of them
 _BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
 _BYTES_PER_CONTRIBUTION = 8 + 2 * 16  # in single and in double precision
-_GRID_STRIDE_PIXELS = 4  # in a step along a line; a cubic interpolates between steps
-_MAX_STRETCH_FACTOR = 4.0  # length of a pixel over its spacing, where Doppler hardly changes along a line
-_PATH_SAMPLES = 65  # slow times of the paths that show how far the line of sight turns
-_ONE_WAY_FRACTION = 0.99  # of the range of Doppler that the ends of the aperture span unless Doppler turns back
-_MAX_SLANT_RATIO = 60.0  # length of the step from line to line over its shortest: equal Doppler along equal range
-_CORRECTION_STEPS = 3  # of Newton's method for each pixel's range sum
-_BLOCK_PIXELS_COUNT = 1 << 14  # corrected at once
+_GRID_STRIDE_PIXELS = 4  # pixels in a step along a line; a cubic interpolates between steps
+_MAX_STRETCH_FACTOR = 4.0  # largest ratio of pixel length to spacing, used where Doppler hardly changes along a line
+_PATH_SAMPLES = 65  # slow times of the paths from which the turn of the line of sight is computed
+_ONE_WAY_FRACTION = 0.99  # smallest fraction of the Doppler interval that the aperture's ends span without reversal
+_MAX_SLANT_RATIO = 60.0  # largest ratio of a step to the shortest step; with more, both kinds of lines are parallel
+_CORRECTION_STEPS = 3  # Newton steps that correct each pixel's range sum
+_BLOCK_PIXELS_COUNT = 1 << 14  # pixels that are corrected at once
 _PULSES_PER_CELL, _LARGE_PATCH_CELLS = 4, 128  # a response repeats after as many cells as there are pulses
 
 
@@ -63,10 +63,11 @@ _PULSES_PER_CELL, _LARGE_PATCH_CELLS = 4, 128  # a response repeats after as man
 class RangeLines:
     """Grid of ground pixels along lines of equal range and of equal Doppler.
 
-    On this grid a response is the product of its two cuts. On a straight grid it is not if a platform is near: the
-    ridge of the response follows an ellipse, and the range sidelobes follow lines of equal Doppler. Here the pixels
-    of a line have the same range sum at the aperture midpoint, and the pixels of a column have the same change of the
-    range sum over the aperture. Lines are followed from the middle outwards, so a patch may bend around a platform.
+    On this grid a response is the product of its two cuts. On a straight grid this does not hold if a platform is
+    near, because the ridge of the response then follows an ellipse, and the range sidelobes follow lines of equal
+    Doppler. Here the pixels of a line have the same range sum at the aperture midpoint, and the pixels of a column
+    have the same change of the range sum over the aperture. Lines are followed from the middle outwards, so a patch
+    may bend around a platform.
 
     If the line of sight turns so far that Doppler reverses within the aperture, as on a full circle, the range sums
     at three times do not determine a point. The pixels then lie along straight lines, and sample the full wave-number
@@ -113,14 +114,13 @@ class RangeLines:
 
     @staticmethod
     def _column(by_range: Floats, by_doppler: Floats) -> Floats:
-        """Step along the line of equal Doppler over which the range sum grows by 1, (..., 2).
+        """Step along the line of equal Doppler per metre of increase of the range sum, (..., 2). [m/m]
 
-        `by_range` and `by_doppler` are the results of `gradients` at points (..., 2). If the step is too long, it is
-        across the lines of equal range instead.
+        `by_range` and `by_doppler` are the results of `gradients` at points (..., 2). If this step would be too long,
+        the step is perpendicular to the lines of equal range instead.
         """
         slant = _left(by_doppler)
         square, slope = _dot(by_range, by_range), _dot(by_range, slant)
-        # Where that step is too long, a step across the lines of equal range instead.
         is_short = _dot(slant, slant) * square <= _MAX_SLANT_RATIO**2 * slope**2
         step: Floats = np.where(is_short, slant / np.where(is_short, slope, 1.0), by_range / square)
         return step
@@ -173,16 +173,16 @@ class RangeLines:
         return float(SPEED_OF_LIGHT_MPS / (radar.bandwidth * steepness)), float(wavelength / (area / steepness))
 
     def sampled(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
-        """Cell sizes that pixels must sample: those of `cells`, or finer across the lines of equal range. [m]
+        """Cell sizes that pixels must sample: those of `cells`, or smaller across the lines of equal range. [m]
 
-        Wavefronts are curved over a long aperture near a platform. A point is then out of focus less than a cell away
-        along its column, and the spectrum along the column is wider than the bandwidth.
+        Over a long aperture near a platform the wavefronts are so curved that a point is out of focus even at pixels
+        of its column less than a cell away. The spectrum along the column is then wider than the bandwidth.
         """
         across, along = self.cells(centre, radar)
         if self.turns_back:
             return across, along
         first, middle, last = self._sums(np.asarray(centre, dtype=float))
-        column = self._column(middle, last - first) * float(np.hypot(*middle))  # by a metre across the lines
+        column = self._column(middle, last - first) * float(np.hypot(*middle))  # step per metre across the lines
         wider = (
             abs(float(((first + last) / 2 - middle) @ column)) * float(radar.center_frequency) / SPEED_OF_LIGHT_MPS
         )
@@ -223,7 +223,7 @@ class RangeLines:
         spacing : (2,) float
             Distance of neighbouring pixels at the centre, across the lines of equal range and along them. [m]
         shape : (2,) int
-            Number of lines, which follow each other towards the platforms, and number of pixels of a line,
+            Number of lines, in the direction towards the platforms, and number of pixels of a line,
             counter-clockwise.
 
         Returns
@@ -245,7 +245,7 @@ class RangeLines:
             return range_step * self._column(*self.gradients(points))
 
         def along(points: Floats) -> Floats:
-            """Step from points to the next pixel of a line, by an equal change of Doppler, limited in length."""
+            """Step from points to the next pixel of their line: an equal change of Doppler, up to a longest step."""
             g, d = self.gradients(points)
             tangent = -_left(g) / np.sqrt(_dot(g, g))
             slope, longest = _dot(d, tangent), _MAX_STRETCH_FACTOR * spacing[1]
@@ -271,9 +271,9 @@ class RangeLines:
 class Chip(NamedTuple):
     """Image of a patch, (nx, ny), and the ground points of its pixels, (nx, ny, 3). [m]
 
-    `spacing` is the distance of neighbouring pixels in the middle of the patch, along x′ and y′. [m] Lines of pixels
-    along y′ have equal range, and columns have equal Doppler, both by the measured paths. The phase of the
-    range to each pixel at the midpoint is removed, so the spectrum of the image is that of the aperture, about zero.
+    `spacing` is the distance of neighbouring pixels in the middle of the patch, along x′ and y′. [m] For the measured
+    paths, lines of pixels along y′ have equal range, and columns have equal Doppler. The phase of the range to each
+    pixel at mid-aperture is removed, so the spectrum of the image is that of the aperture, centred at zero.
     """
 
     image: Complexes
@@ -297,7 +297,7 @@ class Chip(NamedTuple):
 
 
 class PointCollection:
-    """Collection of a mission, for images of a single point."""
+    """Simulated collection of a mission, from which images of a single point are formed."""
 
     def __init__(self, mission: Mission, geometry: BistaticGeometry) -> None:
         self.radar, self.geometry = mission.radar, geometry
@@ -321,7 +321,7 @@ class PointCollection:
         return taylor_window(count) if self.is_tapered else np.ones(count)
 
     def flight(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> Flight:
-        """Fly both platforms with errors, and return the flown paths and the clock errors at the slow times.
+        """Actual and measured paths of both platforms with errors, and the clock errors, at the slow times.
 
         If the receiver takes the direct path as its clock, the errors of both paths also cause a clock error. Errors
         with wideband vibration need the generator `rng`.
@@ -358,7 +358,9 @@ class PointCollection:
         return history
 
     def effect(self, errors: Errors, seen_from: GroundVector = (0.0, 0.0)) -> ExactEffect:
-        """Displacement and phases of a ground point, by exact ranges.
+        """Displacement of a ground point in the image and the phases that remain there, computed from exact ranges.
+
+        `seen_from` is the ground point, east and north. [m]
 
         Raises
         ------
@@ -370,7 +372,7 @@ class PointCollection:
         return exact_effect(self._nodes, transmitter, receiver, flight.seen, self.radar, self.aperture_time)
 
     def range_lines(self, errors: Errors) -> RangeLines:
-        """Lines of equal range for the measured paths without vibration, along which a processor lays its pixels."""
+        """Lines of equal range for the measured paths without vibration, on which a processor places its pixels."""
         times = np.linspace(-1.0, 1.0, _PATH_SAMPLES) * self.aperture_time / 2
         return RangeLines(*(path.measured for path in self.flight(errors.smooth(), times).paths))
 
@@ -423,9 +425,9 @@ class PointCollection:
     def pair(
         self, errors: Errors, ground_point: GroundVector, cells: int = CUT_CELLS, range_cells: int = RANGE_CELLS
     ) -> tuple[Chip, Chip]:
-        """Form an image with errors around the displaced `ground_point` of the scene centre, and its reference image.
+        """Form an image with errors around the point where the scene centre appears, and its reference image.
 
-        The reference image has a scatterer at `ground_point` and no errors.
+        `ground_point` is this displaced point. The reference image has a scatterer at `ground_point` and no errors.
         """
         return (
             self.chip(ground_point, errors, cells=cells, range_cells=range_cells),
@@ -453,12 +455,12 @@ class PointCollection:
         return self._last_grid[1:]
 
     def _frequencies(self, grid: Floats, flight: Flight, scatterer: GroundVector) -> int:
-        """Number of frequencies with which a range profile does not repeat within the patch, including range walk."""
+        """Number of frequencies for which range profiles do not repeat within the patch, including the range walk."""
         farthest = 0.0
         point = np.array([*scatterer, 0.0])
         for pulse in (0, len(flight.clock) // 2, -1):
             range_difference = np.zeros(grid.shape[:-1])
-            if self.has_direct_path:  # cancels most of the error of a distant platform
+            if self.has_direct_path:  # the clock error cancels most of the range error of a distant platform
                 range_difference -= SPEED_OF_LIGHT_MPS * flight.clock[pulse]
             for flown in flight.paths:
                 range_difference += np.linalg.norm(grid - flown.measured[pulse], axis=-1)
@@ -468,9 +470,10 @@ class PointCollection:
         return max(_MIN_CHIP_FREQUENCY_COUNT, 16 * math.ceil((cells + _MIN_CHIP_FREQUENCY_COUNT / 2) / 16))
 
     def _require_room(self, cells: int, range_cells: float) -> None:
-        """Raise a `ValueError` if a patch aliases or is too large.
+        """Raise a `ValueError` if a patch of resolution cells aliases or is too large.
 
-        More pulses than the patch needs would not change its image.
+        The memory is checked for the number of pulses that the patch needs, because additional pulses would not
+        change its image.
         """
         if cells > MAX_CELLS:
             raise ValueError(f"a patch of {cells} resolution cells, at most {MAX_CELLS} are formed")
@@ -503,9 +506,9 @@ def pulses_for(cells: int) -> int:
 
 
 def _followed(step: Callable[[Floats], Floats], start: Floats, count: int) -> Floats:
-    """Follow a field of steps in both directions from points (..., 2).
+    """Follow a field of steps from points (..., 2) in both directions.
 
-    Returns (count, ..., 2), with the start at index count // 2.
+    Returns the points along the curves, (count, ..., 2). The start is at index count // 2.
     """
     back = count // 2
     direction = np.array([-1.0, 1.0]).reshape(2, *[1] * start.ndim)

@@ -5,9 +5,9 @@ Import this module only where a missing Numba is handled.
 Range profiles are refined until a B-spline of two taps (linear) or four taps (cubic) can interpolate them. The
 spectrum is divided by the transform of the spline, which is known in closed form. On a lattice of pixels, the range
 is computed exactly in the middle of each run of 32 pixels of a line, and expanded to fourth order along the run. For
-other pixels it is computed exactly at each pixel. Whole cycles and whole samples are split off in double precision or
-integers. Only the fractions are in single precision, which therefore suffices for any position of the scene and any
-wavelength.
+other pixels it is computed exactly at each pixel. Whole cycles and whole samples are removed in double precision or
+integers. Only the fractions that remain are in single precision. The accuracy therefore does not depend on the
+position of the scene and on the wavelength.
 """
 
 import math
@@ -31,22 +31,22 @@ from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory
 
 Spline = Literal["linear", "cubic"]
 
-_SEGMENT_LENGTH = 32  # pixels in one expansion; two or four vectors of a processor
+_SEGMENT_LENGTH = 32  # pixels in one expansion; they fill two or four vector registers of a processor
 _RUN_LENGTH = 64  # scattered pixels whose ranges are bounded together
 _TILE_ROWS = 16  # lines of one tile; the part of a pulse that a tile reads stays in a processor's first cache
-_FFT_OVERSAMPLING_FACTOR = 2  # of profiles from the FFT
-_KERNEL_SAMPLES = 8  # of the kernel that refines profiles: -140 dB at this oversampling
-_REFINEMENT_FACTORS = {"linear": 16, "cubic": 8}  # samples per sample from the FFT
+_FFT_OVERSAMPLING_FACTOR = 2  # oversampling of profiles that the FFT gives
+_KERNEL_SAMPLES = 8  # width of the kernel that refines profiles; its error is -140 dB at this oversampling
+_REFINEMENT_FACTORS = {"linear": 16, "cubic": 8}  # refined samples per sample from the FFT
 _SPLINE_ORDERS = {"linear": 1, "cubic": 3}
 _RANGE_MARGIN_SAMPLES = 8  # samples beyond the last pixel on each side
-_BLOCK_BYTES = 24e6  # of profiles held at once, about the size of a processor's last cache
-_MAX_SAMPLES_PER_PIXEL = 8  # to refine more samples takes longer than to read the pixel with the kernel itself
+_BLOCK_BYTES = 24e6  # size of the profiles in memory at once, about that of a processor's last cache
+_MAX_SAMPLES_PER_PIXEL = 8  # with more, refining takes longer than reading each pixel with the kernel itself
 _MAX_NEGLECTED_RAD = 1e-6  # phase of the first neglected order of the expansion
-_LATTICE_TOLERANCE_FRACTION = 1e-8  # of a wavelength that a pixel may be off the lattice
+_LATTICE_TOLERANCE_FRACTION = 1e-8  # largest distance of a pixel from the lattice, as a fraction of a wavelength
 
 
-# Multiply-adds are rounded once; nothing is reordered, NaN and infinity stay what they are. Division by zero gives
-# infinity as in NumPy: a check for it would keep loops from being vectorised.
+# Multiply-adds may be fused. Operations are not reordered, and NaN and infinity are preserved. Division by zero gives
+# infinity as in NumPy, because a check for it would prevent the vectorisation of loops.
 _compiled = njit(cache=True, fastmath={"contract"}, error_model="numpy")
 _parallel = njit(cache=True, fastmath={"contract"}, error_model="numpy", parallel=True)
 _F = np.float32
@@ -93,7 +93,7 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
     across = (grid[-1, 0] - origin) / max(1, lines - 1)
     along = (grid[0, -1] - origin) / max(1, count - 1)
     first = origin + np.arange(count)[:, None] * along
-    for top in range(0, lines, _TILE_ROWS):  # a few at a time: no second copy of the grid
+    for top in range(0, lines, _TILE_ROWS):  # a few lines at a time, to avoid a second copy of the grid
         rows = grid[top : top + _TILE_ROWS]
         line = np.arange(top, top + rows.shape[0])[:, None, None]
         if not np.abs(rows - first - line * across).max() <= tolerance:
@@ -159,14 +159,15 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
 def _neglected_phase(history: PhaseHistory, lattice: Lattice) -> float:
     """Upper bound of the phase of the fifth order, which the expansion of ranges along half a segment omits. [rad]
 
-    In units of the distance, |r + x e| has the coefficients (P_{n-2} - P_n)/(2n - 1), with Legendre polynomials P.
+    The expansion of |r + x·e|/|r| in powers of x/|r| has the coefficients (P_{n-2} - P_n)/(2n - 1), with the Legendre
+    polynomials P_n of the cosine between r and e.
     """
     centre, radius = lattice.disc()
     half = _SEGMENT_LENGTH / 2 * float(np.linalg.norm(lattice.along))
     total = 0.0
     for positions in (history.transmitter, history.receiver):
         nearest = float(np.linalg.norm(positions - centre, axis=1).min()) - radius
-        if nearest <= 2 * half:  # the orders do not fall off
+        if nearest <= 2 * half:  # the expansion does not converge fast enough
             return math.inf
         total += 2 / 9 * half**5 / nearest**4
     return 2 * math.pi * float(history.frequency.max()) / SPEED_OF_LIGHT_MPS * total
@@ -195,10 +196,10 @@ class _Needed(NamedTuple):
 
 
 def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats, pixels: int) -> _Needed | None:
-    """Part of the profiles that pixels between two range sums, (pulses,) [m], need.
+    """Part of each profile that is needed for pixels between the range sums `nearest` and `farthest`, (pulses,). [m]
 
-    None if it has too many samples for the number of pixels. A profile is periodic: if more samples are needed than
-    it has, they repeat.
+    None if this part has too many samples for the number of pixels. A profile is periodic. If more samples are needed
+    than it has, they repeat.
     """
     length = profile_length(history, _FFT_OVERSAMPLING_FACTOR)
     per_metre = cells_per_metre(history, length)
@@ -222,10 +223,10 @@ def _reference(history: PhaseHistory) -> Floats:
 
 
 def _kernel(offset: Floats) -> Floats:
-    """Exponential of a semicircle over ±_KERNEL_SAMPLES/2 cells, 1 at the centre.
+    """Interpolation kernel over ±_KERNEL_SAMPLES/2 cells: an exponential of a semicircle, 1 at the centre.
 
     Source: Barnett, Magland & af Klinteberg, "A parallel non-uniform fast Fourier transform library based on an
-    'exponential of semicircle' kernel", 2019; the shape parameter is their value for this oversampling.
+    'exponential of semicircle' kernel", 2019. The shape parameter is the value that they give for this oversampling.
     """
     shape = 0.976 * math.pi * _KERNEL_SAMPLES * (1 - 1 / (2 * _FFT_OVERSAMPLING_FACTOR))
     return np.exp(shape * (np.sqrt(np.clip(1 - (2 * offset / _KERNEL_SAMPLES) ** 2, 0.0, None)) - 1))
@@ -240,10 +241,10 @@ def _kernel_transform(angle: Floats) -> Floats:
 
 
 def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> Iterator[_Block]:
-    """Refine the needed part of each profile, for blocks of as many pulses as fit into a cache.
+    """Refine the part of each profile that the pixels need, in blocks of as many pulses as fit into a cache.
 
-    A patch is laid out in resolution cells, which may be a hundred times longer than wide. Its pixels need fewer
-    samples than a sphere around the patch.
+    The part is found from the pixels and not from a sphere around the patch. A resolution cell may be a hundred times
+    longer than wide, and a sphere around such cells would need many more samples.
     """
     length, factor, order = (
         profile_length(history, _FFT_OVERSAMPLING_FACTOR),
@@ -254,7 +255,7 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> I
     harmonic = harmonics(history)
     transform = _kernel_transform(2 * math.pi * harmonic / length)
     transform = transform * np.sinc(harmonic / (length * factor)) ** (order + 1)
-    # Weights of the taps for each of the positions between two samples.
+    # Kernel weights of all taps, for each refined position between two samples.
     offset = np.arange(factor) / factor - (np.arange(_KERNEL_SAMPLES)[:, None] - _KERNEL_SAMPLES // 2 + 1)
     weights = _kernel(offset).astype(np.float32)
     reference = _reference(history)
@@ -262,7 +263,7 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> I
     pulses = min(history.slow_time.size, max(1, int(_BLOCK_BYTES / (8 * count * factor + PROFILE_BYTES * length))))
     buffer = np.empty(
         (pulses, 2 * count * factor), dtype=np.float32
-    )  # shared by all blocks: a block is read before the next is made
+    )  # all blocks share it, because each block is used before the next is computed
     for start in range(0, history.slow_time.size, pulses):
         pulse_block = slice(start, start + pulses)
         profiles = range_profiles(history, length, transform, pulse_block)
@@ -299,7 +300,7 @@ def _refine(profiles, first, weights, refined):
                 refined[pulse, 2 * (n * factor + position) + 1] = im
 
 
-# Half a turn's sine over its angle and cosine, as polynomials of the squared angle in cycles, a bit beyond ±½.
+# sin(πx)/x and cos(πx) as polynomials of x², for |x| up to slightly more than ½.
 _SINE = tuple(
     Chebyshev.interpolate(lambda z: math.pi * np.sinc(np.sqrt(z)), 4, domain=[0, 0.27]).convert(kind=Polynomial).coef
 )
@@ -312,7 +313,7 @@ _C0, _C1, _C2, _C3, _C4 = (np.float32(c) for c in _COSINE)
 
 @_compiled
 def _phasor(cycles):
-    """exp(2πj·cycles) in single precision, as the square of exp(πj·cycles); |cycles| may slightly exceed ½."""
+    """Return exp(2πj·cycles) in single precision, as the square of exp(πj·cycles); |cycles| may slightly exceed ½."""
     z = cycles * cycles
     sine = cycles * (_S0 + z * (_S1 + z * (_S2 + z * (_S3 + z * _S4))))
     cosine = _C0 + z * (_C1 + z * (_C2 + z * (_C3 + z * _C4)))
@@ -321,9 +322,10 @@ def _phasor(cycles):
 
 @_compiled
 def _expand(middle, platform, along, ranges):
-    """Add the range from one platform to `ranges`: its value at the middle of each segment, and four further orders.
+    """Add the range from one platform to `ranges`, expanded to fourth order along each segment.
 
-    The orders are the coefficients of the expansion along the segment, per pixel.
+    Row 0 of `ranges` is the range at the middle of each segment. [m] Rows 1 to 4 are the coefficients of the powers
+    of the distance from the middle. [m/pixelⁿ]
     """
     px, py, pz = platform[0], platform[1], platform[2]
     ex, ey, ez = along[0], along[1], along[2]
@@ -393,8 +395,8 @@ def _cubic(v):
     return w0, w1, _F(1) - w0 - w1 - w3, w3
 
 
-# A separate loop: scattered loads next to arithmetic would keep the arithmetic from being vectorised. Neighbours are
-# read before the first is written, so that they are read at once.
+# This loop is separate, because scattered loads would prevent the vectorisation of arithmetic in the same loop. All
+# neighbours are read before the first is written, so that their loads can overlap.
 
 
 @_compiled
@@ -492,17 +494,17 @@ def _sums(points, transmitter, receiver, reference, sums):
 
 
 def _boxes(lines: Floats) -> tuple[Floats, Floats]:
-    """Boxes that enclose runs of successive points in each line (nx, ny, 3), oriented from first to last point.
+    """Boxes around runs of successive pixels in each line (nx, ny, 3), oriented from the first to the last pixel.
 
-    The boxes give the part of a range profile that a patch needs in a few steps. Finding it from the pixels
-    themselves would take as long as forming an image.
+    They show quickly which part of a range profile a patch needs. Finding this part from all pixels would take as
+    long as forming an image.
 
     Returns
     -------
     centres : (3, m) ndarray
-        [m]
+        Centres of the boxes. [m]
     halves : (m, 3, 3) ndarray
-        Half axes as rows. [m]
+        Half axes of each box, as rows. [m]
     """
     starts = np.arange(0, lines.shape[1], _RUN_LENGTH)
     ends = np.minimum(starts + _RUN_LENGTH, lines.shape[1]) - 1
@@ -525,7 +527,10 @@ def _boxes(lines: Floats) -> tuple[Floats, Floats]:
 
 @_compiled
 def _leg(position, box, centres):
-    """Distance from a platform to the middle of a box, and unit vector; the vector is 0 if the distance is 0."""
+    """Distance from a platform to the middle of a box [m], and the three components of the unit vector to it.
+
+    The unit vector is 0 if the distance is 0.
+    """
     x, y, z = centres[0, box] - position[0], centres[1, box] - position[1], centres[2, box] - position[2]
     distance = math.sqrt(x * x + y * y + z * z)
     scale = 1.0 / distance if distance > 0.0 else 0.0
@@ -534,7 +539,7 @@ def _leg(position, box, centres):
 
 @_compiled
 def _bend(distance, size):
-    """Upper bound of the error if a distance is approximated linearly up to `size` from a point. [m]"""
+    """Upper bound of the error of a linear approximation of `distance` for displacements up to `size`. [m]"""
     return min(size, size * size / (2.0 * (distance - size))) if distance > size else 2.0 * size
 
 
@@ -542,8 +547,8 @@ def _bend(distance, size):
 def _reach(transmitter, receiver, centres, halves):
     """Lower and upper bound of the range sum over all boxes, at each pulse. [m]
 
-    The range sum is convex, so it is above its tangent at the middle of a box, and exceeds the tangent by at most
-    r²/2R.
+    The range sum is convex. It is therefore nowhere below its tangent at the middle of a box. For each platform it
+    exceeds the tangent by at most `_bend`.
     """
     nearest, farthest = np.empty(transmitter.shape[0]), np.empty(transmitter.shape[0])
     for pulse in prange(transmitter.shape[0]):

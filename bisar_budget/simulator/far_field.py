@@ -1,4 +1,4 @@
-"""Image formation in the far field, with plane waves: the filter (7), (12), and the polar format (13), (14).
+"""Image formation with the plane waves of the far field: the filter (7), (12) and the polar format (13), (14).
 
 Both methods defocus and displace points away from the scene centre, because of the approximation (5).
 """
@@ -17,10 +17,10 @@ from bisar_budget.simulator.image_formation import direct_sum
 from bisar_budget.simulator.impulse_response import lagrange_weight
 from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory, look_sum
 
-_NUFFT_ERROR_FRACTION = 1e-8  # of the non-uniform FFT
-_SAMPLES_PER_GRID_CELL, _GRID_MARGIN_CELLS = 2, 10  # of the grid of a non-uniform FFT, along each axis
-_MAX_GRID_SAMPLES = 1 << 22  # samples of some 40 bytes each
-_STENCIL_SAMPLES = 12  # per interpolation
+_NUFFT_ERROR_FRACTION = 1e-8  # relative error of the non-uniform FFT
+_SAMPLES_PER_GRID_CELL, _GRID_MARGIN_CELLS = 2, 10  # FFT grid along each axis: samples per cell, and margin
+_MAX_GRID_SAMPLES = 1 << 22  # each sample takes about 40 bytes
+_STENCIL_SAMPLES = 12  # samples that one interpolation uses
 
 
 def far_field_filter(
@@ -78,8 +78,8 @@ def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: 
     """Sum of (7) by a non-uniform FFT; None if `bounded` and the grid of the FFT would be too large.
 
     The number of cells of the grid is the size of the box around the points times the size of the box around the
-    wavenumbers. Both boxes are along and across the look direction. Along other axes, the box of a patch whose cells
-    are kilometres wide would give millions of cells.
+    wavenumbers. Both boxes are along and across the look direction. With boxes along other axes, a patch with cells
+    that are kilometres long would need millions of grid cells.
     """
     import finufft
 
@@ -140,7 +140,7 @@ def polar_format(
         Number of pixels along x′ and y′. The pixels are those of `ground_grid(centre, look_azimuth, size, shape)`.
     centre : (2,) float
         Centre of the patch, east and north. [m] The phase of a plane wave at the centre is removed from the samples
-        before they are interpolated. This is (14) at other pixels, with the same approximation (5).
+        before they are interpolated. This is equivalent to (14) at shifted pixels, with the same approximation (5).
 
     Returns
     -------
@@ -150,7 +150,7 @@ def polar_format(
     ------
     ValueError
         The line of sight does not turn steadily over the aperture, no rectangle fits into the recorded frequencies,
-        or pixels are coarser than its resolution.
+        or the pixels are coarser than the resolution of the rectangle.
     """
     cosine, sine = math.cos(look_azimuth), math.sin(look_azimuth)
     east, north = look_sum(history.transmitter, history.receiver)[:, :2].T / 2
@@ -171,7 +171,7 @@ def polar_format(
         raise ValueError(
             f"polar format needs {_STENCIL_SAMPLES} frequencies or more, and x′ pointing at the platforms"
         )
-    # (13), f₀ projected. At a squint the projection of a frequency changes over the aperture.
+    # (13) with f₀ projected. With a squint, the projection of a frequency changes over the aperture.
     fx = _grid(low * along.max(), high * along.min(), SPEED_OF_LIGHT_MPS / (2 * size[0]))
     if not fx.size:
         raise ValueError(

@@ -1,8 +1,8 @@
-"""Image formers with a common interface: the pixels they use, where they show a point, and their baseband image.
+"""Image formers with a common interface: their pixels, the position where they show a point, and the baseband image.
 
 A former by exact ranges, (4), shows a point at the displaced point, and uses pixels along lines of equal range. A
 former by plane waves, (7) to (14), shows a point where plane waves have the recorded range history. It uses straight
-lines of pixels along the axes (x′, y′) of (10). Ground points are east and north. [m]
+lines of pixels along the axes (x′, y′) of (10). Ground points are given as east and north. [m]
 """
 
 import math
@@ -23,10 +23,10 @@ from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory
 
 IMAGE_FORMERS = ("backprojection", "polar_format", "matched_filter", "far_field")
 
-_HISTORY_ORDER = 8  # of the polynomials through range histories
+_HISTORY_ORDER = 8  # order of the polynomials that are fitted to range histories
 _PROGRESS_PIXELS_COUNT = 1 << 18  # pixels formed between two calls of the progress
-_TRIAL_PIXELS, _COMPILED_TRIAL_PIXELS = 1 << 10, 1 << 15  # of a timed trial
-_SECONDS_PER_SAMPLE = 3e-6  # of polar format or a non-uniform FFT to 1e-8, one core of 2024
+_TRIAL_PIXELS, _COMPILED_TRIAL_PIXELS = 1 << 10, 1 << 15  # pixels of a timed trial
+_SECONDS_PER_SAMPLE = 3e-6  # for polar format or a non-uniform FFT to 1e-8, on one core of 2024
 _DIRECT_BYTES = 30e6  # held by the sums over all pulses and frequencies for a block of pixels
 
 OnPixels = Callable[[int], None]
@@ -43,15 +43,18 @@ class ExactRangeFormer:
 
     @property
     def bytes_held(self) -> float:
-        """Memory in addition to the images and the phase history. [B]"""
+        """Memory that forming an image needs in addition to the images and the phase history. [B]"""
         return _DIRECT_BYTES if self.is_direct else bytes_held(self.kernel)
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
-        """Ground point at which the image shows a target; here the displaced point itself. [m]"""
+        """Ground point at which the image shows a target: for exact ranges, the displaced point itself. [m]"""
         return displaced
 
     def remaining_range(self, ground_point: GroundVector, remaining_range: Floats, recorded: Floats) -> Floats:
-        """Range history that remains at a ground point; here `remaining_range`, that at the displaced point. [m]"""
+        """Range history that remains for a target at `ground_point`. [m]
+
+        For exact ranges it is the argument `remaining_range`, the range history that remains at the displaced point.
+        """
         return remaining_range
 
     def cells(self, centre: GroundVector) -> tuple[float, float]:
@@ -118,7 +121,7 @@ class PlaneWaves:
         return math.atan2(self.middle[1], self.middle[0])
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
-        """Ground point for which the phase that plane waves (5) leave has the smallest variance. [m]"""
+        """Ground point with the smallest variance of the phase that remains in the plane-wave model (5). [m]"""
         slow_time, sampling = np.linspace(-1, 1, len(self.sight)), nodes(_HISTORY_ORDER + 1)
         fitted = np.polynomial.legendre.legfit(slow_time, np.c_[self.sight, recorded], _HISTORY_ORDER)
         *sight, error = np.polynomial.legendre.legval(sampling.places, fitted)[..., None]
@@ -157,7 +160,7 @@ class PlaneWaves:
         return ground_grid(centre, self.azimuth, size, shape)
 
     def image(self, history: PhaseHistory, grid: Floats, on_pixels: OnPixels) -> Complexes:
-        """Form the image at pixels (nx, ny, 3). The polar format takes only pixels from `grid`."""
+        """Form the image at pixels (nx, ny, 3). The polar format requires pixels that `grid` has returned."""
         if not self.is_polar:
             return _in_blocks(lambda block: far_field_filter(history, block) * self._carrier(block), grid, on_pixels)
         nx, ny = grid.shape[:2]
@@ -171,7 +174,10 @@ class PlaneWaves:
         return formed * self._carrier(grid)
 
     def seconds(self, trial_history: PhaseHistory, pulses: int, grid: Floats) -> float:
-        """Estimate the time to form an image; a Fourier transform uses each sample and each pixel a few times. [s]"""
+        """Estimate the time to form an image from the numbers of samples and pixels. [s]
+
+        A Fourier transform uses each of them only a few times.
+        """
         if not self.is_polar and not is_nonuniform():
             return _extrapolated(far_field_filter, trial_history, pulses, grid, _TRIAL_PIXELS)
         pixels = grid.shape[0] * grid.shape[1]

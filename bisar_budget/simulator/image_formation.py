@@ -16,10 +16,10 @@ from bisar_budget.memory import is_spacious
 from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory, is_even, split
 
 PROFILE_BYTES = 3 * 16  # per sample while a profile is formed: spectrum, profile and working memory of the FFT
-_SAMPLES_PER_RANGE_CELL = 16  # of a profile; the interpolation between them is exact to -119 dB
-_BLOCK_TERMS_COUNT = 1 << 20  # complex samples held at once
-_CACHED_PIXELS_COUNT = 1 << 13  # formed at once; their data stay in a processor's second cache
-_WORKING_BYTES = {"numpy": 30e6, "cubic": 110e6}  # beside data and image: working arrays, and compiled code itself
+_SAMPLES_PER_RANGE_CELL = 16  # profile samples per cell; interpolation between them has an error of -119 dB
+_BLOCK_TERMS_COUNT = 1 << 20  # complex samples in memory at once
+_CACHED_PIXELS_COUNT = 1 << 13  # pixels formed at once; their data fit into a processor's second cache
+_WORKING_BYTES = {"numpy": 30e6, "cubic": 110e6}  # in addition to data and image: work arrays, and the compiled code
 _SPACIOUS_BYTES = 3 * _WORKING_BYTES["cubic"]
 
 Kernel = Literal["auto", "numpy", "cubic", "linear"]
@@ -119,12 +119,15 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
 
 
 def kernel_within(memory_limit: float) -> Kernel:
-    """Choose the kernel for a memory limit. [B] The compiled kernel, whose code takes 60 MB, needs ample memory."""
+    """Choose the backprojection kernel that fits a memory limit. [B]
+
+    The compiled kernel is chosen only with ample memory, because its code takes 60 MB.
+    """
     return "cubic" if is_compiled() and memory_limit >= _SPACIOUS_BYTES else "numpy"
 
 
 def bytes_held(kernel: Kernel) -> float:
-    """Memory that backprojection needs in addition to data and image. [B]"""
+    """Memory that backprojection needs in addition to the phase history and the image. [B]"""
     return _WORKING_BYTES["numpy" if kernel == "numpy" else "cubic"]
 
 
@@ -143,7 +146,7 @@ def is_compiled() -> bool:
 def _backprojection(history: PhaseHistory, points: Floats) -> Complexes:
     axes = np.ascontiguousarray(np.reshape(points, (-1, 3)).T)
     length = profile_length(history, _SAMPLES_PER_RANGE_CELL)
-    transform = np.sinc(harmonics(history) / length) ** 4  # of a cubic B-spline
+    transform = np.sinc(harmonics(history) / length) ** 4  # Fourier transform of a cubic B-spline
     per_metre = cells_per_metre(history, length)
     carrier = 2 * math.pi * carrier_frequency(history) / SPEED_OF_LIGHT_MPS
     image: Complexes = np.zeros(axes.shape[1], dtype=complex)
@@ -166,9 +169,9 @@ def _backprojection(history: PhaseHistory, points: Floats) -> Complexes:
 
 
 def _read(spline: Complexes, cell: Floats) -> Complexes:
-    """Values of a cyclic cubic B-spline at any cells, (n,).
+    """Interpolate a periodic cubic B-spline at fractional sample positions `cell`, (n,).
 
-    `spline` (samples + 3,) are the samples, padded cyclically by one before and two after.
+    `spline` (samples + 3,) are the coefficients at the samples, extended periodically by one before and two after.
     """
     first = np.floor(cell)
     fraction = cell - first
@@ -204,19 +207,20 @@ def carrier_frequency(history: PhaseHistory) -> float:
 
 
 def range_profiles(history: PhaseHistory, length: int, transform: Floats, pulses: slice) -> Complexes:
-    """Range profiles of a slice of pulses: Σ S_k exp(+2πj k n/length), with k counted from the carrier.
+    """Range profiles of a slice of pulses: Σ S_k exp(+2πj k n/length), where k is the index from the carrier.
 
-    A profile is the sum of (4) over frequency, without the carrier, as a function of ΔR. It is oversampled, and later
-    interpolated by convolution with a short kernel. The spectrum is divided by the transform of this kernel first.
+    A profile is the sum of (4) over frequency, without the carrier, as a function of ΔR. It is oversampled, and is
+    later interpolated by convolution with a short kernel. The spectrum is therefore first divided by the transform of
+    this kernel.
 
     Parameters
     ----------
     history : PhaseHistory
-        Frequencies evenly spaced.
+        Phase history with evenly spaced frequencies.
     length : int
         Number of samples of a profile.
     transform : (frequencies,) ndarray
-        Fourier transform of the kernel that later interpolates the profile, at `harmonics`.
+        Fourier transform of the interpolation kernel, at the frequencies of `harmonics`.
     pulses : slice
         Pulses whose profiles are computed.
 

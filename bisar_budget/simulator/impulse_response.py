@@ -1,11 +1,13 @@
 """Measures of a point response: width, peak, and sidelobe ratios.
 
-A cut is a line of evenly spaced complex image samples that contains the full response. Sidelobes are counted outside
-a mask: a fixed mask, given by the first nulls of the error-free response, or one given by the nulls of the response
-itself. If an image is formed with a window, the nulls of the response itself hide a quadratic phase error, because
-the shoulder that the error raises merges with the mainlobe. Other tools count sidelobes only up to a distance from
-the peak. For example, perseo-quality takes its PSLR within five widths of the peak and its ISLR within ten. For a
-uniform aperture its ISLR is therefore -10.21 dB, not -9.68 dB.
+A cut is a line of evenly spaced complex image samples that contains the full response. Sidelobes are measured outside
+a mask around the mainlobe. The mask is either fixed, from the first nulls of the error-free response, or given by the
+nulls of the response itself. If an image is formed with a window, the nulls of the response itself hide a quadratic
+phase error, because the shoulder that the error raises merges with the mainlobe.
+
+Other tools measure sidelobes only up to a distance from the peak. For example, perseo-quality computes its PSLR
+within five widths of the peak and its ISLR within ten. For a uniform aperture its ISLR is therefore -10.21 dB, not
+-9.68 dB.
 """
 
 import math
@@ -18,18 +20,18 @@ from bisar_budget.simulator.phase_history import Complexes, Floats
 
 _FULL_WINDOW = slice(None), slice(None)
 _UPSAMPLING_FACTOR = 32
-_REACH_SAMPLES = 8  # on each side, from which values between samples are interpolated
-_KAISER_FACTOR = 12.0  # shape of the window; a line sampled three times per cell is then read to -110 dB
+_REACH_SAMPLES = 8  # samples on each side that an interpolation uses
+_KAISER_FACTOR = 12.0  # shape of the window; the error is -110 dB for three samples per cell
 _CHIP_UPSAMPLING_FACTOR = 8
-_BLOCK_COLUMNS = 512  # interpolated at once
-_MAX_ASCENT_STEPS = 50  # along x′ and y′ in turn
-_NARROWING_STEPS = 3  # after which a row is exact to some thousandths
+_BLOCK_COLUMNS = 512  # columns that are interpolated at once
+_MAX_ASCENT_STEPS = 50  # steps along x′ and y′ alternately
+_NARROWING_STEPS = 3  # steps after which a row is accurate to a few thousandths
 _PEAK_TOLERANCE_SAMPLES = 1e-4
-_GRID_SEARCH_STEPS = 8  # of Newton's method, towards the place of a point in a grid
+_GRID_SEARCH_STEPS = 8  # Newton steps that find a point in a grid
 _GRID_TOLERANCE_PX = 0.02  # pixels; last step of a search that has found its point
 _BLOCK_POINTS = 1 << 16  # read at once
 _IMAGE_UPSAMPLING_FACTOR = 2  # before the interpolation
-_TAPS_COUNT = 6  # with which a response sampled three times per cell is read to -70 dB
+_TAPS_COUNT = 6  # the error is -70 dB for three samples per cell
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,10 +53,10 @@ class ImpulseResponse:
 
 @dataclass(frozen=True, kw_only=True)
 class ImpulseResponse2D:
-    """Measures of a chip: two cuts through its peak, which is between samples, and the sidelobes of its full area.
+    """Measures of a chip: the two cuts through its interpolated peak, and the sidelobe ratios of its full area.
 
-    `peak_m` is relative to the middle sample of each axis. For `pslr_db` and `islr_db`, the mainlobe is the rectangle
-    given by `mask_m` of both cuts, and the sidelobes are the area outside it.
+    `peak_m` is the position relative to the middle sample of each axis. For `pslr_db` and `islr_db`, the mainlobe is
+    the rectangle given by `mask_m` of both cuts, and the sidelobes are the area outside it.
     """
 
     range_cut: ImpulseResponse
@@ -101,7 +103,7 @@ def _carrier_of(cut: Complexes) -> int:
 def _carrier(power: Floats) -> int:
     """FFT bin at the centre of gravity of power spectra, (lines, bins), computed on a circle.
 
-    It is opposite to the empty bins of the spectra.
+    The spectrum is periodic, so its empty bins are on the opposite side of the circle.
     """
     count = power.shape[1]
     turn = np.exp(2j * math.pi * np.arange(count) / count)
@@ -347,7 +349,10 @@ def between(values: Floats, row: Floats, column: Floats) -> Floats:
 
 
 def places_in(grid: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Fractional rows and columns of ground points (n, 2) in a grid (nx, ny, 2), each (n,); NaN outside."""
+    """Fractional rows and columns of ground points (n, 2) in a grid (nx, ny, 2), (n,) each.
+
+    They are NaN for points outside the grid.
+    """
     nx, ny = grid.shape[:2]
     middle = grid[nx // 2, ny // 2]
     steps = np.stack((np.gradient(grid, axis=0), np.gradient(grid, axis=1)), axis=-1)

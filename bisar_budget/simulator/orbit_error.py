@@ -1,7 +1,7 @@
 """Path error of a platform in free fall: the orbit from the measured state minus the orbit from the true state.
 
-Both orbits are integrated with the full law of gravity. The budget uses the linearised dynamics of `paths.free_fall`.
-The simulator checks the budget and therefore does not use them.
+Both orbits are integrated with the full law of gravity. The budget uses the linearised dynamics of `paths.free_fall`
+instead. The simulator does not use them, because it checks the budget.
 """
 
 import math
@@ -13,8 +13,8 @@ from bisar_budget.arrays import Floats
 from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2
 from bisar_budget.geometry import PlatformState
 
-_STEP_COUNT = 64  # of the method of Runge and Kutta, on each side of mid-aperture
-_ORDER = 14  # of the polynomial through the differences of both orbits
+_STEP_COUNT = 64  # Runge-Kutta steps on each side of mid-aperture
+_ORDER = 14  # order of the polynomial fitted to the differences of both orbits
 
 
 def orbit_error(
@@ -79,7 +79,7 @@ def orbit_error(
 
 
 def _turned_by(rotation: Floats, time: float) -> Floats:
-    """Rotation matrix (3, 3) of a rotation at the rate `rotation` for a time."""
+    """Rotation matrix (3, 3) for a rotation at the angular rate `rotation` [rad/s] during `time`. [s]"""
     rate = float(np.linalg.norm(rotation))
     if rate == 0:
         return np.eye(3)

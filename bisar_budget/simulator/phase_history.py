@@ -19,10 +19,10 @@ from bisar_budget.mission.model import Radar
 from bisar_budget.ranges.exact_ranges import ExactEffect, ExactRanges, followed
 from bisar_budget.simulator.orbit_error import orbit_error
 
-_BLOCK_SAMPLES = 1 << 18  # complex numbers held at once
-_MIN_SIGHT_RATIO = 1e-20  # square of the change of the range by a metre of a platform; a smaller square is rounding
-SMOOTH_ORDER = 12  # of the polynomial that is the smooth part of a history
-_FIT_ORDER = 12  # of the fit to samples anywhere over the aperture
+_BLOCK_SAMPLES = 1 << 18  # complex numbers in memory at once
+_MIN_SIGHT_RATIO = 1e-20  # square of the range change per metre of platform motion; less is rounding
+SMOOTH_ORDER = 12  # order of the polynomial that is the smooth part of an error history
+_FIT_ORDER = 12  # order of the polynomial fitted to samples at any times of the aperture
 _FREQUENCY_ROUNDING_FRACTION = 1e-14  # of a frequency: rounding of numpy.linspace
 
 Floats = NDArray[np.float64]
@@ -63,6 +63,11 @@ class Course:
             return values
         return np.stack([np.interp(slow_time, self.times, column) for column in self.values.T], axis=1)
 
+    def plus(self, other: "Course") -> "Course":
+        """Sum of two errors, at the times of both."""
+        times = np.union1d(self.times, other.times)
+        return Course(times, self.at(times) + other.at(times))
+
     def smooth(self, order: int = SMOOTH_ORDER) -> "Course":
         """Polynomial fitted to the values: the slow part of the error, which displaces and defocuses a response."""
         scaled_time = 2 * (self.times - self.times[0]) / (self.times[-1] - self.times[0]) - 1
@@ -84,7 +89,7 @@ class PathError(NamedTuple):
     The errors of position, velocity and acceleration are those at mid-aperture. For a platform in free fall they give
     the difference between two orbits; for any other platform they are a polynomial of time. `height` [m] is the
     height by which the scene is assumed too high. It moves the measured path up, and does not change an orbit.
-    `time_tag` [s] is the delay of a time tag: the measured position is the true position at a time later by the
+    `time_tag` [s] is the delay of the time tags: the measured position at a time τ is the true position at τ plus the
     delay. `wideband_rms` [m] is the RMS position noise of the pulses, white or within `wideband_band` (low, high)
     [Hz]. It requires a random generator.
     """
@@ -100,7 +105,7 @@ class PathError(NamedTuple):
     height: float = 0.0
 
     def slow(self) -> "PathError":
-        """The same error with its `course` replaced by the smooth part."""
+        """Return the same error with its `course` replaced by the smooth part."""
         return self if self.course is None else self._replace(course=self.course.smooth())
 
     def still(self) -> "PathError":
@@ -108,12 +113,13 @@ class PathError(NamedTuple):
         return self._replace(sinusoids=(), wideband_rms=0.0)
 
     def plus(self, other: "PathError") -> "PathError":
-        """Sum of the polynomial errors and of the time tags of two errors, without vibration."""
+        """Sum of two errors, without vibration."""
         position, velocity, acceleration = (
             (u[0] + v[0], u[1] + v[1], u[2] + v[2]) for u, v in zip(self[:3], other[:3], strict=True)
         )
         time_tag, height = self.time_tag + other.time_tag, self.height + other.height
-        return PathError(position, velocity, acceleration, time_tag=time_tag, height=height)
+        course = _sum(self.course, other.course)
+        return PathError(position, velocity, acceleration, course=course, time_tag=time_tag, height=height)
 
 
 class Errors(NamedTuple):
@@ -135,7 +141,7 @@ class Errors(NamedTuple):
         return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
 
     def smooth(self) -> "Errors":
-        """The same errors without vibration, and with each error over time replaced by its smooth part."""
+        """Return the same errors without vibration, and with each error over time replaced by its smooth part."""
         return self.slow().still()
 
     def still(self) -> "Errors":
@@ -143,9 +149,9 @@ class Errors(NamedTuple):
         return self._replace(transmitter=self.transmitter.still(), receiver=self.receiver.still())
 
     def slow(self) -> "Errors":
-        """The same errors, with each error over time replaced by its smooth part.
+        """Return the same errors with each error over time replaced by its smooth part.
 
-        Noise would distort a phase that is computed from a few nodes only.
+        Noise would distort a phase that is computed from only a few nodes.
         """
         return self._replace(
             transmitter=self.transmitter.slow(),
@@ -156,15 +162,22 @@ class Errors(NamedTuple):
 
 
 def superposed(errors_of_sources: Iterable[Errors]) -> Errors:
-    """Sum of several polynomial errors, without vibration, such as those of several sources."""
+    """Sum of the errors of several sources, without vibration."""
     total = Errors()
     for errors in errors_of_sources:
         total = Errors(
             transmitter=total.transmitter.plus(errors.transmitter),
             receiver=total.receiver.plus(errors.receiver),
             clock=tuple(a + b for a, b in zip(total.clock, errors.clock, strict=True)),
+            clock_course=_sum(total.clock_course, errors.clock_course),
+            electrons=_sum(total.electrons, errors.electrons),
         )
     return total
+
+
+def _sum(course: Course | None, other: Course | None) -> Course | None:
+    """Sum of two errors over time, either of which may be missing."""
+    return course.plus(other) if course is not None and other is not None else course or other
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -182,10 +195,10 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """Paths of both platforms at some slow times, and the clock error at these times, (times,). [s]
+    """Paths of both platforms at a set of slow times, and the clock errors at these times, (times,). [s]
 
-    `electrons` is the delay by free electrons at a frequency of 1 Hz, or None. [s·Hz²] `seen` is the clock error that
-    has the same effect at the centre frequency as the clock error and the electrons together. [s]
+    `electrons` is the delay by free electrons at a frequency of 1 Hz, or None. [s·Hz²] `seen` is a clock error that
+    has the same effect at the centre frequency as `clock` and the electrons together. [s]
     """
 
     transmitter: Path
@@ -240,8 +253,9 @@ class Flight:
 class PhaseHistory:
     """Received samples after motion compensation to the scene centre, with the measured paths.
 
-    `samples` is (pulses, frequencies). `slow_time` [s] and `frequency` [Hz] are evenly spaced. `transmitter` and
-    `receiver` are the measured positions, (pulses, 3). [m]
+    `samples` is (pulses, frequencies). `slow_time` [s] is the time of each pulse, and `frequency` [Hz] the frequency
+    of each sample. Backprojection and the polar format need evenly spaced frequencies. `transmitter` and `receiver`
+    are the measured positions, (pulses, 3). [m]
     """
 
     samples: Complexes
@@ -266,17 +280,17 @@ def cell_centres(length: float, count: int) -> Floats:
 
 
 def is_even(frequency: Floats) -> bool:
-    """Whether frequencies are evenly spaced except for rounding, which has no effect within kilometres of range."""
+    """Whether frequencies are evenly spaced except for rounding, which is negligible within kilometres of range."""
     return frequency.size > 2 and float(np.ptp(np.diff(frequency))) <= _FREQUENCY_ROUNDING_FRACTION * float(
         np.abs(frequency).max()
     )
 
 
 def split(wavenumber: Floats) -> tuple[Floats, Floats]:
-    """Split evenly spaced wavenumbers into coarse and fine wavenumbers whose sums, row by row, give them.
+    """Split evenly spaced wavenumbers into coarse and fine wavenumbers; the sums of all pairs are the given ones.
 
-    The last row may extend beyond the given wavenumbers. The phasor of a sum is a product of phasors, so n
-    wavenumbers need only 2√n exponentials.
+    The sums are in the given order, row by row. The last row may extend beyond the given wavenumbers. The phasor of a
+    sum is a product of phasors, so n wavenumbers need only 2√n exponentials.
     """
     fine = math.isqrt(wavenumber.size - 1) + 1
     coarse = -(-wavenumber.size // fine)
@@ -300,11 +314,12 @@ def path(
     slow_time : (pulses,) ndarray
         Slow times of the pulses. [s]
     error : PathError, optional
-        Error of the measured path. None is no error.
+        Error of the measured path. None means no error.
     rng : numpy Generator, optional
         Random generator, required for wideband vibration only.
     way : (pulses, 3) ndarray, optional
-        Displacement per metre of noise and of vibrations without an axis. [m/m] None is along the line of sight.
+        Displacement per metre of noise and of vibrations without an axis. [m/m] If None, the displacement is along
+        the line of sight.
 
     Raises
     ------
@@ -354,7 +369,7 @@ def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.G
     step = float(slow_time[1] - slow_time[0])
     frequency = np.fft.rfftfreq(slow_time.size, step)
     inside = (frequency >= band[0]) & (frequency <= band[1])
-    # Each frequency is two of the full spectrum, except zero and, for an even number of pulses, the highest.
+    # Each frequency is two bins of the full spectrum, except zero and, for an even number of pulses, the highest.
     bin_count = np.full(frequency.size, 2.0)
     bin_count[0] = 1.0
     bin_count[-1] = 2.0 if slow_time.size % 2 else 1.0
@@ -369,11 +384,11 @@ def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.G
 
 
 def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Floats, Floats]:
-    """Shortest displacements of both platforms that change the range minus the direct path by one metre. [m/m]
+    """Shortest displacements of each platform that change the range minus the baseline by one metre. [m/m]
 
-    Each is (pulses, 3). That of the transmitter is along u_t − b and that of the receiver along u_r + b, where u is
-    the line of sight and b the unit vector from receiver to transmitter. It is zero for a platform that cannot change
-    the difference.
+    The baseline is the length of the direct path. Both results are (pulses, 3). The displacement of the transmitter
+    is along u_t − b, and that of the receiver along u_r + b, where u is the line of sight and b the unit vector from
+    receiver to transmitter. It is zero for a platform that cannot change the difference.
     """
     platforms = (
         PlatformState(position=platform.place(slow_time), velocity=platform.velocity) for platform in geometry.both
@@ -531,6 +546,6 @@ def _columns(positions: Floats) -> VectorArrays:
 
 
 def _sampling(nodes: Floats) -> Sampling:
-    """Sampling at any nodes in −1 … 1, with the weights of a polynomial fitted to the samples."""
+    """Sampling at arbitrary positions in −1 … 1, with weights from a polynomial that is fitted to the samples."""
     legendre = np.polynomial.legendre.legvander(nodes, min(_FIT_ORDER, max(3, nodes.size // 4)))
     return Sampling(nodes, LEGENDRE_LEADING[:, None] * np.linalg.pinv(legendre)[:4])

@@ -13,12 +13,13 @@ from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.combined import correlated_errors, likely_error
 from bisar_budget.effects.effect import PLATFORMS, LinePiece, gradients_of, indicated_point
 from bisar_budget.effects.vibration import counted, lines_of, sight_of
-from bisar_budget.geometry import GroundVector, PlatformState, dot, plain_vector
+from bisar_budget.geometry import GroundVector, dot
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError as DeclaredError
 from bisar_budget.ranges.exact_ranges import ExactEffect
 from bisar_budget.simulator.autofocus import ALGORITHMS
 from bisar_budget.simulator.collection import PointCollection, RangeLines
+from bisar_budget.simulator.flown_errors import flown_together
 from bisar_budget.simulator.former import IMAGE_FORMERS, ExactRangeFormer, Former, PlaneWaves
 from bisar_budget.simulator.image_formation import ground_grid
 from bisar_budget.simulator.impulse_response import (
@@ -40,45 +41,46 @@ from bisar_budget.simulator.phase_history import (
     ReceiverNoise,
     cell_centres,
     look_sum,
+    superposed,
 )
 from bisar_budget.simulator.realisations import drawn_errors, oscillator_sinusoids
 from bisar_budget.simulator.targets import Target, Targets
 from bisar_budget.workers import Progress, unseen
 
-_MARGIN_CELLS = 16  # of the patch beyond the smear, on each side
+_MARGIN_CELLS = 16  # cells of the patch beyond the smear, on each side
 _SAMPLES_PER_CELL = 3
 _MIN_PULSES, _MAX_PULSES = 256, 1 << 15
 _MIN_FREQUENCY_COUNT = 64
-_TRIAL_PULSES = 64  # pulses of the trial that foresees the time
-_MAX_ECHO_CELLS = 256  # from the peak; paired echoes farther away are named, not shown
-_SCENE_PIXELS = 1 << 18  # of the image in (x, y)
+_TRIAL_PULSES = 64  # pulses of the trial that estimates the time
+_MAX_ECHO_CELLS = 256  # largest distance of a paired echo that the patch includes; echoes farther away are only named
+_SCENE_PIXELS = 1 << 18  # largest number of pixels of the image in (x, y)
 _BYTES_PER_SCENE_PIXEL = 16 * 8  # in (x, y): image and grid, the image rotated back, and all of them in an archive
 _BYTES_PER_ROTATED_PIXEL = 16 * 16  # grid, three images, and one image within autofocus and interpolation
 _BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
-_SEPARATE_RANGE_CELLS = 3.0  # targets nearer in range share a line with a target's response
-_MIN_WINDOW_CELLS = 6  # half width of a target's response across
-_BLUR_COLUMNS_PER_LINE = 6  # blur of a point beyond a patch of finer pixels, for each line of its distance
-_MIN_HEIGHT_FRACTION = 0.5  # of a target's height that its place shows; else the patch does not reach the target
-_LINE_UPSAMPLING_FACTOR = 16  # interpolation of a line, whose highest sample is then exact to 1e-3 dB
-_CLUTTER_STREAM_INDEX = 1  # beside the file's seed, so that clutter changes no noise
+_SEPARATE_RANGE_CELLS = 3.0  # responses of targets that are nearer in range overlap
+_MIN_WINDOW_CELLS = 6  # half width of a target's response in cross-range
+_BLUR_COLUMNS_PER_LINE = 6  # blur of a point outside a patch of finer pixels, per line of distance
+_MIN_HEIGHT_FRACTION = 0.5  # smallest peak at a target's position; with less, the patch does not contain the target
+_LINE_UPSAMPLING_FACTOR = 16  # interpolation after which the highest sample is accurate to 1e-3 dB
+_CLUTTER_STREAM_INDEX = 1  # used with the file's seed, so that clutter does not change the noise
 
 
 A_POINT = Targets()  # at the scene centre
 
 
 class SimulationError(Exception):
-    """An image cannot be formed as requested; the message says what to change."""
+    """The images cannot be formed as requested. The message says what the user should change."""
 
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """Appearance of one target in the images.
+    """Position and measures of one target in the images.
 
-    `effect` is the effect of the errors by exact ranges, with the displacement relative to the target. The image
-    former shows the target at `shown` in the rotated images and at `shown_in_scene` in the image along (x, y), east
-    and north. [m] `clean`, `smeared` and `focused` are measures of the cross-range cuts through the target in the
-    image without errors, the image with errors and the image after autofocus; None where neighbours cover the
-    response.
+    `effect` is the effect of the errors, computed from exact ranges, with the displacement relative to the target.
+    The image former shows the target at `shown` in the rotated images and at `shown_in_scene` in the image along (x,
+    y), east and north. [m] `clean`, `smeared` and `focused` are measures of the cross-range cuts through the target
+    in the image without errors, the image with errors and the image after autofocus. They are None where neighbours
+    cover the response.
     """
 
     target: Target
@@ -107,9 +109,9 @@ class PointImages(NamedTuple):
     gradients that `points_by` names. By (25), the image of the scene centre is at the middle one of these points.
 
     `responses` has one entry for each target. `clean_response`, `response` and `focused_response` are cuts through
-    the peaks of the brightest target. `rows` are the rows of these peaks in the images. `misread_db` is the error by
-    which a single point without errors is measured too high because its pixels do not sample it well enough; NaN if
-    unknown. `outside` names the declared paired echoes that are beyond the patch.
+    the peaks of the brightest target. `rows` are the rows of these peaks in the images. `misread_db` is the error of
+    the measured peak of a single point without errors, which is too high if the pixels do not sample the response
+    well enough; NaN if unknown. [dB] `outside` names the declared paired echoes that are beyond the patch.
     """
 
     slow_time: Floats
@@ -307,7 +309,10 @@ def simulate_point(
     formed, windows = (error_free, rotated, focused), [_window(plan, cells, index) for index in range(len(shown))]
 
     def rows_of(index: int) -> tuple[float, ...]:
-        """Rows of the peaks of a target, one for each image. With errors a target is in focus at another range."""
+        """Rows of the peaks of a target, one for each image.
+
+        The rows differ, because with errors a target is in focus at another range.
+        """
         smeared_rows = [row_of_peak(image, windows[index]) for image in formed[1:]]
         if isinstance(former, ExactRangeFormer):
             return (
@@ -332,8 +337,8 @@ def simulate_point(
             upsampled(line_at(error_free, row_of_peak(error_free)), _LINE_UPSAMPLING_FACTOR)
         ).max()
         misread_db = 20 * math.log10(highest_sample / heights[0])
-    # Figure 3 shows the range error without constant and linear part, from mid-aperture; (29) takes all of the range
-    # error, from the displaced point.
+    # Figure 3 shows the range error without its constant and linear part at mid-aperture. (29) uses the full range
+    # error, relative to the displaced point.
     slope = np.gradient(remaining_range, fine)
     curved_range_error = remaining_range - remaining_range[fine.size // 2] - slope[fine.size // 2] * fine
     times = np.array([-T / 3, 0.0, T / 3])  # centres of three sub-apertures
@@ -380,58 +385,24 @@ def declared_errors(mission: Mission) -> Errors:
 
     A covariance has no sign: its error is the most probable error whose quadratic phase is one sigma.
     """
-    analysis, factor, common = Analysis(mission), mission.allocation.coverage_factor, mission.common_motion_error
-    errors = drawn_errors(analysis)
-    sources = {source.id: source for source in analysis.sources}
-    likely_errors = {
-        group.platform: likely_error(group, [sources[row_id] for row_id in group.ids])
-        for group in correlated_errors(mission)
-    }
+    analysis = Analysis(mission)
+    sizes = {source.id: source.declared for source in analysis.stated if source.displaces}
+    sources = {source.id: source for source in analysis.stated}
+    for group in correlated_errors(mission):
+        likely_sizes = likely_error(group, [sources[row_id] for row_id in group.ids])
+        sizes |= dict(zip(group.ids, likely_sizes, strict=True))
+    declared = [(sources[row_id], size) for row_id, size in sizes.items()]
+    of_known_motion = flown_together(declared, mission.geometry, mission.collection.aperture_time)
+    errors = superposed((of_known_motion, drawn_errors(analysis)))
     for name in PLATFORMS:
-        declared: DeclaredError = getattr(mission.platforms, name).motion_error
-        state = getattr(mission.geometry, name)
-        error = _turned((declared.position, declared.velocity, declared.acceleration), state, declared.frame, factor)
-        error = error._replace(time_tag=factor * (declared.time_tag or 0.0))
-        if name in likely_errors:
-            likely_vectors = (likely_errors[name][:3], likely_errors[name][3:])
-            likely_path_error = _turned(likely_vectors, state, declared.frame, 1.0)
-            error = likely_path_error._replace(acceleration=error.acceleration)
-        if common is not None:
-            common_vectors = (common.position, common.velocity, common.acceleration)
-            common_error = _turned(common_vectors, state, common.frame, factor)
-            error = error.plus(common_error._replace(time_tag=factor * (common.time_tag or 0.0)))
-        if mission.scene.height_error:  # a higher scene: both platforms are measured too high
-            error = error.plus(PathError(height=mission.scene.height_error))
-        wideband = declared.vibration.wideband
+        wideband = getattr(mission.platforms, name).motion_error.vibration.wideband
+        error: PathError = getattr(errors, name)
         error = error._replace(
             sinusoids=_sinusoids(mission, name),
             wideband_rms=float(counted(mission, name, wideband.rms, "islr") if wideband else 0.0),
-            course=getattr(errors, name).course,
         )
         errors = errors.of(name, error)
-    clock_terms = [
-        [source.declared * term for term in source.clock] for source in analysis.stated if source.clock is not None
-    ]
-    return errors._replace(clock=tuple(map(math.fsum, zip((0.0,) * 4, *clock_terms, strict=True))))
-
-
-def _turned(vectors: Sequence[Sequence[float] | None], state: PlatformState, frame: str, factor: float) -> PathError:
-    """Turn position, velocity and acceleration errors from the axes of a frame to the axes of the scene.
-
-    The errors keep their signs and are multiplied by `factor`. For a platform in free fall, a velocity error in the
-    frame `ric` is relative to the stars and is converted to the rate of the position error in the scene's axes, which
-    turn with the Earth. In all other frames, a velocity error already is this rate.
-    """
-    axes, turned = state.frame(frame), []
-    for vector in vectors:
-        components = (0.0, 0.0, 0.0) if vector is None else vector
-        x, y, z = (factor * sum(d * axis[i] for d, axis in zip(components, axes, strict=True)) for i in range(3))
-        turned.append(plain_vector((x, y, z)))
-    position, velocity, acceleration = (*turned, (0.0, 0.0, 0.0))[:3]
-    if frame == "ric" and state.fall is not None:
-        u, v, w = (a + b for a, b in zip(velocity, state.fall.rate_against_stars(position), strict=True))
-        velocity = plain_vector((u, v, w))
-    return PathError(position, velocity, acceleration)
+    return errors
 
 
 def _formers(
@@ -448,7 +419,7 @@ def _formers(
 
 
 def _middle(points: Sequence[GroundVector] | Floats) -> GroundVector:
-    """Centre of the box around ground points; a patch is centred there."""
+    """Centre of the smallest box around ground points, used as the centre of a patch. [m]"""
     low, high = np.min(points, axis=0), np.max(points, axis=0)
     return float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2
 
@@ -471,7 +442,7 @@ def _plan(
     centre, scene_centre = _middle(shown), _middle(scene_shown)
     cell, scene_cell = former.sampled(centre), scene_former.sampled(scene_centre)
     finer = former.cells(centre)[0] / cell[0]
-    # Cycles over the aperture are cells of cross range. The walk of the range error is in cells of c/B.
+    # One cycle over the aperture is one cell in cross-range. The walk of the range error is in cells of c/B.
     reach = float(np.abs(slope).max()) * T / radar.wavelength
     time = cell_centres(T, remaining_range.size)
     walk = float(np.abs(remaining_range - slope * time).max()) * radar.bandwidth / SPEED_OF_LIGHT_MPS
@@ -507,13 +478,13 @@ def _plan(
         1.0,
         math.sqrt(_SCENE_PIXELS / (_SAMPLES_PER_CELL**2 * extent**2 * samples_per_metre[0] * samples_per_metre[1])),
     )
-    # All targets with the ends of their responses, even if the patch then exceeds the cap.
+    # The patch includes all targets with the ends of their responses, even if it then exceeds the cap.
     targets_extent = 2 * float(np.abs(scene_shown - scene_centre).max())
     extent = max(capped, min(extent, targets_extent + _MARGIN_CELLS * max(scene_cell))) if targets_extent else capped
     shape = tuple(2 * math.ceil(_SAMPLES_PER_CELL * extent * density / 2) for density in samples_per_metre)
     in_scene = Patch((shape[0], shape[1]), (extent / shape[0], extent / shape[1]))
-    # Twice the frequencies that keep a profile from repeating within a patch: over its range cells and the range walk
-    # of its cross-range cells.
+    # Twice the number of frequencies for which a profile does not repeat within a patch, including its range cells
+    # and the range walk of its cross-range cells.
     relative = radar.bandwidth / radar.center_frequency
     diagonal = extent * (cosine + sine)
     longest = max(
@@ -527,12 +498,15 @@ def _plan(
 
 
 def _flown_lines(mission: Mission) -> list[PathSinusoid]:
-    """Declared vibrations of both platforms, and motions with the phases that they cause in oscillators."""
+    """Sinusoidal motions of both platforms: declared vibrations, and motions equivalent to oscillator phases.
+
+    An equivalent motion causes the same phase as an oscillator that vibrates with its platform.
+    """
     return [line for name in PLATFORMS for line in _sinusoids(mission, name) if line.amplitude]
 
 
 def _sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
-    """Declared vibrations of one platform, and motions with the phases that they cause in its oscillator."""
+    """Sinusoidal motions of one platform: declared vibrations, and motions equivalent to its oscillator's phases."""
     count = len(getattr(mission.platforms, name).motion_error.vibration.sinusoidal)
     declared_lines = (line for entry in range(count) for line in sinusoids_of(mission, name, entry))
     return (*declared_lines, *oscillator_sinusoids(mission, name))
@@ -558,8 +532,8 @@ def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
 def pulses_for(mission: Mission, cells: int) -> int:
     """Number of pulses that samples the patch and every declared vibration without aliasing.
 
-    Without `collection.pulses` it is at least two per resolution cell and four per cycle of vibration. A
-    `SimulationError` reports if the declared number is too small, or the necessary number too large.
+    Without `collection.pulses` it is at least two per resolution cell and four per cycle of vibration. Raises a
+    `SimulationError` if the declared number is too small, or if the necessary number is too large.
     """
     pulses = mission.collection.pulses
     cycles = max((line.frequency for line in _flown_lines(mission)), default=0.0) * mission.collection.aperture_time
@@ -602,14 +576,15 @@ def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> t
     """Random scatterers of clutter over a patch: positions (n, 2) [m] and circular normal amplitudes (n,).
 
     There is one scatterer for each resolution cell. The area of a cell is the energy of a response whose peak is 1,
-    so `level_db` is the mean power of a pixel. A patch of finer pixels is narrower than a range cell. Scatterers up
-    to a range cell beyond the patch then contribute to it, out of focus by some cells across for each finer line.
+    so `level_db` is the mean power of a pixel. If a range cell has `finer` times more pixels than a cross-range cell,
+    scatterers up to a range cell beyond the patch also contribute to it. They are out of focus: their blur in
+    cross-range grows by some cells for each line of distance.
     """
     if level_db is None:
         return np.empty((0, 2)), np.empty(0, dtype=complex)
     rng = np.random.default_rng([seed, _CLUTTER_STREAM_INDEX])
     nx, ny = grid.shape[:2]
-    margin_rows = min(_SAMPLES_PER_CELL * (finer - 1), 2 * nx)  # farther away, lines cannot be continued
+    margin_rows = min(_SAMPLES_PER_CELL * (finer - 1), 2 * nx)  # the grid cannot be extrapolated farther
     margin_columns = _BLUR_COLUMNS_PER_LINE * margin_rows
     count = round((nx - 1 + 2 * margin_rows) * (ny - 1 + 2 * margin_columns) / (_SAMPLES_PER_CELL**2 * finer))
     row, column = (
@@ -621,7 +596,7 @@ def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> t
 
 
 def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
-    """Rows and columns of the rotated patch around a target, as far as halfway to the nearest other target."""
+    """Rows and columns of the rotated patch around a target, up to halfway to the nearest other target."""
     distances = np.abs(cells - cells[index])
     neighbours = distances[(distances[:, 0] < 2 * _SEPARATE_RANGE_CELLS) & (distances[:, 1] > 0), 1]
     reach = plan.own_cells // 2 if len(cells) > 1 else plan.rotated.shape[1]
@@ -638,9 +613,9 @@ def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
 def _cuts(
     images: Sequence[Complexes], rows: Sequence[float], columns: slice, spacing: float, amplitude: float
 ) -> list[ImpulseResponse | None]:
-    """Measures of a target in each image, with the mask from the first image, which is error-free.
+    """Measures of a target in each image, with the mask from the first image, which has no errors.
 
-    The entry of an image is None if the target cannot be measured there.
+    The entry is None for an image in which the target cannot be measured.
     """
     measures: list[ImpulseResponse | None] = []
     mask = None

@@ -1,8 +1,8 @@
 """Random time series of the errors of sensors, clocks and the atmosphere within one aperture.
 
 The time series check the formulas of the budget and do not use them. Random walks are sums of steps. Correlated noise
-is computed by its recursion. Phase noise is a sum of tones. Synchronisation joins samples of the phase noise by
-straight lines.
+is computed by its recursion. Phase noise is a sum of tones. Synchronisation subtracts the straight lines between
+samples of the phase noise.
 """
 
 import math
@@ -44,32 +44,32 @@ from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.propagation import DELAYS
 from bisar_budget.simulator.phase_history import Complexes, Course, Errors, Floats, PathError, PathSinusoid
 
-_WALK_STEPS = 512  # in which a walk is summed from mid-aperture to the end of the aperture
-_SLOW_TONES_COUNT = 80  # at logarithmic distances, below one cycle per two apertures
-_MIN_CYCLES_PER_APERTURE = 1e-4  # of a tone; the quadratic phase of a slower tone is negligible
-_PERIOD_FACTOR = 4  # period after which phase noise repeats, over the aperture
-_AGE_CYCLES, _TONES_PER_AGE_CYCLE = 24, 8  # cycles within the age of a setting up to which tones are the same
-_MAX_AVERAGING_CYCLES = 256  # of a tone within an averaging; a faster tone leaves nothing in the fitted line
-_SAMPLES_PER_CYCLE = 8  # of the fastest flown tone; samples are joined by straight lines
+_WALK_STEPS = 512  # steps of a random walk from mid-aperture to the end of the aperture
+_SLOW_TONES_COUNT = 80  # tones at logarithmic steps, below one cycle per two apertures
+_MIN_CYCLES_PER_APERTURE = 1e-4  # of the slowest tone; the quadratic phase of slower tones is negligible
+_PERIOD_FACTOR = 4  # ratio of the period of the phase noise to the aperture time
+_AGE_CYCLES, _TONES_PER_AGE_CYCLE = 24, 8  # tones up to this many cycles in a setting's age are common to both
+_MAX_AVERAGING_CYCLES = 256  # of a tone within the averaging time; faster tones do not change the fitted line
+_SAMPLES_PER_CYCLE = 8  # of the fastest simulated tone; samples are interpolated linearly
 _MAX_TONES_COUNT = 1 << 18
-_NARROW_COUNT, _TONES_PER_NARROW_PIECE = 4, 8  # evenly spaced tones in a piece below which the piece is narrow
+_NARROW_COUNT, _TONES_PER_NARROW_PIECE = 4, 8  # a piece with fewer evenly spaced tones is narrow
 _BLOCK_COUNT = 1 << 20  # random numbers drawn at once
-_FAR_FACTOR = 32  # interval of exchanges over the aperture beyond which tones of one cycle are independent
-_MIN_EXCHANGES_COUNT = 4  # in a period of tones: the exchanges on either side of an aperture differ
-_MAX_EXCHANGES_COUNT = 1 << 13  # drawn in an aperture
-_COURSE_SAMPLES = 4097  # of a flown time series
-_MAX_FLOWN_STEPS = 1 << 19  # of phase noise; with more, fast tones are joined by straight lines
+_FAR_FACTOR = 32  # exchange interval in apertures; tones are independent at longer ones
+_MIN_EXCHANGES_COUNT = 4  # in a period of the tones, so that the exchanges before and after an aperture differ
+_MAX_EXCHANGES_COUNT = 1 << 13  # largest number that is drawn in an aperture
+_COURSE_SAMPLES = 4097  # samples of a simulated time series
+_MAX_FLOWN_STEPS = 1 << 19  # of phase noise; beyond, fast tones are interpolated linearly
 
 
 def position_courses(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, Floats]:
-    """Random position errors from one sensor, for one sigma of the declared size, by the name of the platform.
+    """Random position errors that one sensor causes, for one sigma of the declared size.
 
-    Each is (draws, times, 3): east, north, up. [m] An error that is common to both platforms uses the same random
-    numbers along the axes of each. The error is one of an inertial sensor, of a lever arm, or correlated noise. Its
-    `declared` may be any size; the mission gives the sizes along each axis. `times` (times,) are slow times within
-    the aperture. [s]
+    The keys are the names of the platforms. The values are (draws, times, 3): east, north, up. [m] The error is an
+    error of an inertial sensor or of a lever arm, or correlated noise. If it is common to both platforms, both use
+    the same random numbers along their axes. `declared` only scales the result: the ratios between the axes are those
+    of the mission. `times` (times,) are slow times within the aperture. [s]
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     courses = {}
@@ -81,14 +81,14 @@ def position_courses(
     return courses
 
 
-# Pairs of drawn numbers, (draws, times), and the motion of a platform by a unit of them, (3,) or (times, 3).
+# Pairs of a random series, (draws, times), and the motion of a platform per unit of it, (3,) or (times, 3).
 _Motions = list[tuple[Floats, Floats]]
 
 
 def _drawn_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Random series and directions of the motion of each platform, for one unit along the largest axis."""
+    """Random series and directions of the motion of each platform, for a unit error along its largest axis."""
     kind, figure = error.subject.kind, error.subject.axis
     if kind in CORRELATED:
         process = process_of(mission, error)
@@ -204,7 +204,7 @@ def drawn_errors(analysis: Analysis) -> Errors:
     phase: Floats = np.zeros(noise_times.size)
     air = dict.fromkeys(DELAYS, np.zeros(times.size))
     for error in analysis.random:
-        if not error.declared or error.counted_in or error.subject.kind == "other":  # stated only by its effect
+        if not error.declared or error.counted_in or error.subject.kind == "other":  # declared only by its effect
             continue
         rng = np.random.default_rng([seed, *error.id.encode()])
         if error.subject.kind in MOVING:
@@ -250,9 +250,9 @@ _Draw = Callable[[Floats, int, np.random.Generator], tuple[Floats, Floats]]
 
 
 def _biased(order: int) -> _Draw:
-    """Return a function that draws the position error from a constant bias, and the tilt from the bias.
+    """Return a function that draws the position error caused by a constant bias, and the tilt caused by the bias.
 
-    The position error is the bias times τⁿ/n!, with n = `order`. The tilt has two integrals fewer.
+    The position error is the bias times τⁿ/n!, with n = `order`. The tilt is the bias times τ^(n−2).
     """
 
     def draw(times: Floats, draws: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
@@ -263,9 +263,10 @@ def _biased(order: int) -> _Draw:
 
 
 def _walk(integrals: int) -> _Draw:
-    """Return a function that draws white noise integrated `integrals` times, and the same noise integrated once.
+    """Return a function that draws a position error and a tilt, both of which are integrals of white noise.
 
-    The integrals start at mid-aperture. The noise before and after mid-aperture is independent.
+    The position error is the noise integrated `integrals` times, and the tilt is the same noise integrated once. The
+    integrals start at mid-aperture. The noise before and after mid-aperture is independent.
     """
 
     def draw(times: Floats, draws: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
@@ -299,7 +300,7 @@ def _correlated(correlation_time: float, times: Floats, draws: int, rng: np.rand
     return noise.T
 
 
-# By figure: draws of the position error by a unit of acceleration, of its rate or of its noise, and of the tilt.
+# For each figure of merit: function that draws the position error and the tilt per unit of the figure.
 _INERTIAL_DRAWS = {
     "accelerometer_bias": _biased(2),
     "accelerometer_scale_factor": _biased(2),
@@ -320,8 +321,8 @@ def phase_courses(
 ) -> Floats:
     """Random phases of one oscillator, or of the link, at the centre frequency, for one sigma, (draws, times). [rad]
 
-    For an oscillator, `declared` is a factor on its amplitude. `times` are evenly spaced and divide the aperture.
-    Tones above `highest` [Hz] may be omitted if no exchange of pulses folds them.
+    For an oscillator, `declared` is a factor on its amplitude. `times` are evenly spaced over the aperture. Tones
+    above `highest` [Hz] may be omitted if no exchange of pulses folds them.
     """
     sync, T = mission.synchronization, mission.collection.aperture_time
     size = error.declared or 0.0
@@ -334,7 +335,7 @@ def phase_courses(
         for _ in range(draws):
             knots = _knots(times, knot_interval, rng)
             series.append(np.interp(times, knots, rng.standard_normal(knots.size)))
-        # With more exchanges than are drawn, the scale keeps the flat part of the spectrum.
+        # If not all exchanges are drawn, this scale preserves the level of the flat part of the spectrum.
         return size * math.sqrt(sync.interval / knot_interval) * np.stack(series)
     turn_phase: _TurnPhase | None = None
     if error.subject.kind == "vibration":
@@ -348,7 +349,7 @@ def phase_courses(
     interval = None if sync is None else sync.interval
     turn_phases = [turn_phase.draw(rng) for _ in range(draws)] if turn_phase is not None else []
     if interval is not None:
-        # Exchanges at shorter intervals leave no phase that an image shows.
+        # After exchanges at shorter intervals, the remaining phase is too small to have an effect on an image.
         residual = _between_exchanges(
             pieces, T, max(interval, T / _MAX_EXCHANGES_COUNT), times, draws, rng, turn_phases
         )
@@ -358,7 +359,7 @@ def phase_courses(
         return size * residual
     pieces = _below(pieces, highest)
     if sync is not None and sync.is_direct_path:
-        if error.owner == "transmitter":  # both paths carry its phase of the same time
+        if error.owner == "transmitter":  # direct path and echo have its phase of the same time
             return np.zeros((draws, times.size))
         return size * _Tones(pieces, T).at(times, draws, rng, later=float(mission.geometry.echo_delay))
     if sync is not None and sync.is_holdover and not error.subject.axis:
@@ -385,8 +386,8 @@ def _between_exchanges(
     """Phases minus the straight lines between their values at exchanges of pulses, (draws, times). [rad]
 
     The tones are periodic in a whole number of exchange intervals. Both the exchanges and the moments at which the
-    phase is sampled then divide the period evenly. For this the moments are stretched slightly, by less than the
-    ratio of one moment's spacing to the period.
+    phase is sampled then divide the period evenly. To achieve this, the times between the moments are scaled. The
+    scale differs from 1 by less than the ratio of the spacing of the moments to the period.
     """
     step = min(interval, _FAR_FACTOR * aperture_time)
     exchanges = max(_MIN_EXCHANGES_COUNT, math.ceil(_PERIOD_FACTOR * aperture_time / step))
@@ -405,7 +406,7 @@ def _between_exchanges(
         cosine, sine = rng.standard_normal((2, tones.fast_size.size)) * tones.fast_size
         fast: Complexes = cosine - 1j * sine
         phases[index] += tones_at(fast, count)[: times.size]
-        # With longer intervals, exchanges lie in later periods of the tones: for fast tones that is equally far.
+        # With longer intervals, exchanges are in later periods of the tones, where fast tones are as independent.
         fast *= _phasors((knots[0] - moments[0]) / interval * step / tones.period, fast.size)
         sampled += np.resize(tones_at(fast, exchanges), knots.size)
         if tones.rest:  # independent at each moment
@@ -434,7 +435,7 @@ def _fastest(mission: Mission, error: RandomError) -> float:
 def fastest_shake(mission: Mission, error: RandomError) -> float:
     """Highest frequency in the spectrum of a vibration, or of the oscillator phase that a vibration causes. [Hz]
 
-    0 for any other error.
+    The result is 0 for any other error.
     """
     pieces: tuple[PowerLawPiece, ...] = ()
     if error.subject.kind == "vibration":
@@ -473,10 +474,9 @@ def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...
 
 
 def _folded_tones(mission: Mission, error: RandomError) -> list[tuple[float, float]]:
-    """Frequencies [Hz] and amplitudes per unit of oscillator tones that exchanges of pulses fold to low frequencies.
+    """Oscillator tones that exchanges of pulses fold to low frequencies: frequencies [Hz] and amplitudes per unit.
 
-    Vibrations that are slow themselves are not included: their phase is drawn before the straight lines are
-    subtracted.
+    Tones of vibrations that are slow themselves are not included, because `_TurnPhase` draws them.
     """
     T, name = mission.collection.aperture_time, error.owner
     tones: list[tuple[float, LeftTone]] = []
@@ -494,7 +494,7 @@ def _folded_tones(mission: Mission, error: RandomError) -> list[tuple[float, flo
 
 
 class _TurnPhase:
-    """Random phase of an oscillator from slow tones and from the turn of its platform, per unit of sensitivity.
+    """Random phase of an oscillator from slow vibration and from the turns of its platform, per unit of sensitivity.
 
     All directions of the sensitivity are equally likely, and so are all phases of a tone. One sigma is the effect in
     the direction with the largest effect.
@@ -505,7 +505,7 @@ class _TurnPhase:
         self.state = getattr(mission.platforms, name).state
         self.turns = not mission.has_direct_path and flies_a_turn(mission, name)
         sync = mission.synchronization
-        is_linked = sync is not None and sync.interval is not None  # the phase between exchanges is drawn
+        is_linked = sync is not None and sync.interval is not None  # lines are subtracted after drawing
         self.slow = [
             (tone.frequency, tone.free if is_linked else tone.free * tone.left.shares[0])
             for tone in accelerated_tones(mission)
@@ -596,8 +596,8 @@ class _Tones:
     """Spectrum as a set of tones: fast tones at equal steps of frequency, slow tones at logarithmic steps.
 
     Fast tones complete cycles within the aperture, and repeat after `period` [s]. A narrow piece of the spectrum
-    contains few fast tones. It gets additional tones, which follow the slow tones in the arrays. Noise above the fast
-    tones is independent at each time, with the standard deviation `rest`.
+    contains few fast tones. It gets additional tones, which follow the slow tones in the arrays. Noise at frequencies
+    above those of the fast tones is independent at each time. Its standard deviation is `rest`.
     """
 
     def __init__(
@@ -653,7 +653,7 @@ class _Tones:
     def fast_at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
         """Random sums of the fast tones at times that divide their period evenly, (draws, times). [rad]
 
-        With `later`, the change within that many seconds, as in `at`.
+        If `later` [s] is given, the result is the change of the sum during that time, as in `at`.
         """
         count = 2 * round(self.period * (times.size - 1) / float(times[-1] - times[0]) / 2)
         square, white_variance = np.square(self.fast_size), self.rest**2
@@ -663,7 +663,7 @@ class _Tones:
         power[1 : (count + 1) // 2] += 2 * white_variance / count
         power[:: count // 2] += white_variance / count
         size = np.sqrt(power) * count / 2
-        size[:: count // 2] *= 2  # these two have no sine
+        size[:: count // 2] *= 2  # the lowest and the highest frequency have no sine part
         sums, block_draws = np.empty((draws, times.size)), max(1, _BLOCK_COUNT // count)
         for start in range(0, draws, block_draws):
             draw_count = min(block_draws, draws - start)
@@ -674,7 +674,7 @@ class _Tones:
     def at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
         """Random sums of all tones at evenly spaced times, (draws, times). [rad]
 
-        With `later`, the change of the sum within that many seconds.
+        If `later` [s] is given, the result is the change of the sum during that time.
         """
         slow = self.draw_slow(draws, rng)
         sums = self.slow_at(times, slow)
@@ -684,10 +684,10 @@ class _Tones:
 
 
 class _Setting:
-    """Setting of a clock before the aperture, by a line that is fitted to its phase over an averaging time.
+    """Setting of a clock before the aperture: a line is fitted to its phase over an averaging time.
 
-    Slow tones are the same in the averaging time and in the aperture. Tones that are faster than one cycle per eight
-    apertures, and that complete two dozen cycles within the age of the setting, are drawn independently for the
+    The slow tones of the averaging time and of the aperture are the same. Tones that are faster than one cycle per
+    eight apertures, and that complete two dozen cycles within the age of the setting, are drawn independently for the
     averaging time.
     """
 
@@ -707,7 +707,7 @@ class _Setting:
         self.fast = _Tones(fast_pieces, averaging) if fast_pieces else None
 
     def lines(self, slow: Floats, times: Floats, rng: np.random.Generator) -> Floats:
-        """Fitted lines at other slow times, (draws, times). [rad]
+        """Values of the fitted lines at slow times within the aperture, (draws, times). [rad]
 
         `slow` are the drawn amplitudes of the slow tones.
         """

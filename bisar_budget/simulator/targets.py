@@ -12,7 +12,7 @@ from bisar_budget.resources import DISK, UnreadableError
 from bisar_budget.units import parse_quantity
 
 _MAX_POINTS = 100
-_MAX_DISTANCE_M = 1e5  # from the scene centre
+_MAX_DISTANCE_M = 1e5  # largest distance of a target from the scene centre
 _LEVEL_RANGE_DB = (-200.0, 200.0)
 _ACCEPTED_FORMS = (
     "EAST, NORTH or EAST, NORTH, LEVEL or grid:NXxNY:SPACING or clutter LEVEL, separated by semicolons; or the name "
@@ -32,9 +32,9 @@ class Target(NamedTuple):
 
 
 class Targets(NamedTuple):
-    """Point targets of a scene, and the clutter level, or None.
+    """Point targets of a scene, and the level of its clutter.
 
-    The level is the mean power of a pixel relative to a point of 0 dB. [dB]
+    The level is the mean power of a pixel relative to a point of 0 dB [dB], or None without clutter.
     """
 
     points: tuple[Target, ...] = (Target(),)
@@ -51,8 +51,8 @@ def parse_targets(text: str) -> Targets:
     Raises
     ------
     ValueError
-        An entry cannot be read; the message names the first such entry and the reason. Or there is no point, or there
-        are more than a hundred.
+        An entry cannot be read, there is no point, or there are more than a hundred points. The message names the
+        first wrong entry and the reason.
     """
     points: list[Target] = []
     clutter = None

@@ -1,4 +1,4 @@
-"""A mission as `verify` examines it: images of its errors, either at a limit or at any size."""
+"""A mission with its analysis and simulated collection, and the images from which limits are verified."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -31,8 +31,9 @@ from bisar_budget.simulator.collection import (
     Chip,
     PointCollection,
 )
+from bisar_budget.simulator.flown_errors import flown, flown_together
 from bisar_budget.simulator.impulse_response import highest
-from bisar_budget.simulator.phase_history import Errors, Floats, PathError, cell_centres, look_sum, superposed
+from bisar_budget.simulator.phase_history import Errors, Floats, cell_centres, look_sum
 from bisar_budget.verifier.aperture_reading import (
     READ_CELLS,
     ApertureReading,
@@ -53,7 +54,7 @@ _MIN_DOPPLER_RATE_FRACTION = 0.02  # of the highest rate of Doppler; slower part
 
 
 class Spread(NamedTuple):
-    """Number of resolution cells over which a response is smeared along its line, and over which it walks in range.
+    """Number of resolution cells over which a response is smeared along its line, and walks in range.
 
     If Doppler turns back within the aperture (`is_round`), the response spreads in all directions, and both numbers
     are equal. A range cell has `finer` times as many pixels as a cross-range cell.
@@ -90,7 +91,7 @@ class Study:
         self.collection = PointCollection(mission, self.geometry)
 
     def blank(self, row_id: str, limit: float, unit: str, **fields: Any) -> Verdict:
-        """Verdict on a limit of the gating model, before its image is formed."""
+        """Create a verdict on a limit of the gating model, to be completed after the image is formed."""
         return Verdict(id=row_id, model=self.model, boundary_error=limit, unit=unit, **fields)
 
     @property
@@ -142,33 +143,20 @@ class Study:
         return min(allowables, key=lambda allowable: math.inf if allowable[0] is None else allowable[0])
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
-        """The errors of an image with a single error of a given size."""
-        if source.clock is not None:
-            return Errors(clock=tuple(size * float(term) for term in source.clock))
-        errors = Errors()
-        for platform_index in source.platforms:
-            if source.is_time_tag:
-                error = PathError(time_tag=size)
-            elif source.subject.kind == "terrain":
-                error = PathError(height=size)
-            else:
-                position, velocity, acceleration = (
-                    (size * x, size * y, size * z) for x, y, z in source.state_of(platform_index)
-                )
-                error = PathError(position, velocity, acceleration)
-            errors = errors.of(PLATFORMS[platform_index], error)
-        return errors
+        """Convert a single error of a given size to the errors of an image."""
+        return flown(source, size, self.geometry, self.collection.aperture_time)
 
     def together(self, sizes: Sizes, scale: float = 1.0) -> Errors:
         """Superpose several errors, each with `scale` times its size."""
-        return superposed(self.errors(source, scale * size) for source, size in sizes)
+        scaled = ((source, scale * size) for source, size in sizes)
+        return flown_together(scaled, self.geometry, self.collection.aperture_time)
 
     def effect(self, sizes: Sizes, scale: float = 1.0) -> ExactEffect:
-        """Effect of several errors together, by exact ranges."""
+        """Compute the effect of several errors together from exact ranges."""
         return self.collection.effect(self.together(sizes, scale))
 
     def exact_effects(self, courses: Mapping[str, Floats]) -> ImagePoints:
-        """Effects of many error histories, by exact ranges.
+        """Compute the effects of many error histories from exact ranges.
 
         `courses` maps the name of a platform to its motion errors, (draws, nodes, 3) [m], and "clock" to range
         errors, (draws, nodes) [m]. The nodes are `aperture_nodes`.
@@ -236,7 +224,7 @@ class Study:
         return math.copysign(effect.equal_loss, effect.qpe) if math.isfinite(effect.qpe) else math.inf
 
     def at_limit(self, subject: Subject, limit: float, room: float = 1.0) -> Responses:
-        """Form the images at the limit of a row of quadratic phase, as they are read for its verdict."""
+        """Form the images at the limit of a quadratic-phase row, with the worse sign of the errors."""
         source = next((s for s in self.sources if s.subject == subject), None)
         sizes = [(source, limit)] if source is not None else self.summed(self.members(subject.owner), limit)
         return self.images(self.together(sizes, self.worse_sign(sizes)), room=room)

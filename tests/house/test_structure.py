@@ -31,6 +31,7 @@ FLOORS = [
         "workers",
     },
     {"geometry"},
+    {"error_kinds"},
     {"image_plane"},
     {"theory", "evaluators", "catalogue"},
     {"paths"},

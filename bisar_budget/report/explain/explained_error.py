@@ -11,6 +11,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS, ErrorSource, subject
+from bisar_budget.error_kinds import MotionKind
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState, plain_vector
@@ -29,7 +30,7 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
         return
     platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     k = mission.allocation.coverage_factor
-    if source.clock is not None:
+    if source.clock is not None or source.is_registered:
         value = source.declared / k
     elif source.is_time_tag:
         owner = mission.common_motion_error if source.is_common else getattr(mission.platforms, platform).motion_error
@@ -90,7 +91,10 @@ def _quadratic_form(products: Sequence[str], correlation: Sequence[Sequence[floa
 
 
 def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterator[Step]:
-    """Yield the steps from `declared` to the quadratic phase error; one unit stands in for an undeclared error."""
+    """Yield the steps from the value `declared` to the quadratic phase error.
+
+    For an undeclared error the steps are for a size of one unit.
+    """
     size = 1.0 if source.declared is None else abs(source.declared)
     each = " of one unit" if source.declared is None else ""
     signed = math.copysign(size, source.declared or 1.0)
@@ -104,6 +108,8 @@ def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterat
         yield step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
     elif source.is_time_tag:
         yield from _time_tag_effect(analysis, source, size, each)
+    elif source.is_registered:
+        yield from _registered_effect(source, size, each)
     elif source.is_common and source.subject.frame != "scene":
         yield from _common_projected_effect(analysis, source, size, each)
     elif source.is_common:
@@ -156,7 +162,7 @@ def _motion_values(analysis: Analysis, platform: str, kind: str, axis: str, size
     }
 
 
-# Symbol and clock terms t̃₀, t̃₁, t̃₂ of the errors after setting: time, frequency, and aging of the oscillator.
+# Symbol of each error of a set clock, and its clock terms t̃₀, t̃₁, t̃₂; H is the time since the clock was set.
 _OF_SETTING = {
     "time": ("x", ("x",)),
     "frequency": ("y", ("y*H", "y")),
@@ -260,6 +266,18 @@ def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each:
     yield _times_declared(source, size, each)
 
 
+def _registered_effect(source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+    """Yield the steps for an error of a registered kind: what its kind says of it, and its published phase."""
+    assert isinstance(source.kind, MotionKind)
+    yield step(f"{source.kind.name}, a registered kind of error ({source.equation}): {source.kind.description}")
+    unit = f"rad per {source.unit}"
+    yield step(
+        "Its motion along the line of sight of mid-aperture, its quadratic part",
+        f"QPE/unit = {with_unit(float(source.effect.qpe), unit)}",
+    )
+    yield _times_declared(source, size, each)
+
+
 def _times_declared(source: ErrorSource, size: float, each: str) -> Step:
     """Return the step that multiplies the effect of one unit by the declared size."""
     values = {"QPE/unit": abs(float(source.effect.qpe)), "declared": size}
@@ -268,7 +286,7 @@ def _times_declared(source: ErrorSource, size: float, each: str) -> Step:
 
 
 def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[str, float]:
-    """Project the effects along the axes of the scene on the axis of the error.
+    """Project the quadratic phases per unit along the axes of the scene on the axis of the error.
 
     Returns the sum as text and as a number [rad per unit].
     """
@@ -354,7 +372,7 @@ def stated(mission: Mission, path: KeyPath, declared: float | None, evidence: st
 
 
 def missing(mission: Mission, path: KeyPath) -> str:
-    """Sentence that says that the file does not declare a key, with the location of the nearest key."""
+    """Sentence about a key that the file does not declare, with the location of the nearest key."""
     return f"Not declared: no {dotted(path)} (the nearest key is at {location(mission, path)})"
 
 
@@ -414,7 +432,7 @@ class Residual:
         return _without_rounding((np.array(self.ranges) - fitted_orders).tolist(), self.rms(self.ranges))
 
     def rms(self, values: Sequence[float]) -> float:
-        """Rms over the aperture of `values` [m] at the nodes. [m]"""
+        """Rms over the aperture of a range error that has `values` at the nodes; both are in metres."""
         return math.sqrt(math.fsum(w * m * m for w, m in zip(self.exact.fit[0].tolist(), values, strict=True)))
 
     @property
@@ -438,10 +456,10 @@ class Residual:
 
     @property
     def hidden(self) -> float:
-        """Quadratic phase with the same peak loss as the range errors that a quadratic phase does not show. [rad]
+        """Quadratic phase with the same peak loss as the residual phases that are not quadratic. [rad]
 
-        These errors are the range error over the band and its slope. If `is_turned`, the cubic order and the rest are
-        included.
+        They are the phase that changes over the band, and the linear phase over the aperture. If `is_turned`, the
+        cubic order and the orders beyond it are included.
         """
         square = float(self.exact.band[0]) * self.rms(self.ranges) ** 2 + self.orders[_SLOPE_ORDER] ** 2 / 3
         if self.is_turned:
@@ -512,7 +530,7 @@ class Residual:
             yield step("Judged against a limit that includes the gain: autofocus corrects no hidden phase", worked)
 
     def listed(self, values: Sequence[float]) -> list[str]:
-        """Write a line with time and value for each node; `values` are in metres."""
+        """Write a line with time [s] and value for each node of the fit; `values` are in metres."""
         times = self.exact.times[:, 0].tolist()
         return [f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, values, strict=True)]
 
@@ -556,7 +574,7 @@ def _beyond_phase(residual: Residual) -> float:
 def worse_sign(
     analysis: Analysis, source: ErrorSource, size: float, measure: Callable[[Residual], float] = _judged
 ) -> Residual:
-    """Residual range error of the sign of the error, positive or negative, that has the larger `measure`."""
+    """Residual range error for the sign of the error, plus or minus, that gives the larger `measure`."""
     signs = [Residual(analysis, source, signed) for signed in (size, -size)]
     if signs[0].is_small or not signs[1].ranges:
         return signs[0]
@@ -670,7 +688,10 @@ def _displacement_of(residual: Residual) -> float:
 
 
 def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
-    """Yield the step for a limit where the image ends, because no ground point has the range history of the error."""
+    """Yield the step for a limit beyond which there is no image.
+
+    Beyond it, no ground point has the range history of the error.
+    """
     yield step(
         "End of the image: no ground point has the range history of a larger error of either sign",
         "The point is followed as the error grows, to where range and Doppler gradients become parallel there",
@@ -728,7 +749,7 @@ def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[St
 
 
 def autofocus_gain(allocation: Allocation) -> Iterator[Step]:
-    """Yield the steps to the gain, the factor that autofocus puts on the limits."""
+    """Yield the steps to the gain, the factor by which autofocus raises the limits of the quadratic phase."""
     if allocation.n_pull is None:
         yield step("No autofocus (autofocus.n_pull): gain = 1")
         return
