@@ -5,7 +5,7 @@ Messages name the packages, not the extra: bisar-budget is not on PyPI, and some
 
 from collections.abc import Mapping
 
-# As `optional-dependencies` of pyproject.toml has them, without the versions. Extras for developers have no messages.
+# The `optional-dependencies` of pyproject.toml without versions. Extras for developers are left out.
 PACKAGES_OF_EXTRA: Mapping[str, tuple[str, ...]] = {
     "cluster": ("distributed", "pyarrow"),
     "fast": ("finufft", "numba"),

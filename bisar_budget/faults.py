@@ -1,4 +1,4 @@
-"""Faults of input files, with all that is needed to correct them: place, problem, given value, accepted values."""
+"""Faults of input files, with all that is needed to correct them: place, problem, given and accepted values."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
@@ -104,15 +104,15 @@ class SetValue(NamedTuple):
 
     @property
     def option(self) -> str:
-        """First words of a message about the value: the option that gave it."""
+        """Option that gave the value, as the first words of a message about it."""
         return f"--set {printable(self.key)}"
 
 
-_BY_UNIT = ("m/s^2", "(m/s^2)^2/Hz", "m^2/Hz")  # of keys whose readers need the unit to tell the dimension
+_BY_UNIT = ("m/s^2", "(m/s^2)^2/Hz", "m^2/Hz")  # keys with these units have several dimensions
 
 
 class SetNumber(SetValue):
-    """Number in SI units that replaces a value, such as in one case of a sweep, with its text.
+    """Number in SI units, with its text, that replaces a value of the mission, for example in one case of a sweep.
 
     Readers of the mission use `value`, and messages show the text. `value` is the number, or the text for a key with
     several dimensions.
@@ -129,13 +129,19 @@ class SetNumber(SetValue):
 
 
 class Changed:
-    """Replacement for the parser's event of a value that comes from an option and has no line in a file."""
+    """Stand-in for the event of the YAML parser, for a value that an option gives.
+
+    Such a value has no line in a file.
+    """
 
     start_mark = None
 
 
 def changes_words(changes: Sequence[SetValue]) -> str:
-    """Write the options that changed a mission as on the command line; empty without options."""
+    """Write the options that changed a mission, as on the command line.
+
+    The text is empty if no option changed the mission.
+    """
     if not changes:
         return ""
     from shlex import quote
@@ -144,7 +150,7 @@ def changes_words(changes: Sequence[SetValue]) -> str:
 
 
 class Problem(NamedTuple):
-    """Problem with a value, before the file of the value is known.
+    """Problem with a value, for use where the file of the value is not known yet.
 
     `at` is the path of the wrong value relative to the checked value. `names_value` is true if the text already
     contains the value. `is_of_key` is true if the key is wrong, whatever its value.
@@ -164,7 +170,7 @@ class Problem(NamedTuple):
 
 
 class InvalidValueError(ValueError):
-    """A value that its key does not accept."""
+    """The value of a key is not accepted."""
 
     def __init__(self, problem: str, accepted: str = "", hint: str = "") -> None:
         super().__init__(problem)
@@ -190,7 +196,7 @@ class Fault(NamedTuple):
 
     @property
     def message(self) -> str:
-        """The problem without its place, the given value and the accepted values."""
+        """Description of the problem without its place, the given value and the accepted values."""
         return self.problem
 
     def __str__(self) -> str:
@@ -201,7 +207,7 @@ class Fault(NamedTuple):
 
 
 def file_fault(problem: str, hint: str = "") -> Fault:
-    """A fault of the file as a whole."""
+    """Return a fault that concerns the file as a whole."""
     return Fault(line=None, column=None, key="", problem=problem, hint=hint)
 
 

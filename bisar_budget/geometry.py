@@ -23,12 +23,12 @@ Vectors = tuple[PerCase, PerCase, PerCase]
 VectorArrays = tuple[Floats, Floats, Floats]
 GroundVector = tuple[float, float]
 
-_MIN_DIRECTED_SPEED_MPS = 1e-300  # a smaller velocity has too few digits for a direction
+_MIN_DIRECTED_SPEED_MPS = 1e-300  # a smaller velocity has too few significant digits for a direction
 STRAIGHT: Vector = (0.0, 0.0, 0.0)  # acceleration of a platform with a straight path
 Axes = tuple[Vectors, Vectors, Vectors]
 
 STILL_SPEED_MPS = 1e-6  # a slower platform does not move
-_LOOKS_PER_PIECE = 8  # samples of a path in pieces, for its length and its lowest point
+_LOOKS_PER_PIECE = 8  # samples per piece of a path, from which its length and its lowest point are found
 _MIN_LOOK_COUNT = 32  # samples on each side of the midpoint
 FRAME_AXES = {
     "scene": ("x", "y", "z"),
@@ -39,10 +39,11 @@ FRAME_AXES = {
 
 
 class UndefinedFrameError(ValueError):
-    """A platform does not have the frame: a still platform has no track frame, one overhead no cross direction.
+    """The requested frame does not exist for a platform.
 
-    Without the latitude and longitude of the scene the Earth's centre is unknown, and no platform has the frame
-    `ric`.
+    A platform that does not move has no `track` frame. A platform directly above the scene centre has no cross
+    direction. Without the latitude and longitude of the scene, the Earth's centre is unknown, and no platform has the
+    frame `ric`.
     """
 
 
@@ -50,7 +51,7 @@ _ARRAY = np.ndarray
 
 
 def _either(of_numbers: Callable[..., PerCase], of_arrays: Callable[..., PerCase]) -> Callable[..., PerCase]:
-    """Combine a function of numbers and a function of arrays into one function of either."""
+    """Combine a function of numbers and a function of arrays into one function that accepts both."""
 
     def function(*values: PerCase) -> PerCase:
         return of_arrays(*values) if _ARRAY in map(type, values) else of_numbers(*values)
@@ -164,17 +165,24 @@ class Fall(Protocol):
     """Dynamics of the errors of a platform in free fall; implemented by `paths.free_fall.FreeFall`."""
 
     def motions(self, path: "PlatformState", half: NDArray[np.float64], places: NDArray[np.float64]) -> Any:
-        """Motion that unit errors of the state at mid-aperture cause, (3, 3, 3, nodes, cases). [m]"""
+        """Motion over the aperture due to unit errors of the state at mid-aperture, (3, 3, 3, nodes, cases). [m]
+
+        The first three indices are the error (position, velocity, acceleration), its axis, and the component. `half`
+        is half the aperture time [s], and `places` are the nodes in units of it.
+        """
 
     def rate_against_stars(self, position: Vectors) -> Vectors:
-        """Rate, in the axes of the scene, of a position error that is constant relative to the stars."""
+        """Velocity error in the axes of the scene for a position error that is constant relative to the stars. [m/s]
+
+        `position` is the position error, east, north and up. [m]
+        """
 
     def orbit_rate(self, path: "PlatformState") -> Vectors:
-        """Angular rate of the orbit. [rad/s]"""
+        """Angular rate vector of the orbit, in the axes of the scene. [rad/s]"""
 
     @property
     def centre(self) -> Vectors:
-        """Position of the Earth's centre. [m]"""
+        """Position of the Earth's centre, in the axes of the scene. [m]"""
 
     @property
     def rotation(self) -> Vectors:
@@ -433,7 +441,10 @@ class PlatformState:
         return math.asin(max(-1.0, min(1.0, sine))) if abs(sine) > VECTOR_ROUNDING_FRACTION else 0.0
 
     def has_frame(self, name: str, margin: float = 1.0) -> PerCaseFlag:
-        """Whether the platform has a frame; `margin` is a margin for rounding."""
+        """Whether the platform has the frame `name`.
+
+        `margin` is a factor on the threshold below which the horizontal part of the first axis counts as rounding.
+        """
         if name in ("scene", "ric"):
             return name == "scene" or self.radial is not None
         first = self._first_axis(name)

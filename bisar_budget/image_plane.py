@@ -1,14 +1,15 @@
-"""The matrix H, which measures how well aperture and band distinguish ground points.
+"""The matrix H, which measures how well the aperture and the band distinguish ground points.
 
 The ranges of two ground points at a distance x from each other differ by g(τ)·x. Here g is the sum of both lines of
-sight, projected on the ground. The variance of the phase difference over aperture and band is k²·xᵀHx, with
-k = 2πf₀/c and
+sight, projected on the ground. The variance of the phase difference over aperture and band is k²·xᵀHx, with k =
+2πf₀/c and
 
     H = Cov_τ(g) + b²⟨g gᵀ⟩,    b² = B²/(12 f₀²),
 
-for an evenly filled band of width B about f₀; ⟨ ⟩ is the mean over the aperture. If H is singular, points along a
-line cannot be distinguished: the collection has no image plane. H is half the second derivative of V, the variance
-that the image point minimises (see `ranges.exact_ranges`). Derived here.
+for an evenly filled band of width B about f₀. ⟨ ⟩ is the mean over the aperture. If H is singular, points along a
+line cannot be distinguished, and the collection has no image plane. H is half the second derivative of V, the
+variance that the image point minimises (see `ranges.exact_ranges`). The matrix is derived here; it is not in the
+paper.
 """
 
 import math
@@ -22,20 +23,20 @@ from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
 from bisar_budget.geometry import BistaticGeometry
 
-# Path of a platform in half an aperture over its slant range, and the number of nodes that serves up to this path:
-# it changes phases by less than 1e-6 of themselves up to a path of 0.5, and by less than 1e-4 beyond.
+# Length of a platform's path in half an aperture, divided by its slant range, and the number of nodes that suffices
+# up to it. The relative error of a phase is less than 1e-6 up to a ratio of 0.5, and less than 1e-4 beyond.
 NODES_BY_PATH = ((0.1, 6), (0.5, 10), (1.0, 16), (2.0, 32), (math.inf, 64))
 FEWEST_PATH_NODES = NODES_BY_PATH[0][1]
 FINEST_NODES = 128  # nodes that resolve phases up to some 100 rad
-SIGHT_POLYNOMIAL_COUNT = 16  # that follow a line of sight around a full circle to 1e-6
-# Paths in pieces turn faster than their length suggests. With 1.5 nodes per piece, phases change by less than 1e-4 of
-# themselves.
+SIGHT_POLYNOMIAL_COUNT = 16  # polynomials that fit a line of sight over a full circle to 1e-6
+# Paths in pieces may turn faster than their length suggests. With 1.5 nodes per piece, the relative error of a phase
+# is less than 1e-4.
 _NODES_PER_PIECE, _PIECE_NODES = 1.5, np.array((16, 32, 64, 128, 256))
-# Area that mean gradient and mean Doppler gradient span, over the determinant of H; with less they do not tell sides
-# apart.
+# Smallest part of the determinant of H that comes from the mean range gradient and the mean Doppler gradient. With
+# less, the sign of the area between these gradients does not tell whether a point is beyond a fold.
 MIN_OWN_AREA_FRACTION = 0.5
 MIN_SINE = math.sin(math.radians(MIN_GRADIENT_ANGLE_DEG))
-MIN_TURN_FRACTION = 1e-9  # of the turns of both lines of sight, below which their sum does not turn
+MIN_TURN_FRACTION = 1e-9  # of the turns of both lines of sight; if their sum turns by less, it does not turn
 
 
 class Band(Protocol):
@@ -93,7 +94,10 @@ LEGENDRE_LEADING = np.array((1.0, 1.0, 1.5, 2.5))  # coefficient of xⁿ in the 
 
 @cache
 def nodes(count: int) -> Sampling:
-    """Sampling at the nodes of Gauss-Legendre quadrature, which gives the order n as (2n + 1)/2 ∫ρPₙ."""
+    """Sampling at the nodes of Gauss-Legendre quadrature.
+
+    The weights give the coefficient of order n of a history ρ as (2n + 1)/2 ∫ρPₙ over −1 … 1.
+    """
     slow_times, weights = np.polynomial.legendre.leggauss(count)
     orders = np.polynomial.legendre.legvander(slow_times, 3)
     return Sampling(slow_times, ((np.arange(4) + 0.5) * LEGENDRE_LEADING)[:, None] * orders.T * weights)
@@ -102,7 +106,10 @@ def nodes(count: int) -> Sampling:
 def nodes_for(
     geometry: BistaticGeometry, aperture_time_s: PerCase, *, has_direct_path: bool = False
 ) -> int | Indices:
-    """Number of nodes that cases need for the lines of sight, and for the direct path if it is the clock."""
+    """Number of quadrature nodes that each case needs, for the lines of sight of both platforms.
+
+    If the direct path is the clock, the number is also sufficient for the direct path.
+    """
     half = aperture_time_s / 2
     turning = (*geometry.both, *((geometry.apart,) if has_direct_path else ()))
     way = reduce(np.maximum, [path.travelled(half) / path.slant_range for path in turning])
@@ -116,7 +123,7 @@ def nodes_for(
 
 
 def band_variance(radar: Band) -> PerCase:
-    """b²: variance of the frequencies of an evenly filled band, divided by the square of its centre."""
+    """Variance of the frequencies of an evenly filled band, divided by the square of the centre frequency: b²."""
     return (radar.bandwidth / radar.center_frequency) ** 2 / 12
 
 
@@ -203,7 +210,10 @@ class GroundMatrix:
 
     @property
     def turning(self) -> Floats:
-        """P₁ part at the aperture edge of the gradient across its mean, from the variance across it. [m/m]"""
+        """P₁ part, at the aperture edge, of the gradient component perpendicular to the mean gradient. [m/m]
+
+        It is computed from the variance of this component.
+        """
         x, y = self.range_gradient
         along = self.xx * x * x + 2 * self.xy * x * y + self.yy * y * y
         with np.errstate(all="ignore"):
@@ -215,15 +225,19 @@ class GroundMatrix:
         return orientation(self.slopes, self.fit, self.band, self.determinant)
 
     def turned_from(self, centre: "GroundMatrix", case: Indices) -> Floats:
-        """Area that the gradient spans, relative to that at the centre of some cases, from the function `turn`."""
+        """Area that the gradient spans, as a fraction of the area at the scene centre of the cases `case`.
+
+        It is computed by the function `turn`.
+        """
         return turn(self.determinant, self.orientation, centre, case)
 
 
 def orientation(slopes: Floats, fit: Floats, band: Floats, determinant: Floats) -> Floats:
-    """Signed area between mean range gradient and mean Doppler gradient.
+    """Signed area between the mean range gradient and the mean Doppler gradient.
 
-    It is 0 if the aperture resolves much more than these two gradients, that is, if their part of the determinant of
-    H is small. The parameters are fields of `GroundMatrix`, and the determinant of H.
+    It is set to 0 if the aperture resolves much more than these two gradients, so that they contribute only a small
+    part of the determinant of H. The first three parameters are fields of `GroundMatrix`, and the last is the
+    determinant of H.
     """
     (x, y), (by_x, by_y) = fit[0] @ slopes, fit[1] @ slopes
     area = x * by_y - y * by_x
@@ -232,9 +246,10 @@ def orientation(slopes: Floats, fit: Floats, band: Floats, determinant: Floats) 
 
 
 def turn(determinant: Floats, orientation: Floats, centre: GroundMatrix, case: Indices) -> Floats:
-    """Area that the gradient spans, relative to that at the centre of some cases; negative if turned around.
+    """Area that the gradient spans, as a fraction of the area at the scene centre; negative beyond a fold.
 
-    The area is the root of the determinant of H.
+    The area is the root of the determinant of H. `centre` is the matrix at the scene centres, and `case` are the
+    cases of the points. The sign is negative if the orientation of the gradients is opposite to that at the centre.
     """
     at_centre, orientation_at_centre = centre.determinant, centre.orientation
     if at_centre.size > 1:
@@ -246,11 +261,11 @@ def turn(determinant: Floats, orientation: Floats, centre: GroundMatrix, case: I
 def spans_ground(
     geometry: BistaticGeometry, radar: Band, aperture_time_s: PerCase, cases: int = 1
 ) -> tuple[Booleans, Floats]:
-    """Whether the lines of sight turn within the aperture, and the sine as in `GroundMatrix.sine`, (cases,).
+    """Whether the lines of sight turn within the aperture, and the sine of `GroundMatrix.sine`, (cases,) each.
 
-    Full circles have an image plane. So have apertures with a moment at which the range and Doppler gradients are
-    parallel. If a collection has no image plane, the gradients are within a degree of parallel over the whole
-    aperture.
+    A full circle has an image plane. An aperture that contains a moment at which the range and Doppler gradients are
+    parallel also has one. If a collection has no image plane, the gradients are within a degree of parallel over the
+    whole aperture.
     """
     half = np.array(np.broadcast_to(np.asarray(aperture_time_s, dtype=float) / 2, (cases,)))
     sampling = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_PATH_NODES)))

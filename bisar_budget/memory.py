@@ -9,7 +9,7 @@ import errno
 import os
 from collections.abc import Iterator
 
-# Address space, bytes. With less, libraries were seen to end the process, or to report that they are not installed.
+# Address space in bytes. With less, libraries may end the process, or report that they are not installed.
 MIN_MEMORY_BYTES = 192 << 20  # NumPy with one thread of OpenBLAS takes 134 MB, a check a little more
 TABLES_MEMORY_BYTES = 400 << 20
 CLUSTER_MEMORY_BYTES = 3 << 29
@@ -19,7 +19,7 @@ _MEMORY_ERRORS = ("failed to map segment", "annot allocate memory", "bad_alloc",
 
 
 def limit() -> int | None:
-    """Limit of the address space of this process [B]; None without a limit."""
+    """Limit of the address space of this process; None if there is no limit. [B]"""
     try:
         import resource
     except ImportError:  # Windows
@@ -47,7 +47,7 @@ def spare_threads() -> None:
 
 
 def hold_room(needed: int, purpose: str) -> None:
-    """Raise a `MemoryError` if the limit is below `needed`, the memory that a purpose needs. [B]"""
+    """Raise a `MemoryError` if the limit is below the memory `needed` [B] for a purpose, which the message names."""
     allowed = limit()
     if allowed is not None and allowed < needed:
         raise MemoryError(f"{purpose} needs at least {needed >> 20} MB of memory; {limit_words()}")
@@ -60,7 +60,10 @@ def is_spacious() -> bool:
 
 
 def ran_out(error: BaseException) -> bool:
-    """Whether an error, or one of its causes, is a lack of memory. Near the memory limit any error counts as one."""
+    """Whether an error, or one of its causes, is a lack of memory.
+
+    Close to the memory limit, any error counts as a lack of memory.
+    """
     return any(map(_says_memory, _causes(error))) or _is_near_limit()
 
 

@@ -13,8 +13,8 @@ from bisar_budget.constants import STANDARD_GRAVITY_MPS2
 from bisar_budget.units import DIMENSIONS, Dimension, format_quantity, normal_unit
 
 _SAME_FACTOR = 1e-9  # relative difference of two spellings of one unit
-_MIN_TYPO_CHARACTERS = 3  # a shorter unit is one slip away from too many units
-_MIN_PLURAL_CHARACTERS = 4  # mils, days
+_MIN_TYPO_CHARACTERS = 3  # a shorter unit is similar to too many units
+_MIN_PLURAL_CHARACTERS = 4  # shortest plural that is recognised, such as mils or days
 
 
 class UnitValue(NamedTuple):

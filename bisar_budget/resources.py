@@ -26,10 +26,10 @@ FILES_READ: set[tuple[int, int]] = set()
 
 
 class FilesHeld:
-    """Contents of the files that a command reads, as first read, so that all its outputs use the same content.
+    """Contents of the files that a command reads, as first read, so that all its outputs use the same contents.
 
-    Contents are kept up to 64 MB in total. For further files a hash is kept, and a file that has changed at a later
-    reading is refused.
+    Contents are kept up to 64 MB in total. Of further files only a hash is kept. Such a file is refused if it has
+    changed when it is read again.
     """
 
     def __init__(self) -> None:

@@ -23,7 +23,8 @@ class Dimension:
 
     `scales` maps each accepted unit to a factor and a divisor, one of which is 1. Division by a whole number keeps
     decimals exact: 5 mm is 0.005 m to the bit. `usual` names the usual units if every number needs a unit; it is
-    empty if a bare number is in SI. `offsets` are units of decibels to which a number is added when they are read.
+    empty if a bare number is in SI. `offsets` maps further decibel units to the number of decibels that is added to
+    their values on reading.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Long computations: their progress, their distribution, and worker processes that always end with the command."""
+"""Tools for long computations: progress reports, distribution, and worker processes that end with the command."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ Result = TypeVar("Result")
 
 
 class MapBlocks(Protocol):
-    """Function that calls another function with common data for each block, in workers.
+    """Function that applies another function to blocks of work, with common data, in worker processes.
 
     It yields each block with its result, in any order. `about` describes a block in messages.
     """
@@ -43,15 +43,15 @@ _POOL_TIMEOUT_S = 10.0  # to wait for the pool's own thread, which ends as soon 
 
 
 def unseen(done: int, total: int) -> None:
-    """Ignore the progress of a computation."""
+    """Ignore reports of progress; used where nobody watches the computation."""
 
 
 @contextmanager
 def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExecutor]:
-    """Context of a pool of processes that leaves no process behind.
+    """Context manager for a pool of processes, all of which have ended when the context is left.
 
     `start` is `spawn` for fresh interpreters; a fork would copy the threads of a numerical library in an undefined
-    state. A `WorkerLostError` is raised if a worker is ended from outside, for example by the system when memory runs
+    state. Raises a `WorkerLostError` if a worker is ended from outside, for example by the system when memory runs
     out.
     """
     worker_count = set(threading.enumerate())

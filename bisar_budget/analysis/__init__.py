@@ -1,6 +1,6 @@
 """Analysis of one mission: its errors and their effects, the division of its budgets, the edge of its scene."""
 
-# What other rooms may use.
+# Names that other packages may import.
 __all__ = [
     "allocation",
     "analysis",

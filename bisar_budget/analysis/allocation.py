@@ -21,11 +21,12 @@ EQUAL = Shares(transmitter=0.5, receiver=0.5)
 
 
 class Allocation(NamedTuple):
-    """Budgets divided between the owners.
+    """Budgets of a mission, divided between transmitter, receiver and clock.
 
     `qpe_total` is the total quadratic phase error before autofocus. [rad] `qpe`, `pslr` and `islr` are the shares of
-    the owners. The shares of PSLR and ISLR are shares of power. `n_pull` is the part of the file's `autofocus.n_pull`
-    that counts, see `effective_n_pull`. `n_pull_stated` is the value in the file.
+    the owners. The shares of PSLR and ISLR are shares of power. `n_pull` is the N_pull of the autofocus after the
+    limitation by `effective_n_pull`: autofocus corrects up to π·N_pull rad at the aperture edge. `n_pull_stated` is
+    the value of `autofocus.n_pull` in the file. Both are None without autofocus.
     """
 
     qpe_total: float
@@ -37,9 +38,9 @@ class Allocation(NamedTuple):
 
     @property
     def autofocus_gain(self) -> Any:
-        """Factor by which autofocus raises QPE limits: π·N_pull divided by the total, at least 1.
+        """Factor by which autofocus raises the limits of the quadratic phase error: π·N_pull/`qpe_total`, at least 1.
 
-        See Section VI. For a total of π/4 it is 4·N_pull.
+        See Section VI. If the total is π/4, the factor is 4·N_pull.
         """
         return _gain(self.n_pull, self.qpe_total)
 
@@ -52,13 +53,14 @@ class Allocation(NamedTuple):
         return self.qpe_limit(owner) * self.autofocus_gain
 
     def of(self, case: int) -> "Allocation":
-        """Return the budgets of one of many cases in plain numbers."""
+        """Return the budgets of the case with index `case`, with plain numbers in place of arrays (cases,)."""
         return Allocation._make(_plain(figure, case) for figure in self)
 
     def passes_with(self, qpe: float, hidden: float, owner: str, mission: Mission) -> Note:
         """Note on the smallest N_pull with which an owner's QPE would pass, or on why autofocus cannot correct it.
 
-        Autofocus does not correct the `hidden` phase. The quadratic phase may use the rest of the limit. [rad]
+        `qpe` is the quadratic phase at the aperture edge, which autofocus corrects. [rad] `hidden` is the equivalent
+        quadratic phase of the loss that autofocus does not correct. [rad] Both are combined as a root-sum-square.
         """
         room = 1 - (hidden / self.qpe_limit(owner)) ** 2
         if room <= 0:
@@ -118,15 +120,16 @@ def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
 
 
 def _balanced(gates: Sequence[Together]) -> Shares:
-    """Shares in proportion to the phases of the declared errors.
+    """Shares of transmitter and receiver in proportion to the combined phases of their declared errors.
 
-    With several models, the larger judged phase of each error counts.
+    If several models gate, each error has the largest of its judged phases in these models. Each share is limited to
+    `BALANCED_RANGE`.
     """
     weights = []
     for owner in ("transmitter", "receiver"):
         by_model = zip(*(together.judged_parts(together.owed(EQUAL, owner)) for together in gates), strict=True)
         phases = [(of_platform[0][0], _largest([phase for _, phase in of_platform])) for of_platform in by_model]
-        # An error that leaves no image has no finite phase: it takes the largest share allowed.
+        # An error that leaves no image has an infinite phase: its platform gets the largest share allowed.
         weights.append(np.minimum(gates[0].combined(phases), 1e300))
     total = weights[0] + weights[1]
     with np.errstate(invalid="ignore"):
@@ -137,7 +140,7 @@ def _balanced(gates: Sequence[Together]) -> Shares:
 
 
 def _largest(phases: Sequence[Floats]) -> Floats:
-    """The phase with the largest magnitude, signed. [rad]"""
+    """Phase with the largest magnitude among the given ones, with its sign, for each case. [rad]"""
     if len(phases) == 1:
         return phases[0]
     of_all = np.array(phases)
@@ -146,27 +149,28 @@ def _largest(phases: Sequence[Floats]) -> Floats:
 
 
 def _shares(split: str | Shares) -> Shares:
-    return EQUAL if isinstance(split, str) else split  # `balanced` weighs phase, not power
+    return EQUAL if isinstance(split, str) else split  # `balanced` divides only the phase, in proportion
 
 
 # ---------------------------------------------------------------------- autofocus
-ROOM = {"pga": 3.0, "map_drift": 1.5}  # smallest patch over smear
+ROOM = {"pga": 3.0, "map_drift": 1.5}  # smallest size of the patch, in units of the smear
 
 
 class Caps(NamedTuple):
-    """Largest useful N_pull: the bound f₀/B by range walk, and the bound by the scene's size.
+    """Upper bounds on a useful N_pull: `walk`, set by range walk, and `scene`, set by the size of the scene.
 
-    `scene` is None if the file gives no size. The gain is limited to the bound by range walk. Beyond the bound by the
-    scene's size, the report has a warning.
+    `walk` is f₀/B. The gain of autofocus is limited to it. `scene` is None if the file gives no size of the scene. If
+    N_pull exceeds `scene`, the report contains a warning.
 
     A phase of π·N at the aperture edge corresponds to a range walk of λN/2, which is N·B/2f₀ cells, and smears a
-    point over 4N cross-range cells. Images of points were used to measure the bounds
-    (`tests/simulate/test_pull_in_caps.py`). One-dimensional autofocus works for a walk of half a cell and more.
-    However, half a cell costs 0.6 dB that no phase correction recovers, and a whole cell 1.3 dB.
+    point over 4N cross-range cells. The bounds were measured on images of points
+    (`tests/simulate/test_pull_in_caps.py`). One-dimensional autofocus still works for a range walk of half a cell or
+    more. However, a walk of half a cell causes a loss of 0.6 dB that no phase correction recovers, and a walk of a
+    whole cell a loss of 1.3 dB.
 
-    Autofocus fails if the patch is too small, for any walk and bandwidth. Phase gradient needs a patch of three times
-    the smear, map drift one and a half times. With a smaller patch the image stays smeared, for a walk of a hundredth
-    of a cell as well as for a third of a cell.
+    Autofocus fails if the patch is too small, whatever the range walk and the bandwidth. Phase gradient autofocus
+    needs a patch of three times the smear, map drift autofocus one and a half times. With a smaller patch the image
+    stays smeared, for a range walk of a hundredth of a cell as well as for a third of a cell.
     """
 
     walk: float
@@ -174,7 +178,7 @@ class Caps(NamedTuple):
 
 
 def caps(mission: Mission) -> Caps:
-    """Upper bounds on N_pull for any autofocus of a mission."""
+    """Upper bounds on the N_pull of a mission's autofocus, see `Caps`."""
     walk = range_walk_cap(mission)
     if mission.scene.radius is None:
         return Caps(walk)
@@ -199,7 +203,7 @@ def effective_n_pull(mission: Mission) -> float | None:
 
 
 def needed_sentence(n_pull: float, caps: Caps) -> Note:
-    """Note on the N_pull from which an error would pass, or on the bound that rules out such an N_pull.
+    """Note that gives the N_pull from which an error would pass, or the bound that rules out such an N_pull.
 
     Parameters
     ----------

@@ -39,9 +39,9 @@ __all__ = ["Analysis", "Case", "Model", "by_nodes"]
 def by_nodes(
     mission: Mission, cases: int, geometry: BistaticGeometry
 ) -> Iterator[tuple[int, NDArray[np.intp], Mission, BistaticGeometry]]:
-    """Group the cases of a mission that need the same number of nodes.
+    """Group the cases of a mission that need the same number of quadrature nodes over the aperture.
 
-    Yields the number of nodes, the indices of the cases, and their mission and geometry.
+    Yields for each group the number of nodes, the indices of its cases, and their mission and geometry.
     """
     T = np.broadcast_to(mission.collection.aperture_time, (cases,))
     counts = np.broadcast_to(nodes_for(geometry, T, has_direct_path=mission.has_direct_path), (cases,))
@@ -95,7 +95,7 @@ class Analysis:
 
     @cached_property
     def exact(self) -> ExactRanges:
-        """Exact ranges over the aperture."""
+        """Exact range histories of all cases at the nodes of the aperture."""
         return exact_ranges(self.mission, self.geometry, self.nodes, self.cases)
 
     @cached_property
@@ -110,9 +110,10 @@ class Analysis:
 
     @cached_property
     def errors(self) -> DeclaredErrors:
-        """Errors of the cases.
+        """Listed errors of the cases, with their effects.
 
-        These are all errors that the cases can have, or the declared errors and those in `shown` if it is given.
+        If `shown` is given, they are the declared errors and the errors in `shown`. Otherwise they are all errors
+        that the cases can have.
         """
         return DeclaredErrors(
             self.mission,
@@ -131,7 +132,7 @@ class Analysis:
 
     @cached_property
     def random(self) -> list[RandomError]:
-        """Errors of sensors, clocks and the air that the mission names."""
+        """Errors of sensors, clocks and the air that the mission names; empty if it names none."""
         if not has_random_errors(self.mission):
             return []
         return random_errors(self.mission, None if self.is_by_itself else self.geometry, self.cases)
@@ -143,7 +144,7 @@ class Analysis:
 
     @cached_property
     def slow_tones(self) -> dict[str, SlowTone]:
-        """Declared vibrations below three cycles per aperture, as a mapping from the ids of their rows."""
+        """Declared vibrations below three cycles per aperture; the keys are the ids of their rows."""
         return slow_tones(self.mission, self.geometry, self.cases)
 
     @cached_property
@@ -181,33 +182,33 @@ class Analysis:
 
     @cached_property
     def groups(self) -> tuple[Correlated, ...]:
-        """Covariances of the mission."""
+        """Covariances that the mission declares for the errors of its platforms."""
         return correlated_errors(self.mission)
 
     @property
     def gates(self) -> list[str]:
-        """Names of the models whose limits the mission must meet.
+        """Names of the gating models, which are those whose limits the mission must meet.
 
-        There is one name, or both if the stricter model decides.
+        There is one name, or both names if the stricter model decides.
         """
         return [name for name in ("published", "full") if self.mission.gating_model in (name, "strictest")]
 
     def models(self, gating: str) -> tuple[Model, Model]:
-        """The model that gates, `published` or `full`, followed by the other model."""
+        """The gating model and the other model, given the name of the gating model, `published` or `full`."""
         return (self.full, self.published) if gating == "full" else (self.published, self.full)
 
     @cached_property
     def allocation(self) -> Allocation:
-        """Divided budgets.
+        """Budgets of the cases, divided between the owners.
 
-        A `balanced` division weighs the phases of the gating model, and under `strictest` the larger phases of both
-        models.
+        A `balanced` division is in proportion to the phases in the gating model. Under `strictest` it is in
+        proportion to the larger of the phases in both models.
         """
         return allocate(self.mission, (self.together(model) for model in self.gates))
 
 
 class Case:
-    """One case out of those that were analysed together.
+    """One of the cases of an analysis.
 
     Parameters
     ----------
@@ -223,7 +224,7 @@ class Case:
         self.analysis, self.mission, self.place = analysis, mission or analysis.mission, place
 
     def number(self, column: PerCase | PerCaseFlag) -> float:
-        """Number of this case in a column (cases,). A single number holds for every case."""
+        """Return the number of this case from an array (cases,), or from a single number that holds for all cases."""
         return plain(column, self.place)
 
     @cached_property
@@ -244,7 +245,7 @@ class Case:
 
     @cached_property
     def allocation(self) -> Allocation:
-        """Divided budgets of this case."""
+        """Budgets of this case, divided between the owners."""
         allocation = self.analysis.allocation
         return allocation if self.analysis.is_by_itself else allocation.of(self.place)
 
@@ -256,13 +257,14 @@ class Case:
         return [in_one_case(self.mission, error, self.place) for error in self.analysis.random]
 
     def does(self, model: Model, source: ErrorSource) -> Declared:
-        """Effect of a declared error in a model."""
+        """Phases and displacements of a declared error in a model, in this case."""
         return self.analysis.errors.does(model.name, source).in_one_case(self.place)
 
     def moved_by_tone(self, row_subject: Subject, model: str) -> GroundVector | None:
-        """Displacement by the tone of a row in its worst phases, in a model, east and north. [m]
+        """Displacement of the image, east and north, by the tone of a row in the model of the given name. [m]
 
-        None for a row without a tone, or without a displacement.
+        Each component is that for the worst phase of the tone. None if the row has no tone or the model has no
+        displacement.
         """
         for tone in self.analysis.displacing_tones:
             if tone.subject.id == row_subject.id:
@@ -271,5 +273,5 @@ class Case:
         return None
 
     def degeneracy(self, model: str) -> Note:
-        """Note on why a model has no displacement in this case; empty if it has one."""
+        """Note on why the image has no displacement in a model in this case; empty if it has one."""
         return self.analysis.errors.degeneracy(model, self.place)

@@ -1,10 +1,10 @@
-"""Loss of the image peak due to all declared errors, in many cases at once.
+"""Loss of the image peak due to all declared errors, for many cases at once.
 
-At the image point an error of motion or of a clock leaves a range error ρ over the aperture. The peak keeps
-|⟨exp(ikρf/f₀)⟩|² of its power, computed as a direct sum, where ⟨ ⟩ is the mean over aperture and band. A random error
-whose phase has the variance σ² keeps exp(-σ²) of the power; so does a tone of any phase. Losses of independent errors
-add in decibels, as the variances of their phases do to second order. Derived here. Images formed by direct sums check
-it in `tests/theory/test_image_point.py`.
+An error of motion or of a clock leaves a range error ρ over the aperture at the image point. The peak then keeps
+|⟨exp(ikρf/f₀)⟩|² of its power, where ⟨ ⟩ is the mean over aperture and band. It is computed as a direct sum. With a
+random error whose phase has the variance σ², the peak keeps exp(-σ²) of its power; the same holds for a tone of any
+phase. Losses of independent errors add in decibels, as the variances of their phases do to second order. Derived
+here. `tests/theory/test_image_point.py` checks it against images formed by direct sums.
 """
 
 import math
@@ -31,9 +31,9 @@ _DB_OF_VARIANCE = 10 / math.log(10)
 def peak_loss_db(analysis: "Analysis") -> Floats:
     """Loss of the image peak due to all declared errors, (cases,). [dB]
 
-    The mission's rule combines the losses of the errors. Under root-sum-square the decibels add, under a sum their
-    square roots add, and under `each` the largest loss counts. NaN where an error leaves no image, or where no error
-    is declared.
+    The mission's rule combines the losses of the errors. Under root-sum-square the decibels are added, and under a
+    sum the square roots of the decibels are added. Under `each` the largest loss is taken. The loss is NaN where an
+    error leaves no image, or where no error is declared.
     """
     errors, together = analysis.errors, analysis.together("full")
     losses = list(_losses_of_motion(analysis, together.motion))

@@ -1,17 +1,18 @@
 """Change of the quadratic phase error from the scene centre to the scene's edge, for many cases at once.
 
-The paper's errors are spatially invariant. In the full model they are not: at a point p of the scene both platforms
-have other lines of sight. The exact ranges are therefore computed with p in place of the scene centre. An autofocus
-correction is one phase for the whole image, so it does not remove the difference between p and the centre. Derived
-here. `tests/simulate/test_scene_edge.py` checks it against exact ranges and against images at 250 m and 1 km.
+The paper's errors are spatially invariant. In the full model they are not: both platforms have other lines of sight
+at a point p of the scene than at the scene centre. The exact ranges are therefore computed with p in place of the
+scene centre. An autofocus correction is one phase for the whole image, so it does not remove the difference between p
+and the centre. Derived here. `tests/simulate/test_scene_edge.py` checks it against exact ranges and against images at
+250 m and 1 km.
 
-The requirement is that this difference stays within the total budget, without the gain of autofocus, because it
-remains after an autofocus correction of any error. Without autofocus, the difference is the phase that the edge adds
-to that at the centre, to which the rows of the report refer. Without autofocus, and also with a correction that has a
-bound of its own, the report warns if the phase at the edge itself exceeds a limit.
+The requirement is that this difference stays within the total budget without the gain of autofocus, because it
+remains after autofocus has corrected an error of any size. Without autofocus, it is the phase that the edge adds to
+the phase at the centre, to which the rows of the report refer. The report also warns if the phase at the edge itself
+exceeds a limit, autofocus gain included, that the phase at the centre meets.
 
-A place is a ground point of one of the cases. The argument `of` gives the index of the case of each place. The rows
-of arrays are the errors, followed by the parts of the random errors (`scene_random`).
+A place is a ground point of one of the cases. The argument `of` holds the index of the case for each place. The rows
+of arrays are the errors of motion and clocks, followed by the parts of the random errors (`scene_random`).
 """
 
 import math
@@ -51,34 +52,37 @@ class SceneSettings:
     nearest_m : float
         Distance between a platform and a ground point below which there is no image. [m]
     crest_fraction : float
-        A climb ends when a height differs from the predicted crest of the cosine by less than this fraction of the
-        crest. The azimuth is then accurate to a degree.
+        A search for a maximum ends when the computed value differs from the predicted crest of the cosine by less
+        than this fraction of the crest. The azimuth is then accurate to a degree.
     crest_error_fraction : float
-        Assumed error of a crest that is predicted from points of a rim, as a fraction of the crest.
+        Assumed error of a crest that is predicted from the points of a circle, as a fraction of the crest.
     max_climb_rounds : int
-        Largest number of rounds of a climb. Each round searches a quarter of the previous arc.
+        Largest number of rounds of a search for a maximum. Each round searches a quarter of the previous arc.
     narrow_clearance_ratio : float
-        Clearance below which the surroundings of a point are searched, whatever its difference.
+        A local minimum of the clearance is searched only if it is expected to be below this value.
     max_radius_fraction : float
         Radius at which the search for a radius ends, as a fraction of the nearest slant range.
     radius_fraction : float
         Tolerance of a radius, as a fraction of the radius.
     similar_size_fraction : float
-        Difference between a size and the total below which large errors need no search, as a fraction of the total.
+        The radius found with first-order effects is kept if the largest difference there, for errors of any size,
+        deviates from the total by at most this fraction of the total.
     max_azimuth_rounds : int
         Number of worst azimuths along which a radius is searched before the whole circle is searched.
     probe_count : int
-        Number of azimuths at which a large error is compared with a small one.
+        Number of azimuths at which the exact difference of a large error is compared with the first-order difference.
     small_phase_rad, small_phase_fraction : float
-        Difference of one error that is taken as small: up to this phase [rad], or this fraction of the largest
-        difference.
+        Deviation of an exact difference from the first-order difference up to which an error is treated as small: the
+        larger of this phase [rad] and this fraction of the largest difference on the circle.
     azimuth_rad : float
-        Tolerance of the azimuth of a largest difference. A cosine loses half the square of this angle. [rad]
+        Tolerance of the azimuth of a largest difference [rad]. The relative loss of a cosine is half the square of
+        it.
     folding_fraction : float
-        Area that the gradients span, as a fraction of their area without an error, below which a point may have no
-        image.
+        Area spanned by the range and Doppler gradients, as a fraction of their area without an error, below which the
+        search looks for places without an image.
     cases_per_block, lanes_per_block : int
-        Numbers of cases, and of large errors at ground points, whose arrays stay in a cache.
+        Numbers of cases, and of large errors at ground points, in one block of a computation, so that its arrays fit
+        into a cache.
     """
 
     rim_points: int = 16
@@ -106,16 +110,18 @@ _SCENE = SceneSettings()
 _LIMIT_FACTOR = 1 + UTILIZATION_TOLERANCE_FRACTION
 _ARC = math.pi / _SCENE.rim_points
 _SIDES = np.array([[-1.0], [1.0]])
-HeightAt = Callable[[Floats, Indices], Floats]  # heights at azimuths, of some climbers
-SizeAt = Callable[[Floats, Indices], Floats]  # sizes at radii, of some cases
+HeightAt = Callable[
+    [Floats, Indices], Floats
+]  # values to maximise, at azimuths (n,), for the searches with indices (n,)
+SizeAt = Callable[[Floats, Indices], Floats]  # combined differences at radii (n,), for the cases with indices (n,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenePlaces:
-    """Quadratic phase of each error or part at places, and its difference from the scene centre.
+    """Quadratic phases of errors and parts at places, and their combined difference from the scene centre.
 
-    `phases` (errors, places) are the quadratic phases. `size` (places,) is the combined size of the differences from
-    the phases at the centre. [rad]
+    `phases` (errors and parts, places) are the quadratic phases. [rad] `size` (places,) is the difference from the
+    phases at the centre, combined over all errors by the mission's rule. [rad]
 
     `clearance` (places,) is the sine of the angle between the directions that band and aperture resolve, divided by
     the smallest sine that gives an image. A place has an image if its clearance is above 1. The clearance is positive
@@ -133,16 +139,17 @@ class ScenePlaces:
 
     @property
     def heights(self) -> Floats:
-        """Heights for the search along circles, (2, places): the negative of the clearance, and the size."""
+        """Values that the search along circles maximises, (2, places): the negative of `clearance`, and `size`."""
         return np.array((-self.clearance, self.size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rims:
-    """Circles around scene centres: largest difference from the centre, its azimuth, and phases on the circle. [rad]
+    """Results on circles around scene centres: largest difference from the centre and its azimuth, (circles,). [rad]
 
-    The differences assume that all errors are small. `phases` is (errors or parts, points, circles). The difference
-    is infinite where a part of the circle has no image.
+    The differences are computed as if all errors were small. A difference is infinite if a part of its circle has no
+    image. `phases` (errors or parts, points, circles) are the quadratic phases at evenly spaced points of the
+    circles. [rad]
     """
 
     azimuth: Floats
@@ -158,39 +165,42 @@ Selection = int | Booleans | Indices | tuple[Indices, ...]  # of the cases
 
 
 class Heights(NamedTuple):
-    """Heights and their azimuths. Of two equal heights, the one with the larger azimuth counts as higher."""
+    """Values found by a search along circles, such as combined phase differences, and their azimuths. [rad]
+
+    If two values are equal, the one with the larger azimuth counts as higher.
+    """
 
     height: Floats
     azimuth: Floats
 
     @property
     def highest(self) -> "Heights":
-        """The highest entries along the first axis, with their azimuths."""
+        """Highest value along the first axis, with its azimuth."""
         height = self.height.max(axis=0)
         return Heights(height, np.where(self.height == height, self.azimuth, -math.inf).max(axis=0))
 
     def with_others(self, *candidates: "Heights") -> "Heights":
-        """The higher of these heights and the candidates, element by element."""
+        """Element-wise maximum of these values and the candidates, with the azimuths."""
         return Heights(*map(np.array, zip(self, *candidates, strict=True))).highest
 
     def of(self, indices: Selection) -> "Heights":
-        """Select the heights with the given indices."""
+        """Select the values with the given indices."""
         return Heights(self.height[indices], self.azimuth[indices])
 
     def where(self, is_kept: Booleans, replacements: "Heights") -> "Heights":
-        """These heights where `is_kept` is true, and the replacements elsewhere."""
+        """Return these values where `is_kept` is true, and the replacements elsewhere."""
         return Heights(*(np.where(is_kept, *both) for both in zip(self, replacements, strict=True)))
 
     def put(self, indices: Selection, heights: "Heights") -> None:
-        """Replace the heights at the given indices."""
+        """Replace the values at the given indices."""
         self.height[indices], self.azimuth[indices] = heights
 
 
 class ScenePhases:
-    """Quadratic phases of the declared errors at any places of the scenes.
+    """Quadratic phases of the declared errors at arbitrary places of the scenes.
 
-    Arrays have one row for each error of motion or of a clock (`members`). After them follow the rows of the random
-    errors, one row for each of their parts (`scene_random`).
+    In all arrays, the first rows are the errors of motion and clocks (`members`), one row for each. They are followed
+    by the random errors, with one row for each of their parts (`scene_random`).
     """
 
     def __init__(self, errors: DeclaredErrors, random: Sequence[RandomError] = ()) -> None:
@@ -222,7 +232,7 @@ class ScenePhases:
         return self.there(self.ranges_at(radius, azimuth, of), of)
 
     def there(self, there: ExactRanges, of: Indices) -> ScenePlaces:
-        """Return the same as `places`, for places whose exact ranges are known."""
+        """Return the same result as `places`, from the exact ranges `there` of the places."""
         centre = self.centre.take(of, axis=1)
         phases = self.random.there(there, of)
         if self.members:
@@ -236,9 +246,10 @@ class ScenePhases:
         return ScenePlaces(phases, self.together(phases - centre, of), clearance)
 
     def together(self, phases: Floats, of: Indices, indices: Sequence[int] | None = None) -> Floats:
-        """Combine the phases of all errors, or of the errors with the given indices. [rad]
+        """Combine phases at places by the mission's rule, for all errors or for those with the given indices. [rad]
 
-        The phases of a covariance are combined with their correlations.
+        `phases` (errors and parts, places) are signed. The phases of a covariance are combined with their
+        correlations.
         """
         phases_of_errors = self.of_errors(phases)
         if indices is None and not self.groups:
@@ -249,7 +260,7 @@ class ScenePhases:
         return np.asarray(np.broadcast_to(total, phases.shape[1:]))
 
     def of_errors(self, phases: Floats) -> Floats:
-        """Phase of each error, (errors, ...), from the phases of errors and parts. [rad]
+        """Phase of each error, (errors, ...), from the phases of errors and parts, (errors and parts, ...). [rad]
 
         The phase of a random error is its sigma, computed from its parts.
         """
@@ -257,18 +268,22 @@ class ScenePhases:
         return np.concatenate((phases[:count], self.random.of_errors(phases[count:])))
 
     def differences(self, radius: Floats, azimuth: Floats, of: Indices) -> Floats:
-        """Phase of each error at places less its phase at the centre. Large errors have their worse sign. [rad]"""
+        """Phase of each error or part at places less its phase at the centre, (errors and parts, places). [rad]
+
+        For a large error it is the difference for the worse sign of the error.
+        """
         return self.around(radius, azimuth, of, self.is_large.take(of, axis=1))[1]
 
     def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Booleans) -> tuple[Floats, Floats, Floats]:
-        """Differences of the phases from the centre, to first order and by exact ranges, and the least area ratio.
+        """Phase differences from the centre, to first order and by exact ranges, and the smallest area ratios.
 
-        Returns three arrays. The first, (errors, places), holds the differences if all errors were small. [rad] The
-        second is the same, with exact ranges for the errors marked in `exact`. [rad]
+        Returns three arrays. The first, (errors, places), holds the first-order differences. [rad] The second is
+        equal to the first, except that the differences of the errors marked in `exact` (errors, places) follow from
+        exact ranges. [rad]
 
-        The third, (places,), is the smallest ratio, over the errors marked in `exact`, of two areas that the range
-        and Doppler gradients span: the area at the point to which the error moves the image, and the area without the
-        error. It is 0 where there is no image.
+        The third, (places,), is the smallest area ratio of the errors marked in `exact`. The area ratio of an error
+        is the area that the range and Doppler gradients span at the point to which the error moves the image, divided
+        by the area without the error. It is 0 where there is no image.
         """
         there = self.ranges_at(radius, azimuth, of)
         small = self.there(there, of).phases - self.centre.take(of, axis=1)
@@ -282,7 +297,7 @@ class ScenePhases:
     def _exactly(
         self, there: ExactRanges, of: Indices, error: Indices, point: Indices, kept: tuple[Floats, Floats]
     ) -> None:
-        """Replace the differences and area ratios of some errors at places by the results of exact ranges."""
+        """Replace differences and area ratios in `kept`, for pairs of an error and a place, by exact results."""
         (differences, turns), case, count = kept, of[point], error.size
         lanes = self._lanes.of((self._rows[:, error] * self.errors.cases + case).reshape(-1))
         lanes = replace(lanes, case=np.tile(point, 2))
@@ -299,13 +314,16 @@ class ScenePhases:
 
     @cached_property
     def _rows(self) -> Indices:
-        """Position of each large error in the lanes of `_lanes`, for each sign, (2, errors)."""
+        """Index of the block of lanes of each large error and sign in `_lanes`, (2, errors).
+
+        A block has one lane, which is one error of one sign in one case, for each case.
+        """
         lane = np.cumsum(self.is_large.any(axis=1)) - 1
         return np.array((2 * lane, 2 * lane + 1))
 
     @cached_property
     def _lanes(self) -> Lanes:
-        """Lanes, in all cases and for both signs, of the errors that are large in any case."""
+        """Lanes of the errors that are large in any case: both signs of each error, in all cases."""
         large = np.flatnonzero(self.is_large.any(axis=1))
         return self.errors.lanes(*(self.members[i] for i in large), signs=(1.0, -1.0))
 
@@ -319,9 +337,9 @@ class ScenePhases:
 
     @cached_property
     def more(self) -> Floats:
-        """Quadratic phase at the centre by exact ranges less the first-order phase, (errors, cases). [rad]
+        """Exact less first-order quadratic phase at the centre, (errors and parts, cases). [rad]
 
-        The sign of the error is its worse sign. The value is 0 for errors that are not large.
+        The exact phase is that for the worse sign of the error. The value is 0 for errors that are not large.
         """
         exactly = self.centre.copy()
         for index, error in enumerate(self.members):
@@ -330,15 +348,15 @@ class ScenePhases:
 
     # ------------------------------------------------------------------ circles
     def points(self, radius: Floats, of: Indices) -> Indices:
-        """Number of evenly spaced points that each circle needs."""
+        """Number of evenly spaced points at which a circle of the given radius [m] needs to be evaluated."""
         return np.where(radius <= _SCENE.wide_fraction * self.nearest[of], _SCENE.rim_points, 2 * _SCENE.rim_points)
 
     def rims(self, radius: Floats, of: Indices) -> Rims:
-        """Evaluate circles that need the same number of points, at even points and around the worst point of each.
+        """Evaluate circles at evenly spaced points and around their worst points.
 
-        The worst point is the point with the largest difference. The surroundings of the smallest clearance are
-        searched too if that clearance comes close to 1. There the difference grows as the inverse of the clearance,
-        within an arc that the even points may miss.
+        All circles must need the same number of evenly spaced points. The worst point of a circle is the point with
+        the largest difference. If the smallest clearance comes close to 1, its surroundings are searched too. There
+        the difference grows as the inverse of the clearance, within an arc that the evenly spaced points may miss.
         """
         count, circles = int(self.points(radius, of)[0]), np.arange(of.size)
 
@@ -350,7 +368,7 @@ class ScenePhases:
         nearest = clear.highest
         has_image = nearest.height < -1
         point, circle = np.nonzero((clear.height > -math.inf) & has_image)
-        if point.size:  # beside the narrowest
+        if point.size:  # the difference may peak near the smallest clearance
             arc, azimuth = math.pi / count / 8, clear.azimuth[point, circle]
             three = np.concatenate((azimuth - arc, azimuth, azimuth + arc))
             before, height, after = look(three, np.tile(circle, 3)).size.reshape(3, -1)
@@ -376,16 +394,16 @@ def at(radius: PerCase, azimuth: PerCase) -> tuple[PerCase, PerCase]:
 
 # ---------------------------------------------------------------------- climbs
 def _tops(heights: Floats, look: Callable[[Floats, Indices], Floats]) -> tuple[Heights, Heights]:
-    """Climb to the local maxima of heights on circles, from the even points that are above their neighbours.
+    """Search for the local maxima of values on circles, starting from points that are above their neighbours.
 
-    `heights` (2, points, circles) are the negative clearances and the sizes. `look` returns both at given azimuths of
-    given circles. The result is the maxima of the negative clearances and the maxima of the sizes, (points, circles)
-    each. It is minus infinity where no climb started.
+    `heights` (2, points, circles) are the negative clearances and the sizes at evenly spaced points. `look` returns
+    both at given azimuths of given circles. Returns the maxima of the negative clearances and the maxima of the
+    sizes, (points, circles) each. A value is minus infinity where no search started.
 
     Two kinds of starting points are left out: clearances that are not expected to fall below
     `narrow_clearance_ratio`, and sizes that are expected to stay below the highest size by more than the error of a
     predicted crest. All other minima of the clearance are searched, not only the lowest, because the true minimum
-    between the even points may be beside a higher one.
+    between the evenly spaced points may be beside a higher one.
     """
     arc = 2 * math.pi / heights.shape[1]
     before, after = np.roll(heights, 1, axis=1), np.roll(heights, -1, axis=1)
@@ -403,7 +421,7 @@ def _tops(heights: Floats, look: Callable[[Floats, Indices], Floats]) -> tuple[H
     )
     tops = Heights(np.full(heights.shape, -math.inf), np.zeros(heights.shape))
     tops.put(is_start, top)
-    # As if they had been climbed one by one, from the highest crest on.
+    # The result is that of searches one after another, in falling order of the predicted crests.
     order = np.argsort(np.where(is_start[1], -crests[1], math.inf), axis=0, kind="stable")
     climbed, seemed = (np.take_along_axis(values, order, axis=0) for values in (tops.height[1], most))
     is_low = seemed[1:] < np.maximum.accumulate(climbed, axis=0)[:-1]
@@ -413,10 +431,11 @@ def _tops(heights: Floats, look: Callable[[Floats, Indices], Floats]) -> tuple[H
 
 
 def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, arc: float) -> Heights:
-    """Climb to the maximum near each starting point, whose neighbours at a distance `arc` are not higher.
+    """Search for the maximum near each starting point, whose neighbours at a distance `arc` are not higher.
 
-    To first order in the radius, a height is a constant plus a cosine of the azimuth. If the predicted crest of this
-    cosine differs from the height computed there, the search is repeated in a quarter of the arc.
+    `sides` are the values at both neighbours. To first order in the radius, a value is a constant plus a cosine of
+    the azimuth. If the value computed at the predicted crest of this cosine differs from the prediction, the search
+    is repeated in a quarter of the arc.
     """
     best, here, climbers = Heights(*map(np.array, start)), start, np.arange(start.height.size)
     for _ in range(_SCENE.max_climb_rounds):
@@ -438,7 +457,10 @@ def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, 
 
 
 def _crest(before: Floats, after: Floats, middle: Floats, arc: float) -> tuple[Floats, Floats]:
-    """Offset from the middle of three points, `arc` apart, to the crest of their cosine, and the crest's height."""
+    """Crest of the cosine through three points on a circle that are `arc` apart [rad].
+
+    Returns the offset of the crest from the middle point [rad], limited to ±`arc`, and the value at the crest.
+    """
     sine = (after - before) / (2 * math.sin(arc))
     cosine = (middle - (after + before) / 2) / (1 - math.cos(arc))
     offset = np.minimum(np.maximum(np.arctan2(sine, cosine), -arc), arc)
@@ -448,18 +470,23 @@ def _crest(before: Floats, after: Floats, middle: Floats, arc: float) -> tuple[F
 class _Climb:
     """Search for the largest differences on circles, for errors of any size.
 
-    The search starts from the highest of several places on each circle. One of these places is the azimuth where the
-    difference is largest for small errors.
+    The search on a circle starts from the azimuth with the highest value. The azimuths compared are evenly spaced
+    ones and the azimuth where the difference is largest for small errors.
     """
 
     def __init__(self, phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> None:
         self.phases, self.radius, self.of, self.rims = phases, radius, of, rims
         self.large = phases.is_large.take(of, axis=1)
         self.bent = self._bent()
-        self.lowest = Heights(np.full(of.size, -math.inf), np.zeros(of.size))  # turns and azimuths, negative
+        self.lowest = Heights(
+            np.full(of.size, -math.inf), np.zeros(of.size)
+        )  # negative area ratios and negative azimuths
 
     def largest(self) -> Heights:
-        """The largest differences [rad] with their azimuths; infinite if a part of the circle has no image."""
+        """Largest differences on the circles, with their azimuths. [rad]
+
+        A difference is infinite if a part of the circle has no image.
+        """
         azimuth, bent_circles = self.rims.azimuth.copy(), np.flatnonzero(self.bent.any(axis=0))
         if bent_circles.size:
             azimuth[bent_circles] = self._azimuths(bent_circles) % (2 * math.pi)
@@ -467,7 +494,7 @@ class _Climb:
         return Heights(self.phases.together(differences, self.of), azimuth)
 
     def _bent(self) -> Booleans:
-        """Mark the large errors whose differences vary around the circle in another way than for small errors.
+        """Mark the large errors whose exact differences deviate from the first-order differences on a circle.
 
         The differences are compared at three azimuths, which reveal two harmonics.
         """
@@ -485,9 +512,9 @@ class _Climb:
         return np.asarray(is_bent.reshape(len(large), _SCENE.probe_count, -1).any(axis=1))
 
     def _look(self, circles: Indices, azimuths: Floats) -> Heights:
-        """The largest of the differences at azimuths (n, circles). [rad]
+        """Largest combined difference of each circle among given azimuths (n, circles), with its azimuth. [rad]
 
-        The smallest area ratios of `ScenePhases.around` found so far are kept in `lowest`.
+        `lowest` keeps the smallest area ratio (see `ScenePhases.around`) that was found so far on each circle.
         """
         count = len(azimuths)
         of, bent = np.tile(self.of[circles], count), np.tile(self.bent[:, circles], count)
@@ -535,7 +562,9 @@ class _Climb:
 def differences_at(
     errors: DeclaredErrors, radius: float, azimuth: float, random: Sequence[RandomError] = ()
 ) -> list[tuple[str, float]]:
-    """Phase of each error at a place of one case less its phase at the centre, as pairs of row id and phase. [rad]
+    """Phase of each error at a place less its phase at the centre, as pairs of row id and phase. [rad]
+
+    `errors` have a single case. The place is given by its radius [m] and azimuth [rad] from the scene centre.
 
     The errors are in the order of the file. The value of a random error is its sigma, coverage factor included.
     """
@@ -549,12 +578,13 @@ def differences_at(
 # ---------------------------------------------------------------------- edges
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneEdges:
-    """Changes of the phases from the centre to the edges of the scenes, for many cases. [rad]
+    """Changes of the phases from the centres to the edges of the scenes, for many cases. [rad]
 
-    `rim` has the largest combined difference from the centre and its azimuth if all errors were small. `largest` has
-    the same for the declared sizes. Both combine the errors by the mission's rule, and are infinite where there is no
-    image. `over` (names, cases) are the phases at the edge of the errors or sums that meet their `limit` at the
-    centre but exceed it at the edge. For all others `over` is 0.
+    `rim` holds the largest combined difference from the centre, and its azimuth, as if all errors were small.
+    `largest` holds the same for the declared sizes. Both combine the errors by the mission's rule, and are infinite
+    where there is no image. `names` are the errors, or the sums of errors, that have a `limit` (names, cases). `over`
+    (names, cases) is the phase at the edge where it exceeds the limit although the phase at the centre meets it, and
+    0 elsewhere.
     """
 
     phases: ScenePhases
@@ -567,12 +597,12 @@ class SceneEdges:
 
     @property
     def difference(self) -> Floats:
-        """The largest combined difference of the phases between edge and centre, (cases,). [rad]"""
+        """Largest combined difference of the phases between edge and centre, (cases,). [rad]"""
         return self.largest.height
 
     @property
     def has_doubt(self) -> Booleans:
-        """Cases in which an error exceeds its limit at the edge, but not at the centre."""
+        """Cases in which an error or a sum exceeds its limit at the edge, but not at the centre."""
         return np.asarray((self.over > 0).any(axis=0))
 
 
@@ -624,7 +654,7 @@ def scene_edges(
     return edges
 
 
-@np.errstate(all="ignore")  # a gradient vanishes, or both are parallel to the last digit
+@np.errstate(all="ignore")  # a gradient may vanish, or both gradients may be parallel to the last digit
 def _evaluate(edges: SceneEdges, members: Sequence[Sequence[int]], of: Indices) -> None:
     phases = edges.phases
     rims = phases.rims(edges.radius[of], of)
@@ -647,7 +677,7 @@ def _largest(phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> He
 
 
 def _over_at_the_edge(edges: SceneEdges, members: Sequence[Sequence[int]], of: Indices, rims: Rims) -> Floats:
-    """Combined phases that exceed their limits at the edge but not at the centre, (names, of). [rad]
+    """Combined phases that exceed their limits at the edge but not at the centre, (names, cases in `of`). [rad]
 
     The value is 0 for all others.
     """
@@ -655,7 +685,7 @@ def _over_at_the_edge(edges: SceneEdges, members: Sequence[Sequence[int]], of: I
     more = phases.more[:, of]
 
     def combined_phases(at_points: Floats) -> Floats:
-        """Phases as they are compared with the limits, (names, ..., of). [rad]"""
+        """Phases that are compared with the limits: of each error under `each`, otherwise of each sum. [rad]"""
         if phases.combine == "each":
             return np.abs(phases.of_errors(at_points))
         return np.array([phases.together(at_points, of, indices) for indices in members])
@@ -674,7 +704,7 @@ def _over_at_the_edge(edges: SceneEdges, members: Sequence[Sequence[int]], of: I
 class Corrections:
     """Distance from the scene centre within which one autofocus correction is sufficient.
 
-    Within this distance the differences of the phases from the centre stay within a total. [rad]
+    Within this distance, the differences of the phases from the centre stay within `total`. [rad]
 
     Attributes
     ----------
@@ -756,7 +786,7 @@ class Corrections:
     def _grow(
         self, size_at: SizeAt, of: Indices, searched: Indices, low: Floats, below: Floats, high: Floats, size: Floats
     ) -> None:
-        """Increase the radii until the size exceeds the total, or until `farthest` is reached."""
+        """Increase the radii [m] in place until the size exceeds the total, or until `farthest` is reached."""
         total, farthest = self.total[of], self.farthest[of]
         while True:
             searched = searched[(size[searched] <= total[searched]) & (high[searched] < farthest[searched])]
@@ -770,7 +800,8 @@ class Corrections:
     def _crests(self, radius: Floats, of: Indices, *, of_small: bool = True) -> Heights:
         """Largest differences on circles with their azimuths. [rad]
 
-        With `of_small`, all errors are taken as small; otherwise they have their declared sizes.
+        If `of_small` is true, the effects of all errors are taken to first order; otherwise they are those of any
+        size.
         """
         largest, counts = Heights(np.empty(of.size), np.empty(of.size)), self.phases.points(radius, of)
         for count in np.unique(counts):
@@ -798,15 +829,16 @@ def where(
         Limit of the sizes.
     searched : (searched,)
         Indices, out of n, of the cases to search.
-    inside, outside : (radius, size) of (n,)
-        Radii with their sizes inside and outside the total, between which the solution lies.
+    inside, outside : pairs of (n,)
+        Radius with its size, at which the size is within the total (`inside`) or exceeds it (`outside`). The solution
+        lies between the two radii.
     """
     (low, below), (high, above) = ([values[searched].copy() for values in pair] for pair in (inside, outside))
     slack = total[searched] * _SCENE.radius_fraction / 2
     goal = total[searched] - slack
     below, above = below - goal, above - goal
-    side = np.zeros(searched.size)  # of the goal, on which the last one was
-    going = np.flatnonzero(below <= 0)  # others are as near as asked for
+    side = np.zeros(searched.size)  # side of the goal on which the last point was: 1 inside, -1 outside
+    going = np.flatnonzero(below <= 0)  # the others are already within the tolerance
     while True:
         going = going[high[going] - low[going] > _SCENE.radius_fraction * high[going]]
         if not going.size:
@@ -819,7 +851,7 @@ def where(
         ins, outs = going[is_inside], going[~is_inside]
         low[ins], below[ins] = middle[is_inside], over[is_inside]
         high[outs], above[outs] = middle[~is_inside], over[~is_inside]
-        # Twice on one side: draw the other nearer.
+        # Illinois step: after two points on one side, halve the value of the other side.
         above[ins] = np.where(side[ins] > 0, above[ins] / 2, above[ins])
         below[outs] = np.where(side[outs] < 0, below[outs] / 2, below[outs])
         side[ins], side[outs] = 1.0, -1.0

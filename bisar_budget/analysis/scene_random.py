@@ -1,20 +1,21 @@
 """Quadratic phases of errors without a sign at places of a scene: sensors, clocks, air and slow vibrations.
 
-A random error is a sum of independent parts. The variation of each part over the aperture is known except for its
-size. A part is, for example, one axis of a bias, or one axis and one order of noise. In one flight each part has one
-size for the whole scene. The difference of the error between two places is therefore the root-sum-square of the
-differences of its parts. The difference of two root-sum-squares would be smaller.
+A random error is a sum of independent parts. The variation of each part over the aperture is known, while its size is
+random. A part is, for example, the bias along one axis, or one order of the noise along one axis. During one
+collection, a part has the same size at all places of the scene. The difference of the error between two places is
+therefore the root-sum-square of the differences of its parts. The difference of the two root-sum-squares would be too
+small.
 
 - An error that moves a platform is projected on the line of sight from each place.
-- A clock error moves no platform. A place has the phase of the centre, plus the phase that the constant and the
-  linear term add because their displacement differs at this place. These terms are the terms of the displacement at
-  the centre. Terms that the file leaves open, as for a free oscillator, are not counted, and the report contains a
-  note on that.
+- A clock error moves no platform. The phase at a place is the phase at the centre plus a phase that the constant and
+  the linear term of the range error add, because their displacement differs at this place. These terms are those
+  that cause the displacement at the centre. Terms that the file leaves open, as for a free oscillator, are left out,
+  and the report contains a note on that.
 - A zenith delay is the same for the whole scene, and each place has its own elevation of the leg. A delay that
   changes within the aperture consists of as many independent parts as its correlation requires.
 - A slow vibration has an unknown phase. Its cosine and sine are parts of the same size, and the worst phase is the
   root-sum-square of both. The axes may vibrate in any phase, so their effects add. A vibration stated along the line
-  of sight moves along the line of sight of the centre.
+  of sight moves the platform along the line of sight of the centre.
 
 An error that is stated only by its effect has this effect at every place of the scene. Derived here.
 `tests/simulate/test_random_at_scene_edge.py` checks it against exact ranges.
@@ -54,7 +55,7 @@ _CLOCKS = ("oscillator", "synchronization")  # kinds of errors that move nothing
 
 
 class RandomPhases:
-    """Declared errors without a sign, for many cases, at any places of their scenes.
+    """Declared errors without a sign, for many cases, at arbitrary places of their scenes.
 
     Attributes
     ----------
@@ -75,7 +76,10 @@ class RandomPhases:
         self._first_rows, self._groups = (np.cumsum([0, *counts])[:-1].astype(int) for counts in (sizes, groups))
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phases of the parts at the places of exact ranges, (parts, places). [rad]"""
+        """Quadratic phases of the parts of all errors at places, (parts, places). [rad]
+
+        The argument `there` gives the exact ranges at the places, and `of` the index of the case of each place.
+        """
         return np.concatenate([np.zeros((0, of.size)), *(error.there(there, of) for error in self._errors)])
 
     def of_errors(self, phases: Floats) -> Floats:
@@ -88,9 +92,9 @@ class RandomPhases:
 
 # ---------------------------------------------------------------------- one error at places
 class _Moving(NamedTuple):
-    """A random error of the motion of platforms.
+    """Random error of the motion of one or both platforms.
 
-    Its parts form `groups`. Each group is combined as a root-sum-square, and the results of the groups add.
+    Its parts form `groups`. The parts of a group are combined as a root-sum-square, and the groups are then added.
     """
 
     moves: Sequence[Moves]
@@ -105,7 +109,7 @@ class _Moving(NamedTuple):
             along = weights * there.along(motion.place, (ways[:, 0], ways[:, 1], ways[:, 2]))
             total = total + np.einsum("anp,mnp->amp", along, courses)
             seen = seen + np.einsum("anp,mnp->amp", np.abs(along), np.abs(courses))
-        # What is left of terms that cancel exactly is rounding.
+        # Where terms cancel exactly, the remainder is a rounding error.
         phase = np.where(np.abs(total) > VECTOR_ROUNDING_FRACTION * seen, total, 0.0) * _of(self.size, of)
         return np.asarray(phase.reshape(-1, of.size))
 
@@ -126,28 +130,28 @@ class _Clock(NamedTuple):
 
     @classmethod
     def of(cls, exact: ExactRanges, covariance: Floats, size: Floats) -> "_Clock":
-        """Create the clock error from its covariance at the scene centre, (4, 4, cases), and its size in units.
+        """Create the clock error from its covariance at the scene centre, (4, 4, cases), and its declared size.
 
         The covariance is that of `RandomEffect`, for one unit of the error: quadratic phase, cubic phase, and
-        displacement east and north.
+        displacement east and north. `size` (cases,) is in the same unit.
         """
         joint = covariance.reshape(4, 4, -1)[np.ix_((0, 2, 3), (0, 2, 3))]
         quadratic, east, north = np.moveaxis(factor(np.moveaxis(joint, 2, 0)), 0, 2) * size
-        (a, b), (c, d) = _terms(exact.place_weights, exact)  # what a unit of each term displaces
+        (a, b), (c, d) = _terms(exact.place_weights, exact)  # displacement by one unit of each term
         with np.errstate(all="ignore"):
             scale = 1 / (a * d - b * c)
         constant, linear = (d * east - b * north) * scale, (a * north - c * east) * scale
         return cls(quadratic, constant, linear, _terms(exact.phase_weights, exact)[0])
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phase of each part, (parts, places). [rad]"""
+        """Quadratic phase of each part at places, (parts, places). [rad]"""
         by_constant, by_linear = _terms(there.phase_weights, there)[0] - self.at_centre[:, of]
         quadratic, constant, linear = (term[:, of] for term in self[:3])
         return np.asarray(quadratic + by_constant * constant + by_linear * linear)
 
 
 def _terms(weights: Iterable[Floats], exact: ExactRanges) -> Floats:
-    """Effects of a range error of one metre, and of one metre per second, (effects, 2, cases).
+    """Effects of a constant range error of 1 m, and of a linear range error of 1 m/s, (effects, 2, cases).
 
     Each row of `weights` gives one effect per metre of range error at each node.
     """
@@ -155,10 +159,10 @@ def _terms(weights: Iterable[Floats], exact: ExactRanges) -> Floats:
 
 
 class _Delay(NamedTuple):
-    """A delay of the air on the legs of one or both platforms, stated in metres at the zenith.
+    """Delay of the air on the leg of one platform or on both legs, stated in metres at the zenith.
 
-    `middles` are the positions of the platforms at mid-aperture relative to the scene centre. `courses` (courses,
-    nodes, cases) are independent variations over the aperture. Together they make up a zenith delay of variance 1.
+    `middles` are the positions of the platforms at mid-aperture relative to the scene centre. [m] `courses` (courses,
+    nodes, cases) are independent variations over the aperture, which together make up a zenith delay of variance 1.
     """
 
     platform_indices: tuple[int, ...]
@@ -169,7 +173,7 @@ class _Delay(NamedTuple):
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phase by each independent variation of the delay at ground points, (courses, points). [rad]"""
+        """Quadratic phase due to each independent variation of the delay at places, (courses, places). [rad]"""
         along = np.zeros(())
         for platform_index, middle in zip(self.platform_indices, self.middles, strict=True):
             x, y, z = (component[of] for component in middle)
@@ -212,7 +216,7 @@ def _vibrating(errors: DeclaredErrors) -> Iterator[tuple[Subject, _Moving]]:
 
 
 def _at_nodes_of(errors: DeclaredErrors, moves: Sequence[Moves]) -> list[Moves]:
-    """Resample motions of platforms at the nodes of the declared errors."""
+    """Interpolate motions of platforms to the nodes at which the declared errors are sampled."""
     resampled = []
     for motion in moves:
         between = _between(motion.courses.shape[1], errors.exact.fit.shape[1])
@@ -223,7 +227,7 @@ def _at_nodes_of(errors: DeclaredErrors, moves: Sequence[Moves]) -> list[Moves]:
 
 @cache
 def _between(sensed: int, count: int) -> Floats:
-    """Matrix that takes variations from the nodes of the sensors to `count` other nodes.
+    """Matrix (count, sensed) that interpolates from `sensed` nodes of the sensors to `count` other nodes.
 
     It uses the Legendre orders that both sets of nodes resolve.
     """

@@ -1,13 +1,12 @@
-"""Phases that make echoes and phases that spread: tones, noise, and cubic phase without its own requirement.
+"""Phases that cause echoes or spread energy over the image: tones, noise, and cubic phase without a requirement.
 
-Independent powers add, also if `allocation.combine` sets another rule for phases. Each effect is judged once. A tone
-counts against PSLR, or, without that requirement, with its power φ²/2 against ISLR. A cubic phase counts against its
-own requirement. Without that requirement its power counts against ISLR, since the cubic phase is part of the image's
-sidelobes.
+Independent powers add, even if `allocation.combine` sets another rule for phases. Each effect is judged once. A tone
+counts against PSLR or, without a requirement on PSLR, with its power φ²/2 against ISLR. A cubic phase counts against
+its own requirement. Without such a requirement its power counts against ISLR, since it is part of the sidelobes.
 
-Noise of a phase variance σ² leaves exp(-σ²) of the energy in the response and spreads the rest over the image. A
-share E of the response lies within the first nulls, which an image counts as its mainlobe. Noise therefore adds
-(exp(σ²) - 1)/E to the ISLR. The paper's rule adds σ² instead.
+Noise of phase variance σ² leaves exp(-σ²) of the energy in the response and spreads the rest over the image. A share
+E of the response lies within the first nulls, which are taken as the limits of the mainlobe in an image. Noise
+therefore adds (exp(σ²) - 1)/E to the ISLR. The paper's rule adds σ² instead.
 """
 
 import math
@@ -58,7 +57,7 @@ class SpreadPhase(NamedTuple):
 
 
 class StatedPower(NamedTuple):
-    """Error from elsewhere that is stated by the ISLR it adds. [dB]"""
+    """Error that was determined elsewhere and is stated by the ISLR that it adds. [dB]"""
 
     subject: Subject
     islr: Any
@@ -110,9 +109,9 @@ def islr_of(mission: Mission, variance: PerCase) -> Floats:
 
 
 def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> Any:
-    """Largest rms phase that an owner may spread, by the paper's rule or as in an image. [rad]
+    """Largest rms phase that an owner may spread under the requirement on ISLR; None without that requirement. [rad]
 
-    None without a requirement on ISLR.
+    In the published model it follows from the paper's rule, otherwise from the ISLR of an image.
     """
     if mission.requirements.islr is None:
         return None
@@ -171,7 +170,7 @@ def _echoes(alone: Tone, free: PerCase, remaining: LeftTone, mission: Mission) -
 
 
 def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List the phases of noise, which spread beyond the cubic.
+    """List the noise phases, which spread energy over the image, with their variances [rad²].
 
     They come from wideband vibration, sensor noise, phase noise, synchronization links, and powers that the file
     states.
@@ -193,11 +192,11 @@ def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
 
 
 def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List the phases beyond the cubic of errors of motion, clocks, sensors and slow vibrations.
+    """List the phases beyond the cubic order of errors of motion, clocks, sensors and slow vibrations.
 
-    They are at one sigma, and left out where they are negligible. They are very small for short apertures, and larger
-    for a quarter of a circle. The published model has no such phases. Where a line of sight turns by more than a
-    radian, they are contained in the phase of equal loss.
+    Their variances [rad²] are those at one sigma. Negligible ones are left out. They are very small for short
+    apertures, and larger for a quarter of a circle. The list is empty in the published model. Where a line of sight
+    turns by more than a radian, the phase of equal loss already contains them.
     """
     if model == "published":
         return []
@@ -225,7 +224,7 @@ def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
 
 
 def stated_powers(mission: Mission) -> list[StatedPower]:
-    """List the errors from elsewhere that the file states by their ISLR."""
+    """List the errors determined elsewhere that the file states by the ISLR that they add."""
     return [
         StatedPower(subject("mission", "other", f"{stated.name}.islr", entry=index), stated.islr)
         for index, stated in enumerate(mission.other_errors)
@@ -234,12 +233,12 @@ def stated_powers(mission: Mission) -> list[StatedPower]:
 
 
 def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str) -> list[list[SpreadPhase]]:
-    """List the phases that count against ISLR, for each owner.
+    """List, for each owner, the phases that count against its share of the ISLR.
 
-    All phases count against the mission's requirement. The phases are noise, the phases of errors beyond the cubic,
-    the tones without another requirement, and the cubic phase if it has no requirement of its own. The cubic phase of
-    an owner is at one sigma. It is left out where it is negligible, or where an error has no image. A variance is NaN
-    in cases that do not have the phase.
+    All phases count against the requirement of the mission. The phases are noise, the phases of errors beyond the
+    cubic order, the tones if there is no requirement on PSLR, and the cubic phase if it has no requirement of its
+    own. The cubic phase of an owner is that at one sigma. It is left out where it is negligible, or where an error
+    has no image. A variance [rad²] is NaN in cases that do not have the phase.
     """
     mission, split, together = analysis.mission, analysis.allocation.islr, analysis.together(model)
     spreads = noise(analysis, model) + rests(analysis, model)

@@ -64,7 +64,7 @@ class Together:
 
     @property
     def rule_of_all(self) -> str:
-        """Rule by which all declared errors are added up.
+        """Rule that combines all declared errors.
 
         It is the mission's rule, or root-sum-square if the mission's rule is `each`.
         """
@@ -98,7 +98,7 @@ class Together:
 
     @cached_property
     def phases(self) -> list[DeclaredPhase]:
-        """Phases of all declared errors: of motion, of the clock, of pure phase errors, and those in `own`."""
+        """Phases of all declared errors: errors of motion, clock errors, pure phase errors, and those in `own`."""
         phases_of_motion, factor = [], self.errors.mission.allocation.coverage_factor
         for error in self.errors.stated:
             does, coverage = self.errors.does(self.model, error), factor if error.is_covered else 1.0
@@ -108,7 +108,10 @@ class Together:
         return [*phases_of_motion, *self.own]
 
     def owed(self, split: Shares, owner: str) -> list[DeclaredPhase]:
-        """Phases that count against the share of an owner. All phases count against the mission's."""
+        """Phases that count against the share of an owner.
+
+        If the owner is the mission, these are all phases.
+        """
         return [phase for phase in self.phases if split.includes(phase.owner, owner)]
 
     def judged_parts(self, members: Sequence[DeclaredPhase], rule: str = "", gain: PerCase | None = None) -> Phases:
@@ -138,14 +141,17 @@ class Together:
 
     @cached_property
     def _hidden_of_groups(self) -> dict[str, Any]:
-        """Combined hidden phase of each covariance's six errors, by id; 0 in the published model. [rad]"""
+        """Combined hidden phase of the six errors of each covariance, by its id; 0 in the published model. [rad]"""
         if self.model == "published":
             return {group.id: 0.0 for group in self.groups}
         stated = {error.subject.id for error in self.motion}
         return {group.id: self._hidden_of(group) for group in self.groups if stated >= set(group.ids)}
 
     def _hidden_of(self, group: Correlated) -> Floats:
-        """Combined hidden phase of a covariance's six errors, as the rss of independent errors. [rad]"""
+        """Combined hidden phase of the six errors of a covariance, (cases,). [rad]
+
+        It is the root-sum-square of the hidden phases of the independent errors that compose the covariance.
+        """
         errors = {error.subject.id: error for error in self.motion}
         remaining = []
         for row_id in group.ids:
@@ -155,10 +161,10 @@ class Together:
         return np.asarray(np.sqrt(np.square(hidden).sum(axis=0)))
 
     def independent(self, group: Correlated, remaining: Floats) -> Floats:
-        """Range errors at the nodes of six independent errors that together have a given covariance. [m]
+        """Range errors at the nodes of six independent errors that compose a covariance, (6, nodes, cases). [m]
 
-        `remaining` are the range errors of the covariance's six errors, (6, nodes, cases). They are transformed by a
-        matrix root of the correlations.
+        `remaining` are the range errors of the covariance's six correlated errors, (6, nodes, cases). [m] They are
+        transformed by a matrix root of the correlations.
         """
         correlation = np.array([[self.errors.array(rho) for rho in row] for row in group.correlation])
         return np.asarray(np.einsum("cij,inc->jnc", factor(np.moveaxis(correlation, 2, 0)), remaining))
@@ -186,9 +192,10 @@ class Together:
     def moves(self, rule: str) -> Moves:
         """Displacement by each error of motion, prepared for the rule that combines displacements. [m]
 
-        The rule `sum` combines all signs. Each error then has half the difference between the displacements of its
-        two signs. The mean of these two displacements does not depend on the sign, and one more entry holds its sum
-        over all errors. Under the other rules, each error has the sign that moves the image farther.
+        Under the rule `sum`, which takes the largest sum over all signs, each error has half the difference between
+        the displacements for its two signs. The mean of these two displacements does not depend on the sign; its sum
+        over all errors is one further entry. Under the other rules, each error has the sign that moves the image
+        farther.
         """
         does = {error.subject.id: self.errors.does(self.model, error) for error in self.motion}
         if rule != "sum":
@@ -203,10 +210,10 @@ class Together:
 
     @cached_property
     def undirected_moves(self) -> Moves:
-        """Displacement by errors without a sign. [m]
+        """Displacement by errors without a sign, as pairs of id and (east, north). [m]
 
-        They are the sigmas of random errors, and tones in their worst phases. The displacement is 0 for a clock whose
-        displacement the file does not determine.
+        These are the sigmas of random errors, and the displacements by tones in their worst phases. The displacement
+        is 0 for a clock whose displacement the file does not determine.
         """
         moves = []
         for error in self.random:
@@ -240,7 +247,7 @@ class Together:
 
     # ---------------------------------------------------------------- one case
     def phase_parts(self, phases: Phases, rule: str = "", case: int = 0) -> list[tuple[str, float]]:
-        """List the signed phases that the mission's rule, or the given rule, combines in one case. [rad]
+        """List the signed phases that the mission's rule, or the given rule, combines, for one case. [rad]
 
         Each item is a pair of id and phase.
         """
@@ -248,7 +255,7 @@ class Together:
         return [(row_id, plain(phase, case)) for row_id, phase in combined_parts]
 
     def displacement_parts(self, case: int = 0) -> list[tuple[str, GroundVector]]:
-        """List the displacements that the mission's rule combines in one case. [m]
+        """List the displacements that the mission's rule combines, for one case. [m]
 
         Each item is a pair of id and (east, north). The list is empty if an error leaves no image.
         """
@@ -258,10 +265,10 @@ class Together:
 
 
 def quadratics(members: Iterable[DeclaredPhase]) -> Phases:
-    """List the signed quadratic phase of each member with its row id. [rad]"""
+    """List pairs of row id and signed quadratic phase of the given errors. [rad]"""
     return [(phase.row_id, phase.qpe_rad) for phase in members]
 
 
 def cubics(members: Iterable[DeclaredPhase]) -> Phases:
-    """List the signed cubic phase, with its row id, of each member that has a cubic phase. [rad]"""
+    """List pairs of row id and signed cubic phase of those given errors that have a cubic phase. [rad]"""
     return [(phase.row_id, phase.cubic_rad) for phase in members if phase.cubic_rad is not None]

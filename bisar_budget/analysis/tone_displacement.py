@@ -51,7 +51,7 @@ class TonePart(NamedTuple):
 
 
 class ToneDisplacement(NamedTuple):
-    """Displacement by a tone: the subject of its row, and its parts in each model.
+    """Displacement of the image by a tone, as parts for each model, with the subject of the tone's row.
 
     The parts may be in any phase relative to each other.
     """
@@ -61,11 +61,11 @@ class ToneDisplacement(NamedTuple):
     full: Sequence[TonePart]
 
     def parts(self, model: str) -> Sequence[TonePart]:
-        """Parts of the tone in a model."""
+        """Parts of the tone according to the model of the given name."""
         return self.full if model == "full" else self.published
 
     def by(self, model: str) -> Floats:
-        """Displacement east and north in a model, each in its worst phase, (2, n). [m]"""
+        """Displacement east and north according to a model, each component in its worst phase, (2, n). [m]"""
         return np.asarray(sum(tone_part.displacement for tone_part in self.parts(model)))
 
 
@@ -83,7 +83,7 @@ def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: Exac
             sizes: Sequence[float]
             if isinstance(value, tuple):
                 ways, sizes = getattr(geometry, name).frame(error.frame), value
-            else:  # along the line of sight, as it turns
+            else:  # stated along the line of sight, which turns over the aperture
                 ways, sizes = (
                     [[component / exact.ranges[platform_index] for component in exact.tracks[platform_index]]],
                     (value,),
@@ -127,7 +127,10 @@ def _tones_of_oscillators(
 
 
 def _orders(cycles: PerCase, size: PerCase) -> Floats:
-    """Amplitudes of orders 0 to 3 of a tone with the given cycles per aperture and amplitude [m], (4, n). [m]"""
+    """Amplitudes of orders 0 to 3 of a tone at the aperture edge, (4, n). [m]
+
+    `cycles` is the number of cycles per aperture, and `size` the amplitude of the tone. [m]
+    """
     quadratic, cubic, _, constant, linear = size * tone(math.pi * np.atleast_1d(cycles))
     return np.array([constant, linear, quadratic, cubic])
 
@@ -145,7 +148,7 @@ def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
 def _by_ranges(exact: ExactRanges, along: Floats) -> Floats:
     """Displacement per metre of each order by exact ranges, (4, 2, n). [m/m]
 
-    `along` (nodes, n) is the range error per metre of the tone.
+    `along` (nodes, n) is the range error at the nodes per metre of the tone.
     """
     seen = np.where(np.abs(along) > VECTOR_ROUNDING_FRACTION, along, 0.0)
     return np.asarray(np.einsum("wnc,nc,no->owc", exact.place_weights, seen, orders_at(exact.sampling.places)))

@@ -48,7 +48,7 @@ class VibrationLimits(NamedTuple):
     full: Any
 
     def by(self, model: str) -> Any:
-        """Limit in the model that gates. Under `strictest` it is the smaller of both limits."""
+        """Limit according to the gating model. Under `strictest` it is the smaller of both limits. [m]"""
         return np.minimum(*self) if model == "strictest" else self.full if model == "full" else self.published
 
     @property
@@ -99,7 +99,7 @@ def level_of(phase: PerCase) -> PerCase:
 
 
 def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:
-    """Pairs of indices of tones in quadrature: that of the tone, and that of the tone it refers to."""
+    """Pairs of tones in quadrature: index of a tone, and index of the tone that is a quarter cycle away from it."""
     index_by_id = {tone.subject.id: index for index, tone in enumerate(tones)}
     return [
         (here, index_by_id[tone.in_quadrature])
@@ -109,10 +109,10 @@ def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:
 
 
 def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | None:
-    """Highest echo of all tones, each alone or together with neighbouring tones.
+    """Highest echo of single tones and of groups of neighbouring tones; None without tones.
 
-    None without tones. `shape` is the shape of the numbers of many cases, (cases,). A case without a tone has level
-    0.
+    `shape` is the shape of the tones' numbers: (cases,), or () for plain numbers. In a case without a tone, the level
+    of the echo is 0.
     """
     if not tones:
         return None
@@ -123,7 +123,7 @@ def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | N
     )
     phases = np.where(is_there, phases, 0.0)
     pairs = quadratures(tones)
-    for first, second in pairs:  # at one frequency: both together are one tone
+    for first, second in pairs:  # both have one frequency and together form one tone
         phases[second], phases[first] = np.hypot(phases[first], phases[second]), 0.0
     number = near_groups(np.where(is_there, cycles, 0.0))
     here = np.arange(phases.shape[1])
@@ -162,7 +162,10 @@ def echo_phase(level: PerCase) -> PerCase:
 
 
 def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> dict[str, VibrationLimits]:
-    """Limits of each platform's vibration for `pslr` or `islr`; empty without that requirement."""
+    """Limits of each platform's vibration along the line of sight that follow from the requirement `metric`. [m]
+
+    `metric` is `pslr`, for amplitudes, or `islr`, for rms values. Empty without that requirement.
+    """
     requirement_db, split = getattr(mission.requirements, metric), getattr(allocation, metric)
     if requirement_db is None:
         return {}
@@ -173,7 +176,7 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
         largest = spread_phase(power, "full", mainlobe_energy(mission))
     wavelength, limits = mission.radar.wavelength, {}
     for name in PLATFORMS:
-        # The squares of rms phases are the shares of power.
+        # The shares of power divide the square of the rms phase.
         share = amplitude_share(split, name) if metric == "pslr" else np.sqrt(split.of(name))
         published = evaluators.vibration_limit(wavelength, power, split.of(name))
         limits[name] = VibrationLimits(published, _motion_of_phase(wavelength, largest * share))
@@ -205,11 +208,11 @@ def amplitude_share(split: Shares, name: str) -> PerCase:
 
 
 class SlowLimits(NamedTuple):
-    """Amplitudes along the line of sight at which a vibration reaches its limits of phase. [m]
+    """Amplitudes along the line of sight at which a slow vibration reaches its limits of phase. [m]
 
-    `quadratic` belongs to the platform's limit of the quadratic phase, and `cubic` to the requirement on the cubic
-    phase. `use` is the utilization of the stricter limit by the declared vibration, and `quadratic_use` that of the
-    quadratic limit.
+    `quadratic` is the amplitude at the platform's limit of the quadratic phase, and `cubic` that at the requirement
+    on the cubic phase. `use` is the utilization of the stricter limit by the declared vibration, and `quadratic_use`
+    that of the limit of the quadratic phase.
     """
 
     quadratic: Floats
@@ -219,7 +222,7 @@ class SlowLimits(NamedTuple):
 
     @property
     def smallest(self) -> Floats:
-        """The stricter of both limits. [m]"""
+        """Smaller of both amplitudes. [m]"""
         return self.quadratic if self.cubic is None else np.minimum(self.quadratic, self.cubic)
 
     @property
@@ -229,7 +232,7 @@ class SlowLimits(NamedTuple):
 
 
 def slow_limits(mission: Mission, allocation: Allocation, tone: SlowTone) -> SlowLimits:
-    """Largest vibration below one cycle per aperture, for its worst phase; see `effects.slow_tones`.
+    """Largest amplitudes of a vibration below one cycle per aperture, in its worst phase; see `effects.slow_tones`.
 
     The limit of the quadratic phase is the platform's share, autofocus gain included. The limit of the cubic phase,
     if one is required, is the whole requirement without gain.

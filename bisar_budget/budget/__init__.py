@@ -1,4 +1,7 @@
-"""Turns an analysis into findings: limits on single errors and on sums of errors, waivers, checks of many files."""
+"""Turns an analysis into findings: limits on single errors and on sums of errors, and waivers.
+
+Many mission files can be checked together.
+"""
 
 # Modules that other rooms may use.
 __all__ = [

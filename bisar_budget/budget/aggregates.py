@@ -1,4 +1,4 @@
-"""Rows for sums of errors: quadratic and cubic phase, location, autofocus pull-in range, edge of the scene."""
+"""Budget rows for sums of errors: quadratic and cubic phase, location, autofocus pull-in range, and scene edge."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -39,7 +39,7 @@ PULL_IN = "autofocus_pull_in"
 
 
 class Aggregates:
-    """Builds the rows for sums of errors, for many cases at once."""
+    """Builds the budget rows for sums of errors, for an array of cases."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         self.judging, self.together, self.array = judging, analysis.together, judging.array
@@ -47,16 +47,16 @@ class Aggregates:
         self.needs, self.combine = self.errors.mission.requirements, self.errors.mission.allocation.combine
 
     def rows(self, model: str) -> Iterator["Aggregate"]:
-        """Yield all rows judged by one model, in the order of the contract.
+        """Yield all rows for sums of errors under one gating model, in the order of the JSON output.
 
-        The other model may turn a pass into a warning.
+        The result of the other model may turn a pass into a warning.
         """
         mine, theirs = self.together(model), self.together(OTHER_MODEL[model])
         if self.combine == "each":
             yield self._largest_quadratic(mine, theirs)
         else:
             owners = ("transmitter", "receiver", "clock", "mission")
-            has_clock = self.allocation.qpe.clock is not None  # else the clock counts with the receiver
+            has_clock = self.allocation.qpe.clock is not None  # otherwise it uses the receiver's share
             yield from (self._quadratic(mine, theirs, owner) for owner in owners if owner != "clock" or has_clock)
         yield self._cubic(mine, theirs)
         yield self._location(mine, theirs)
@@ -88,7 +88,7 @@ class Aggregates:
         return aggregate.of_equal_loss(equal_loss, equal_loss if is_full else theirs.judged(full, gain=1.0))
 
     def _largest_quadratic(self, mine: Together, theirs: Together) -> "Aggregate":
-        """The row of the mission's quadratic phase if each error is judged alone.
+        """Build the row for the mission's quadratic phase under `combine: each`, which judges each error alone.
 
         The row exists only as a warning, in the cases where the root-sum-square of all errors exceeds the total.
         """
@@ -96,7 +96,7 @@ class Aggregates:
         size, of_all = mine.judged(mine.phases), mine.judged(mine.phases, "rss")
         limit = self.allocation.qpe_total * self.allocation.autofocus_gain
         aggregate = self._row(row_subject, True, phases, size, limit, theirs, of_all=of_all)
-        is_warning = aggregate.judged.status == CODE["warn"]  # else the row of the error says why it fails
+        is_warning = aggregate.judged.status == CODE["warn"]  # a failing error has its own row
         is_there = aggregate.is_over_of_all & is_warning
         nothing = self.judging.row(row_subject, None, None)
         return replace(aggregate, judged=aggregate.judged.where(~is_there, nothing), is_there=is_there)
@@ -148,11 +148,11 @@ class Aggregates:
         )
 
     def _of_owners(self, split: Shares, owner: str) -> Sequence[RandomError]:
-        """Errors of sensors, clocks and the air that count against an owner's share."""
+        """List the random errors (sensors, clocks, atmosphere) that use the share of an owner."""
         return [error for error in self.together("full").random if split.includes(error.owner, owner)]
 
     def _is_declared(self, members: Iterable[DeclaredPhase]) -> Booleans:
-        """Mark the cases in which at least one of the phases is declared."""
+        """Find the cases in which at least one of the given phases is declared, (cases,)."""
         is_declared = np.zeros(self.judging.cases, dtype=bool)
         for member in members:
             is_declared |= member.is_there
@@ -175,11 +175,12 @@ class Aggregates:
         continued: tuple[str, Sequence[RandomError]] = ("quadratic", ()),
         **fields: Any,
     ) -> "Aggregate":
-        """Judge a sum of errors. A sum without a finite value fails, because one of its errors has no image.
+        """Judge a sum of errors against a limit, for an array of cases.
 
-        `without_value` replaces the status `fail` of such a sum. `continued` holds the kind of effect that the row
-        sums over random errors, and these errors. A pass becomes a warning if it depends on noise below the first
-        points of masks. A pass that depends on doubted noise is not evaluated.
+        A sum without a finite value fails, because with one of its errors the point has no image. `without_value`
+        replaces the status `fail` of such a sum. `continued` is a pair: the kind of effect that the row sums, and the
+        random errors in the sum. A pass becomes a warning if it depends on phase noise below the first point of a
+        mask. A pass that depends on doubtful noise is not evaluated.
         """
         rests_on: PerCaseFlag = False
         is_in_doubt: PerCaseFlag = False
@@ -218,11 +219,11 @@ class Aggregates:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Aggregate(FamilyRow):
-    """One row for a sum of errors, judged by one model in many cases.
+    """The budget row for one sum of errors, judged by one model, for an array of cases.
 
-    `rule` is the rule that combines the `phases`; a row of displacements has no phases. `by_other` is the sum by the
+    `rule` is the rule that combines the `phases`. A row of displacements has no phases. `by_other` is the sum by the
     model that does not gate. If the row holds the largest error instead of a sum, `of_all` is the root-sum-square of
-    all errors. A pass becomes a warning if `by_other` or `of_all` exceeds the limit.
+    all errors, otherwise NaN. A pass becomes a warning if `by_other` or `of_all` exceeds the limit.
     """
 
     rule: str
@@ -232,16 +233,17 @@ class Aggregate(FamilyRow):
     is_over_by_other: PerCaseFlag = False
     is_over_of_all: PerCaseFlag = False
     without_autofocus: PerCase = 0.0
-    rests_on: PerCaseFlag = False  # on noise below the first points of masks; `continued` as in `Aggregates._row`
+    rests_on: PerCaseFlag = False  # result depends on noise below the first points of masks
     continued: tuple[str, Sequence[RandomError]] = ("quadratic", ())
-    is_in_doubt: PerCaseFlag = False  # the noise that the row depends on is in doubt
+    is_in_doubt: PerCaseFlag = False  # result depends on doubtful noise
 
     def of_equal_loss(self, equal_loss: Floats, of_full: Floats) -> "Aggregate":
-        """Return the row with the phase of equal loss as its declared value.
+        """Return the row with the equal-loss phase in place of the judged phase as its declared value.
 
-        The phase of equal loss may be smaller than the judged phase, because autofocus does not correct part of the
+        The equal-loss phase may be smaller than the judged phase, because autofocus does not correct part of the
         phase. The allowable is scaled by the same factor, so that the utilization does not change. Without a declared
-        phase the allowable stays the same.
+        phase the allowable stays the same. `equal_loss` is this phase by the gating model and `of_full` by the full
+        model, both (cases,) [rad].
         """
         judged = self.judged
         with np.errstate(all="ignore"):
@@ -255,7 +257,7 @@ class Aggregate(FamilyRow):
         return replace(self, judged=judged)
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Describe the row of one case in words; `model` is the model that judges it."""
+        """Build the report row of one case, with its texts; `model` names the model that judges the row."""
         mission, row_subject = case.mission, self.judged.subject
         groups, combine, owner = case.analysis.groups, mission.allocation.combine, row_subject.owner
         numbers = map(case.number, (self.judged.declared, self.judged.allowable))
@@ -293,7 +295,10 @@ class Aggregate(FamilyRow):
         )
 
     def _passes_with(self, case: Case, model: str) -> Note:
-        """Note with the smallest N_pull for which the sum would pass, or that no autofocus can correct the sum."""
+        """State the smallest pull-in range N_pull of autofocus for which the sum would pass.
+
+        If no autofocus can correct the sum, the note states that instead.
+        """
         together, owner = case.analysis.together(model), self.judged.subject.owner
         members = together.owed(case.allocation.qpe, owner)
         quadratic = case.number(together.combined(quadratics(members)))
@@ -303,9 +308,10 @@ class Aggregate(FamilyRow):
 
 # ---------------------------------------------------------------------- totals of effects
 def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
-    """Phases of each declared error by a model, in three groups. [rad]
+    """Compute the phases [rad] of each declared error with one model, in three groups.
 
-    The groups are: `cubic` phase, rms phase that spreads power (`spread`), and peak phase of tones (`tone`).
+    The groups are the `cubic` phase, the rms phase that spreads power (`spread`), and the peak phase of tones
+    (`tone`).
     """
     array, together = analysis.errors.array, analysis.together(model)
     return {
@@ -319,10 +325,10 @@ def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
 
 
 def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> list[UntakenEffect]:
-    """Find the effects that no requirement covers, and the rows that cause each of them.
+    """Find the effects that no requirement limits, and the rows of the errors that cause them.
 
     Rows are named only for effects that are not negligible. With several gating models, the largest value of each
-    effect counts. `instead` are errors that replace the errors with the same ids.
+    effect is used. `instead` holds errors that replace the errors with the same ids.
     """
     needs = analysis.mission.requirements
     level = negligible_rad(analysis.mission)
@@ -342,7 +348,7 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
                 sizes[row_id] = np.fmax(sizes.get(row_id, 0.0), np.abs(size))
         if not sizes:
             continue
-        # An error without an image fails by its own row.
+        # An error with which the point has no image is judged by its own row.
         total = np.where(np.isfinite(sum_of_all), sum_of_all, 0.0)
         sizes = {row_id: np.where(np.isfinite(size), size, 0.0) for row_id, size in sizes.items()}
         largest = np.max(list(sizes.values()), axis=0)
@@ -355,7 +361,7 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
 
 
 def _exchanged(phases_by_kind: Mapping[str, Phases], errors: Sequence[RandomError], model: str) -> dict[str, Phases]:
-    """Replace the phases of the errors that have the same ids as `errors` by the phases of `errors`. [rad]"""
+    """Replace the cubic and spread phases [rad] of the given errors, which are matched by id."""
     ids = {error.id for error in errors}
     exchanged = {kind: [phase for phase in phases if phase[0] not in ids] for kind, phases in phases_by_kind.items()}
     for error in errors:
@@ -366,21 +372,21 @@ def _exchanged(phases_by_kind: Mapping[str, Phases], errors: Sequence[RandomErro
 
 # ---------------------------------------------------------------------- displacements that no row holds
 def unplaced(together: Together) -> dict[str, Booleans]:
-    """Find the clocks that displace the image by an amount that the file does not state.
+    """Find the random errors that displace the image by an amount that the file does not state, such as unset clocks.
 
-    The result maps the row id of each random error to the cases in which it does so.
+    The result maps the row id of each random error to a mask of the cases in which it does so, (cases,).
     """
     return {error.subject.id: together.errors.array(error.displaces_unknown) > 0 for error in together.random}
 
 
 # ---------------------------------------------------------------------- in words
 class _Words(NamedTuple):
-    """Texts for a row: name of the summed effect, its unit, the key of its limit in the file, and the equations."""
+    """Texts for a row: name and unit of the summed effect, the key of its limit in the file, and the equations."""
 
     what: str
     unit: str
     path: KeyPath
-    equation: tuple[str, str]  # by the published model, by the full model
+    equation: tuple[str, str]  # published model, full model
 
 
 _ROW_SUM_WORDS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "each": "largest of the rows"}
@@ -400,7 +406,11 @@ def _wording_of(row_subject: Subject, rule: str) -> _Words:
 
 
 def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, Note]:
-    """Id and size of the largest error in a sum, and a note if the size relies on data from outside the file."""
+    """Return the row id and size of the largest error in a sum, and a note on the source of the size.
+
+    The size is a phase [rad] or a displacement [m]. The note is empty unless the size relies on extrapolated noise or
+    on a folded spur.
+    """
     together, kind = case.analysis.together(model), aggregate.judged.subject.kind
     if kind == LOCATION:
         sizes = [(row_id, math.hypot(*move)) for row_id, move in together.displacement_parts(case.place)]
@@ -414,9 +424,10 @@ def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, 
 
 
 def _folded_spur(case: Case, row_id: str, size: float, kind: str) -> Note:
-    """Name the folded spur that causes most of an oscillator's phase after pulses are exchanged.
+    """Name the folded spur that causes most of an oscillator's phase.
 
-    The note is empty if noise causes most of the phase.
+    Spurs fold to low frequencies if the platforms exchange pulses to synchronise. The note is empty if noise causes
+    most of the phase.
     """
     T, factor = case.mission.collection.aperture_time, case.mission.allocation.coverage_factor
     for spur in spurs_of(case.mission):
@@ -427,10 +438,10 @@ def _folded_spur(case: Case, row_id: str, size: float, kind: str) -> Note:
 
 
 def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit: float | None) -> Note:
-    """Reason why a pass becomes a warning.
+    """Explain why a pass becomes a warning.
 
-    The reason is one of: all errors together exceed the limit, the model that does not gate exceeds it, or the row
-    depends on noise below the first point of a mask.
+    The reason is one of the following: all errors together exceed the limit, the sum by the model that does not gate
+    exceeds it, or the row depends on noise below the first point of a mask.
     """
     if limit is None:
         return NOTHING
@@ -454,7 +465,7 @@ def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit:
 # ---------------------------------------------------------------------- the scene's edge
 @dataclass(frozen=True, eq=False)
 class JudgedScene:
-    """Differences of phase that errors cause at the edge of the scene, in many cases.
+    """Phase differences between the centre and the edge of the scene that errors cause, for an array of cases.
 
     `edges` is None if no error is declared.
     """
@@ -464,18 +475,21 @@ class JudgedScene:
 
     @cached_property
     def corrections(self) -> Corrections | None:
-        """Range over which one autofocus correction is valid.
+        """Distance from the scene centre within which one autofocus correction is sufficient; None without errors.
 
-        Only the wording of rows uses it, because the search is slow.
+        The search for it is slow. It is therefore made only when a row is put into words.
         """
         return None if self.edges is None else Corrections(self.edges, self.analysis.allocation.qpe_total)
 
     def edge(self, case: Case) -> SceneEdge | None:
-        """The edge of the scene in one case, with the range over which one autofocus correction is valid."""
+        """Return the edge of the scene in one case, with the distance within which one correction is sufficient."""
         return None if self.corrections is None else SceneEdge.of(self.corrections, case.mission, case.place)
 
     def row(self, judging: Judging, model: str) -> "SceneRow":
-        """Judge the edges by a model. In the published model an error is the same everywhere in the scene."""
+        """Judge the phase differences at the edge of the scene with one model.
+
+        In the published model an error has the same effect everywhere in the scene, so that the differences are zero.
+        """
         row_subject, edges = subject("mission", "spatial_variance"), self.edges
         total = judging.array(self.analysis.allocation.qpe_total)
         allowable = None if model == "published" else total
@@ -494,12 +508,12 @@ class JudgedScene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneRow(FamilyRow):
-    """The row that judges the edge of the scene, for many cases at once."""
+    """The row that judges the edge of the scene, for an array of cases."""
 
     scene: JudgedScene
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Describe the row of one case in words; `model` is the model that judges it."""
+        """Build the report row of one case, with its texts; `model` names the model that judges the row."""
         edge, total = self.scene.edge(case), case.allocation.qpe_total
         doubt, degeneracy, notes = NOTHING, NOTHING, tuple[Note, ...]()
         if edge is not None:

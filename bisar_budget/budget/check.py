@@ -1,9 +1,9 @@
 """Check missions: compare declared errors with the allocated budget, with one row for each error and for each sum.
 
-`check_mission` checks one mission. `check_missions` checks missions of one shape together. `check_files` checks many
-files on all cores. The findings of one mission consist of several hundred objects. A caller that needs only a report
-passes `keep`, a function that reduces the findings in the process that made them. This saves a quarter of the time
-for a thousand missions.
+`check_mission` checks one mission. `check_missions` checks several missions and treats missions of one shape as one
+array of cases. `check_files` checks files and uses all cores for many files. The findings of one mission consist of
+several hundred objects. A caller that needs only a report passes `keep`, a function that reduces the findings in the
+process that made them. This saves a quarter of the time for a thousand missions.
 """
 
 import gc
@@ -40,11 +40,11 @@ from bisar_budget.units import format_quantity
 if TYPE_CHECKING:
     from bisar_budget.sampling.draws import Share
 
-_CASES_AT_ONCE = 256  # arrays of more cases leave the cache
+_CASES_AT_ONCE = 256  # arrays of more cases do not fit into the cache
 
 
 def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_OUTSIDE) -> MissionFindings:
-    """Check one mission as a single case, and describe the findings in words.
+    """Check one mission as a single case, and return the findings with their texts.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ def check_missions(
 ) -> Iterator[tuple[int, MissionFindings]]:
     """Check missions, and yield the index and the findings of each mission, in any order.
 
-    The findings are the same as those of `check_mission`. Missions of one shape are checked together. This never
-    changes a status or a sentence, but numbers may differ within the tolerance of the search.
+    Missions of the same shape are checked together as arrays. The findings have the same statuses and sentences as
+    those of `check_mission`, but numbers may differ within the tolerance of the numerical search.
     """
     if len(missions) == 1:
         yield 0, check_mission(missions[0], today, outside=outside)
@@ -94,7 +94,7 @@ def check_missions(
 
 
 def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) -> MissionFindings:
-    """Describe the findings of one judged case in words."""
+    """Collect the findings of one judged case, with their texts."""
     mission, geometry = case.mission, case.geometry
     waived = apply_waivers(list(rows_in_words(judged, case)), mission, today)
     rows, requirements = waived.rows, requirements_in_words(judged, case, waived)
@@ -173,12 +173,15 @@ def _unused_keys(mission: Mission) -> Iterator[Note]:
 CheckedMission = MissionFindings | UnusableMission
 Kept = TypeVar("Kept")
 
-FILES_FOR_TWO_PROCESSES = 200  # a second process starts in the time that a check of half of them takes
-FILES_AT_ONCE = 500  # checked together at most
+FILES_FOR_TWO_PROCESSES = 200  # starting a second process takes as long as checking half of them
+FILES_AT_ONCE = 500  # largest number of files that are checked together
 
 
 class Draws(NamedTuple):
-    """Arguments of `monte_carlo`: number of draws, seed, and `share`, which works in a single process only."""
+    """Arguments of `monte_carlo`: the number of draws, the seed, and the part of the draws to compute (`share`).
+
+    `share` works only within a single process.
+    """
 
     number: int
     seed: int | None
@@ -186,12 +189,12 @@ class Draws(NamedTuple):
 
 
 def without_analysis(findings: CheckedMission) -> CheckedMission:
-    """Return the findings without the analysis, because a thousand analyses would fill the memory."""
+    """Return the findings without the analysis, which would fill the memory for a thousand missions."""
     return findings if isinstance(findings, UnusableMission) else findings._replace(analysis=None)
 
 
 def whole(findings: CheckedMission) -> CheckedMission:
-    """Return the findings together with the analysis, which is too large to send between processes."""
+    """Return the findings together with the analysis, which is too large to be sent between processes."""
     return findings
 
 
@@ -250,7 +253,7 @@ def check_files(
 def _chunks(files: Sequence[str]) -> list[Sequence[str]]:
     """Divide files into chunks that are checked together. Many files give an even number of chunks.
 
-    The chunks do not depend on the number of cores, because the last digits of a result depend on its chunk.
+    The number of cores does not affect the division, because the last digits of a result depend on its chunk.
     """
     count = 1 if len(files) < FILES_FOR_TWO_PROCESSES else 2 * math.ceil(len(files) / (2 * FILES_AT_ONCE))
     ends = [chunk * len(files) // count for chunk in range(count + 1)]
@@ -272,7 +275,7 @@ def _kept(
     changes: Sequence[SetValue],
     outside: Outside,
 ) -> list[Kept]:
-    # The findings of a thousand missions are 10⁵ tuples without a reference cycle: the collector has no work.
+    # The findings of a thousand missions are 10⁵ tuples without reference cycles: there is no garbage to collect.
     gc.disable()
     kept: dict[int, Kept] = {}
     missions: dict[int, Mission] = {}

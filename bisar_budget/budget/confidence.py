@@ -1,4 +1,4 @@
-"""The confidence level at which requirements are met, from the sigmas or bounds of the declared errors."""
+"""The confidence level of a verdict, which follows from the sigmas or bounds of the declared errors."""
 
 import math
 from collections.abc import Iterator
@@ -10,10 +10,11 @@ from bisar_budget.phrases import Note
 
 
 def confidence_of(case: Case) -> Note:
-    """Confidence level of the verdict on one case, as the end of a sentence: `at 1 sigma`, `for the stated bounds`.
+    """Return the confidence level of the verdict on one case, as the end of a sentence such as `at 1 sigma`.
 
-    Errors for which the file gives a size but no distribution do not count: amplitudes of vibration, errors from
-    elsewhere, the terrain. An error of 0 counts only if all errors are 0.
+    With bounds, the text is for example `for the stated bounds`. Errors for which the file gives a size but no
+    distribution are ignored: amplitudes of vibration, `other` errors and the terrain. An error of 0 is used only if
+    all errors are 0.
     """
     stated = list(_stated(case))
     distributions = {name for name, is_nonzero in stated if is_nonzero} or {name for name, _ in stated}
@@ -22,7 +23,7 @@ def confidence_of(case: Case) -> Note:
 
 
 def _stated(case: Case) -> Iterator[tuple[str, bool]]:
-    """Yield the distribution of each declared error that has one, and whether its size is known and nonzero."""
+    """Yield the distribution of each declared error that has one, and whether the error is known and nonzero."""
     for source in case.analysis.errors.stated:
         if source.is_covered:
             yield distribution_of(case.mission, source), _is_nonzero(case.number(source.declared))

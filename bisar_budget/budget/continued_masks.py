@@ -1,8 +1,8 @@
 """Warnings for rows that depend on phase noise below the first point of a mask, which no data sheet specifies.
 
-Below its first point the mask of an oscillator is extrapolated as f⁻³. A pass becomes a warning if more than half of
-a row's power lies in this extrapolated part and the row uses more than a tenth of its limit. The warning gives the
-frequency down to which the mask should reach.
+A mask gives the phase noise of an oscillator at several offset frequencies. Below its first point it is extrapolated
+as f⁻³. A pass becomes a warning if more than half of a row's power lies in this extrapolated part and the row uses
+more than a tenth of its limit. The warning gives the frequency down to which the mask should reach.
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,19 +17,19 @@ from bisar_budget.effects.oscillators import COVERED_CYCLES
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.phrases import NOTHING, Note
 
-MOST_OF_POWER = 0.5  # share of a row's power, above which the row depends on the continuation
-MIN_USE_FRACTION = 0.1  # utilization of a limit, up to which the source of the noise does not matter
+MOST_OF_POWER = 0.5  # fraction of a row's power above which the row depends on the extrapolated part
+MIN_USE_FRACTION = 0.1  # utilization of a limit up to which the source of the noise does not matter
 
 Part = str  # quadratic, cubic, spread or displacement
 
 
 def part_of(effect: RandomEffect, effect_kind: Part) -> Any:
-    """Size of one kind of effect per unit of the error: a phase, an rms phase or a displacement."""
+    """Return one kind of effect per unit of the error: a phase [rad], an rms phase [rad] or a displacement [m]."""
     return getattr(effect, effect_kind)
 
 
 def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> PerCase:
-    """Power of the part of an effect that noise below the first points of masks causes; 0 without such noise.
+    """Sum the squared effects of the phase noise below the first points of masks; 0 without such noise.
 
     `effect_kind` names the effect. All declared `errors` are summed.
     """
@@ -41,16 +41,21 @@ def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> PerCase
 
 
 def rests_on_masks(errors: Iterable[RandomError], effect_kind: Part, size: PerCase, limit: PerCase) -> PerCaseFlag:
-    """Whether a row depends on noise below the first points of masks, in each case, given its size and its limit."""
+    """Decide whether a row depends on phase noise below the first points of masks, as a number or an array (cases,).
+
+    It does if this noise makes up more than half of the power of the row, and if the `size` of the row exceeds a
+    tenth of its `limit`.
+    """
     power = continued_power(errors, effect_kind)
     with np.errstate(all="ignore"):
         return (power > MOST_OF_POWER * np.square(size)) & (size > MIN_USE_FRACTION * np.asarray(limit))
 
 
 def continuation_note(case: Case, errors: Sequence[RandomError], effect_kind: Part, size: float) -> Note:
-    """Note with the share of a row's power below the first points of masks, and with the frequency to cover.
+    """Write the note on a row that depends on phase noise below the first points of masks.
 
-    The note is empty if no declared error has such noise or if `size` is 0.
+    The note gives the fraction of the row's power that this noise makes up, and the frequency down to which the masks
+    should reach. It is empty if no declared error has such noise or if `size` is 0.
     """
     makers = [error for error in errors if error.continued is not None and error.declared is not None]
     if not makers or not size:

@@ -1,8 +1,8 @@
-"""The row for dispersion: free electrons curve the phase over the band, which blurs the image in range.
+"""The row for dispersion: free electrons cause a quadratic phase over the band, which blurs the image in range.
 
 The quadratic requirement limits dispersion alone, because a phase over frequency does not add to phases over slow
-time. Dispersion may use the full requirement, because no owner has a share for the air. Autofocus does not correct
-it.
+time. Dispersion may use the full requirement, because no owner has a share for the atmosphere. Autofocus does not
+correct it.
 """
 
 from collections.abc import Iterator
@@ -40,10 +40,10 @@ def dispersion_rows(judging: Judging, analysis: Analysis) -> Iterator["Dispersio
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DispersionRow(FamilyRow):
-    """The row for the quadratic phase that dispersion in the air causes, in many cases. [rad]"""
+    """The row for the quadratic phase [rad] over the band that free electrons cause, for an array of cases."""
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Describe the row of one case in words, which are the same for both models."""
+        """Build the report row of one case, with its texts. The row is the same for both models."""
         propagation = case.mission.propagation
         assert propagation is not None  # else there is no row
         contents: dict[str, Any] = {name: propagation.content(name) for name in PLATFORMS}

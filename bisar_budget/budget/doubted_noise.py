@@ -1,9 +1,10 @@
-"""Rows that depend on doubtful noise of an oscillator. Such rows are not evaluated.
+"""Detection of doubtful oscillator noise. Rows that depend on such noise are not evaluated.
 
-There are two reasons for doubt. The file may give a mask without its frequency and also name a part. The mask is then
-taken at the frequency of the part, but at a different frequency the same decibels mean different noise. Or a power
-law may fit an Allan deviation badly, so that it does not describe the oscillator. If such noise uses more than a
-tenth of a limit, the row with this limit is not evaluated, unless it fails anyway.
+There are two reasons for doubt. First, the file may name a catalogue part and replace its phase-noise mask without
+giving the frequency of the new mask. The mask is then taken at the frequency of the part. At another frequency the
+same decibels would mean a different noise. Second, a power law may fit an Allan deviation badly, so that it does not
+describe the oscillator. If doubtful noise uses more than a tenth of a limit, the row with this limit is not
+evaluated, unless it fails anyway.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -23,10 +24,10 @@ from bisar_budget.phrases import NOTHING, Note
 def rests_on_doubted_noise(
     errors: Iterable[RandomError], effect_kind: Part, model: str, limit: PerCase
 ) -> PerCaseFlag:
-    """Whether doubtful noise of oscillators causes more than a tenth of a limit, in each case.
+    """Decide whether doubtful noise uses more than a tenth of a limit, as a Boolean or an array (cases,).
 
-    The effect is the root-sum-square over the oscillators in doubt. `effect_kind` names the effect. `limit` is in the
-    unit of the effect.
+    `effect_kind` names the effect. The effects of all oscillators with doubtful noise are added as a root-sum-square.
+    `limit` is in the unit of the effect.
     """
     power: PerCase = 0.0
     for error in errors:
@@ -38,19 +39,23 @@ def rests_on_doubted_noise(
 
 
 def has_doubted_frequency(mission: Mission, platform: str) -> bool:
-    """Whether the spurs of an oscillator are taken at the frequency of a catalogue part that the file overrides."""
+    """Whether an oscillator has spurs whose carrier frequency is doubtful.
+
+    It is doubtful if the file replaces the noise of a catalogue part by a mask without a frequency. The spurs are
+    then taken at the frequency of the part.
+    """
     oscillator = getattr(mission.platforms, platform).oscillator
     return oscillator is not None and bool(oscillator.spurs) and oscillator.mask_at_frequency_of_part is not None
 
 
 def doubted_noise_note(mission: Mission, platforms: Sequence[str] = PLATFORMS) -> Note:
-    """Note with the keys that make the noise of oscillators doubtful, and with the entries to write instead."""
+    """Write the note that names the keys which make oscillator noise doubtful, and the entries to write instead."""
     notes = [note for name in platforms for _, note in noise_doubts(mission, name)]
     return notes[0].then(*notes[1:]) if notes else NOTHING
 
 
 def noise_doubts(mission: Mission, platform: str) -> Iterator[tuple[str, Note]]:
-    """Yield each key that makes the noise of an oscillator doubtful, with a sentence that explains it."""
+    """Yield each key that makes the noise of an oscillator doubtful, with a sentence that explains the doubt."""
     oscillator = getattr(mission.platforms, platform).oscillator
     if oscillator is None:
         return

@@ -1,14 +1,14 @@
 """Doubts about the input of a check: paths that may be inaccurate, and models or collections at their limits.
 
-A path from an orbit or a log may differ from the true path by a known distance. The causes are the age of the
+A path from an orbit or a log may differ from the true path by a known distance. The causes are the age of the orbital
 elements, the interpolation of the ephemeris, and the residual of the smoothed log. A declared position error smaller
 than this distance cannot be right. A declared error also cannot be right if the source of the path states a larger
 error.
 
 A log has two further errors: the residual, which is the difference between its fixes and its smooth path, and the
 step to which the fixes are rounded. A processor that uses the smooth path has neither error. A processor that uses
-the fixes has both errors in its image. If the file does not state the choice (`trajectory.processed`), neither error
-can be judged.
+the fixes has both errors in its image. If the file does not state which path the processor uses
+(`trajectory.processed`), neither error can be judged.
 """
 
 import math
@@ -32,27 +32,27 @@ from bisar_budget.mission.platforms import FlownPath, LogNoise, MotionError, Pla
 from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.phrases import NOTHING, Note
 
-LEAST_M = 1e-3  # smallest doubt of a path that counts against a declared error, zero included
-NEGLIGIBLE_USE_FRACTION = 0.1  # of a requirement, by the doubt of a path or by a velocity that its source states
-NEGLIGIBLE_RAD = 0.08  # of quadratic phase, in any image
-_TYPICAL_SHARE = 1 / 3  # of a usual error; a fix may be better by this factor than fixes of its quality usually are
+LEAST_M = 1e-3  # smallest inaccuracy of a path that is compared with a declared error, even an error of zero
+NEGLIGIBLE_USE_FRACTION = 0.1  # part of a requirement that an inaccuracy may use without being noted
+NEGLIGIBLE_RAD = 0.08  # quadratic phase that is negligible in any image
+_TYPICAL_SHARE = 1 / 3  # a fix may be this factor better than the typical error of its quality class
 MOST_RESIDUAL_RAD = 0.2  # largest rms phase of the residual along the line of sight that needs no statement
 MOST_GRID_SHARE = 0.1  # largest step of a log, relative to the declared position error, that needs no statement
 RESIDUAL = "residual"  # kind of doubt: the residual of a smooth path
-_EQUAL_VARIANCE_FRACTION = 1e-6  # relative, of variances: an equal variance is enough; a turn of axes causes rounding
+_EQUAL_VARIANCE_FRACTION = 1e-6  # relative tolerance for rounding, when axes are rotated
 
 
 @dataclass(frozen=True)
 class InputDoubt:
-    """A platform whose path may be less accurate than the file declares.
+    """A possible inaccuracy of a platform's path that is larger than the error that the file declares.
 
     `doubt` is the distance between the path and the possible true path, or the error that the source of the path
-    states. It is given along the axis on which it exceeds the declared error most. `declared` is the declared error
-    without the coverage factor; it is 0 if the file declares no error. Both values are root-sum-squares if the doubt
-    has no direction. The unit is [m] or [m/s], depending on `kind`. `note` gives both values in words.
+    states. `declared` is the declared error without the coverage factor; it is 0 if the file declares no error. Both
+    are given along the axis on which `doubt` exceeds `declared` most, or as root-sum-squares if the doubt has no
+    direction. The unit is [m] or [m/s], depending on `kind`. `note` gives both values in words.
 
-    If `is_of_log` is set, the doubt comes from a log. `doubt` is then either the residual of the log [rad], with the
-    largest acceptable residual as `declared`, or the step to which the fixes are rounded. [m]
+    If `is_of_log` is set, the doubt comes from a log. `doubt` is then either the phase of the log's residual [rad],
+    with the largest acceptable phase as `declared`, or the step to which the fixes are rounded [m].
     """
 
     owner: str
@@ -65,7 +65,7 @@ class InputDoubt:
 
 
 def input_doubts(mission: Mission) -> list[InputDoubt]:
-    """List the platforms whose paths may be less accurate than the file declares."""
+    """List the doubts about the paths of the platforms, which may be less accurate than the file declares."""
     doubts = []
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
@@ -92,7 +92,10 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
 
 
 def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Booleans]:
-    """Mark the cases in which a path may be less accurate than the file declares, by platform and kind of error."""
+    """Find the cases in which a path may be less accurate than the file declares.
+
+    The result maps the name of the platform and the kind of error to a mask, (cases,).
+    """
     doubted = {}
     for name in PLATFORMS:
         path: FlownPath | None = getattr(mission.platforms, name).path
@@ -107,10 +110,11 @@ def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Boo
 
 # ---------------------------------------------------------------------- how far the truth may be from a path
 def strays(mission: Mission, name: str) -> PerCaseFlag:
-    """Whether the true path may differ from a platform's path by more than the declared position error, in each case.
+    """Whether the true path may differ from a platform's path by more than the declared position error.
 
-    If no error is declared, the possible difference counts if age, interpolation or residual are unusual, or if the
-    difference would use more than a negligible part of a requirement.
+    The result is a Boolean or an array (cases,). If no position error is declared, the possible difference matters in
+    two situations: age, interpolation or residual are unusual, or the difference would use more than a negligible
+    part of a requirement.
     """
     platform: Platform = getattr(mission.platforms, name)
     path, declared = platform.path, declared_position_error(platform.motion_error)
@@ -126,7 +130,7 @@ def strays(mission: Mission, name: str) -> PerCaseFlag:
 
 
 def declared_position_error(error: MotionError) -> Any:
-    """Root-sum-square of a platform's position errors, constant and random (GNSS); None without such an error. [m]
+    """Root-sum-square of a platform's constant and random position errors; None without such an error. [m]
 
     The result is an array (cases,) if the mission has arrays in place of numbers.
     """
@@ -136,10 +140,10 @@ def declared_position_error(error: MotionError) -> Any:
 
 
 def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, kind: str = "position") -> bool:
-    """Whether a row judges a kind of error of a platform, in the frame in which the file states the error.
+    """Whether a row judges a given kind of error of a platform, in the frame in which the file states the error.
 
-    The residual of a log spreads power. It therefore affects its own row, and the rows that sum spread power for the
-    platform and for the mission.
+    The residual of a log spreads power. The kind `residual` therefore includes its own row, and the rows that sum
+    spread power for the platform and for the mission.
     """
     if kind == RESIDUAL:
         return row_subject == residual_subject(owner) or (
@@ -152,12 +156,12 @@ def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, kind: str = 
 
 # ---------------------------------------------------------------------- errors that the source of a path states
 def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) -> PerCaseFlag:
-    """Whether the source of a path states a larger error than the file declares, in each case.
+    """Whether the source of a path states a larger error than the file declares, as a Boolean or an array (cases,).
 
     An error is larger if its variance is larger in any direction. For a source without directions, the
-    root-sum-squares are compared. A velocity error counts only if it would use more than a negligible part of a
-    requirement: an ephemeris may have good positions and bad velocities, and the path follows the positions. If the
-    file declares no position error, the same condition applies to a position error that is only typical of the
+    root-sum-squares are compared. A velocity error matters only if it would use more than a negligible part of a
+    requirement, because an ephemeris may have good positions and bad velocities, and the path follows the positions.
+    If the file declares no position error, the same condition applies to a position error that is only typical of the
     source.
     """
     platform: Platform = getattr(mission.platforms, name)
@@ -182,10 +186,10 @@ def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) 
 
 
 def _stated_covariance(stated: StatedAccuracy, kind: str, platform: Platform) -> Floats | None:
-    """Covariance (..., 3, 3) of a kind of error along the scene's axes; None if the source does not state it.
+    """Covariance (..., 3, 3) of the stated errors along the scene's axes; None if the source does not state it.
 
-    For a platform in free fall whose errors the file states in the frame `ric`, the velocity is relative to the
-    stars.
+    `kind` is position [m²] or velocity [m²/s²]. For a platform in free fall whose errors the file states in the
+    orbital frame `ric`, the velocity is relative to the stars.
     """
     covariance, row, fall = stated.covariance, 3 * MOTION_KINDS.index(kind), platform.state.fall
     if covariance is None or len(covariance) <= row:
@@ -204,7 +208,7 @@ def _stated_covariance(stated: StatedAccuracy, kind: str, platform: Platform) ->
 
 
 def _declared_covariance(platform: Platform, kind: str) -> Floats:
-    """Covariance (..., 3, 3) of the declared errors of one kind, along the scene's axes."""
+    """Covariance (..., 3, 3) of the declared errors of one kind along the scene's axes. [m²] or [m²/s²]"""
     error = platform.motion_error
     sizes = error.stated(kind) or (0.0, 0.0, 0.0)
     correlation = np.eye(3).tolist() if error.covariance is None else error.covariance.block(kind)
@@ -218,7 +222,7 @@ def _declared_covariance(platform: Platform, kind: str) -> Floats:
 
 
 def _stack(rows: Sequence[Sequence[PerCase]]) -> Floats:
-    """Stack nine elements, numbers or arrays (cases,), into a matrix (..., 3, 3)."""
+    """Stack a 3-by-3 table of elements, which are numbers or arrays (cases,), into matrices (..., 3, 3)."""
     elements = np.broadcast_arrays(*(np.asarray(element, dtype=float) for row in rows for element in row))
     return np.moveaxis(np.array(elements).reshape(3, 3, *elements[0].shape), (0, 1), (-2, -1))
 
@@ -226,7 +230,7 @@ def _stack(rows: Sequence[Sequence[PerCase]]) -> Floats:
 def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccuracy) -> InputDoubt:
     """Describe the doubt about a path whose source states a larger error than the file declares.
 
-    The values are given on the axis with the largest difference.
+    The values are given along the axis with the largest difference.
     """
     error = platform.motion_error
     key = f"platforms.{name}.motion_error.{kind if error.covariance is None else 'covariance'}"
@@ -246,7 +250,7 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
         share * size <= declared_size * (1 + _EQUAL_VARIANCE_FRACTION) + LEAST_M
         for size, declared_size in zip(*sizes, strict=True)
     ):
-        # The declared error is large enough along each axis, but not between the axes.
+        # The declared error is large enough along each axis, but not in a direction between the axes.
         values, directions = np.linalg.eigh(declared - share**2 * stated_covariance)
         worst = directions[:, int(values.argmin())]
         sizes, names = (
@@ -261,19 +265,19 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
 
 # ---------------------------------------------------------------------- the residual of a log
 def leaves_unsaid(mission: Mission, name: str) -> PerCaseFlag:
-    """Whether the residual of a log is too large and the file does not state whether the processor uses the fixes."""
+    """Whether a log has too large a residual, while the file does not state whether the processor uses the fixes."""
     log = _unsaid_log(mission, name)
     return False if log is None else np.asarray(residual_phase(mission, name)) > MOST_RESIDUAL_RAD
 
 
 def residual_phase(mission: Mission, name: str) -> PerCase:
-    """Rms phase over the aperture that the residual of a log's fixes causes along the line of sight. [rad]"""
+    """Rms phase over the aperture due to the residual of a log along the line of sight; 0 without a log. [rad]"""
     path: FlownPath | None = getattr(mission.platforms, name).path
     if path is None or path.log_noise is None:
         return 0.0
     residual, half = _stack(path.log_noise.residual), np.asarray(mission.collection.aperture_time) / 2
     square: PerCase = 0.0
-    for weight, time in ((1 / 6, -half), (2 / 3, 0.0 * half), (1 / 6, half)):  # Simpson, over the aperture
+    for weight, time in ((1 / 6, -half), (2 / 3, 0.0 * half), (1 / 6, half)):  # Simpson's rule over the aperture
         sight = np.stack(np.broadcast_arrays(*_sight(mission, name, time)), axis=-1)
         square = square + weight * np.einsum("...i,...ij,...j->...", sight, residual, sight)
     phase: PerCase = 2 * np.pi / np.asarray(mission.radar.wavelength) * np.sqrt(np.maximum(square, 0.0))
@@ -302,9 +306,9 @@ def is_coarse(mission: Mission, name: str) -> PerCaseFlag:
 
 
 def _unsaid_log(mission: Mission, name: str) -> LogNoise | None:
-    """Noise of a platform's log if the file does not state which path the processor uses; otherwise None.
+    """Return the noise of a platform's log if the file does not state which path the processor uses.
 
-    The result is also None for a platform without a log.
+    The result is None if the file states it, and for a platform without a log.
     """
     path: FlownPath | None = getattr(mission.platforms, name).path
     log = None if path is None else path.log_noise
@@ -314,7 +318,8 @@ def _unsaid_log(mission: Mission, name: str) -> LogNoise | None:
 def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
     """Describe the doubt that the rounding step of a log's fixes causes.
 
-    The values are given on the axis where the step exceeds the allowed part of the declared position error most.
+    The values are given along the axis on which the step exceeds the permitted part of the declared position error
+    most.
     """
     assert platform.path is not None
     assert platform.path.log_noise is not None
@@ -333,7 +338,7 @@ def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
 
 # ---------------------------------------------------------------------- the effect of a doubt
 def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Booleans:
-    """Whether an error with a covariance uses more than a negligible part of a requirement, in each case."""
+    """Whether an error with the given covariance uses more than a negligible part of a requirement, (cases,)."""
     needs, half = mission.requirements, np.asarray(mission.collection.aperture_time) / 2
     with np.errstate(all="ignore"):
         before, middle, after = _range_errors(mission, name, kind, half)
@@ -352,9 +357,10 @@ def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Bool
 
 
 def _range_errors(mission: Mission, name: str, kind: str, half: Floats) -> Sequence[Floats]:
-    """Range errors due to a unit error of a platform along each axis, at slow times −T/2, 0 and T/2. [m]
+    """Range errors due to a unit error of a platform along each axis, at slow times −T/2, 0 and T/2.
 
-    T is the aperture time. Each of the three arrays has the shape (..., 3).
+    T is the aperture time. Each of the three arrays has the shape (..., 3). For a position error it is in [m/m], and
+    for a velocity error in [m per m/s].
     """
     sights = [
         np.stack(np.broadcast_arrays(*_sight(mission, name, time)), axis=-1) for time in (-half, 0.0 * half, half)
@@ -377,7 +383,7 @@ def _range_errors(mission: Mission, name: str, kind: str, half: Floats) -> Seque
 
 
 def _sight(mission: Mission, name: str, time: Any) -> Any:
-    """Change of range per metre of a platform's motion along each axis (x, y, z), at a slow time.
+    """Change of range per metre of a platform's motion along each axis (x, y, z), at a given slow time. [m/m]
 
     With a direct path, the change of the direct path's range is subtracted.
     """
@@ -393,9 +399,10 @@ def _sight(mission: Mission, name: str, time: Any) -> Any:
 
 
 def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floats:
-    """Displacement on the ground (..., 2, 3) per metre of an error along each axis, as in (25).
+    """Displacement on the ground per unit error along each axis, (..., 2, 3), by (25) of Rigling & Moses.
 
-    `constant` and `linear` are the range error and its rate per metre of the error.
+    `constant` and `linear` are the range error and its rate per unit error. The rows of the result are east and
+    north.
     """
     (a, b), (c, d) = geometry.range_gradient, geometry.doppler_gradient
     determinant = np.asarray(a * d - b * c)[..., None]
@@ -409,9 +416,9 @@ def orbit_notes(case: Case, rows: Sequence[Row]) -> Iterator[Note]:
     """Yield a note for each platform in free fall whose position and velocity errors cannot be independent.
 
     The errors of an orbit are correlated: a position error δr comes with a velocity error of about n·δr, where n is
-    the angular rate of the orbit. If both are declared as independent and the velocity error is smaller than n·δr,
-    they leave more phase than the covariance of the orbit. The note is given if the position errors use more than a
-    negligible part of a limit.
+    the angular rate of the orbit. Independent errors with a velocity error smaller than n·δr would leave more phase
+    than the errors of a real orbit. The note is given only if the position errors use more than a negligible part of
+    a limit.
     """
     for index, name in enumerate(PLATFORMS):
         state, error = case.geometry.both[index], getattr(case.mission.platforms, name).motion_error
@@ -427,21 +434,22 @@ def orbit_notes(case: Case, rows: Sequence[Row]) -> Iterator[Note]:
 
 # ---------------------------------------------------------------------- the published model
 MAX_MODEL_DIFFERENCE_FRACTION = (
-    0.05  # of the full model's allowable; beyond this difference the published model does not hold
+    0.05  # of the allowable by the full model; at a larger difference the published model does not hold
 )
 
 
 def model_doubt(case: Case, rows: Sequence[Row]) -> Note:
-    """Name a declared error that the published model judges although the model does not hold for it.
+    """Name the declared error for which the published model is least valid; empty if it is valid for all.
 
-    The note names the row whose utilizations by the two models differ most. It is empty if there is no such error.
+    The note names the row whose utilizations by the two models differ most.
 
     Parameters
     ----------
     case : Case
         The judged case.
     rows : sequence of Row
-        Judged rows. Only rows count that the published model judges, with an error as stated in the file and not 0.
+        Judged rows. Only rows are examined that the published model judges and whose error the file states as
+        nonzero.
     """
     stated = {source.id for source in case.analysis.errors.stated if case.number(source.declared)}
     apart = [row for row in rows if row.model == "published" and row.id in stated and _is_apart(row)]
@@ -461,18 +469,18 @@ def _is_apart(row: Row) -> bool:
 
 
 def _difference(row: Row) -> float:
-    """Difference between the utilizations of a row by the allowables of the two models."""
+    """Difference between the utilizations of a row under the published and the full model."""
     declared, limits = row.declared or 0.0, (row.allowable_published, row.allowable_full)
     published, full = (0.0 if limit is None else declared / limit for limit in limits)
     return abs(published - full)
 
 
 # ---------------------------------------------------------------------- the collection
-_TURNING_RAD = 0.1  # half the turn of a line of sight; the quartic term is 1 % of the quadratic there
+_TURNING_RAD = 0.1  # half the rotation of a line of sight at which the quartic term is 1 % of the quadratic term
 
 
 def missing_settings(mission: Mission) -> list[str]:
-    """List the missing errors of clocks in holdover: errors that remain after the clocks are set."""
+    """List the keys of the errors that clocks in holdover need and that `synchronization` does not give."""
     sync = mission.synchronization
     if sync is None or not sync.is_holdover:
         return []
@@ -480,7 +488,7 @@ def missing_settings(mission: Mission) -> list[str]:
 
 
 def collection_notes(case: Case) -> Iterator[Note]:
-    """Yield notes on collections beyond the published model, and on images that show less than the full model."""
+    """Yield notes on collections for which the published model may fail, and on effects that an image cannot show."""
     mission = case.mission
     for name, state in zip(PLATFORMS, case.geometry.both, strict=True):
         if not state.is_straight:
@@ -495,4 +503,4 @@ def collection_notes(case: Case) -> Iterator[Note]:
     if mission.requirements.location_error is None and (missing := missing_settings(mission)):
         yield phrases.note(
             "setting-is-perfect", missing=missing
-        )  # a required location depends on it, and has a warning
+        )  # a required location depends on these errors, and gets a warning instead

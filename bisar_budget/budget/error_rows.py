@@ -1,4 +1,4 @@
-"""Rows of single errors: the declared size against the largest size that requirements or a specification allow."""
+"""Rows of single errors, which compare the declared size with the size that requirements or a specification allow."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -42,7 +42,7 @@ _BINDING = np.array(
 
 
 class ErrorRows:
-    """Builds the rows of the listed errors.
+    """Builds the rows of the position, velocity, acceleration, clock and `other` errors.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class ErrorRows:
         self.is_of_sums = analysis.is_of_sums
 
     def rows(self, gating: str) -> Iterator["ErrorRow"]:
-        """Yield the rows judged by one model; the other model may turn a pass into a warning."""
+        """Yield the rows under one gating model. The result of the other model may turn a pass into a warning."""
         for block_index in range(len(self.errors.blocks)):
             yield from self._of_block(block_index, gating)
 
@@ -70,7 +70,7 @@ class ErrorRows:
         needs, sources = errors.mission.requirements, block.sources
         limit = np.array([self.limits[source.owner] for source in sources])
         limits = (limit, needs.cubic_phase_error, needs.location_error)
-        # Searches start from the known effects of the declared errors.
+        # A search for the allowable starts from the known effects of the declared error.
         mine, theirs = errors.of_block(gating, block_index), errors.of_block(other_model, block_index)
         searched = (None, None, None) if self.is_of_sums else limits
         allowed = block.allowed(gating, searched, is_complete=asks_for_all)
@@ -111,7 +111,7 @@ class ErrorRows:
 def _is_over(
     does: Declared, gain: PerCase, limits: tuple[Floats, float | None, float | None], is_motion: PerCaseFlag
 ) -> PerCaseFlag:
-    """Whether any effect of the declared errors exceeds its limit, in each case."""
+    """Decide whether any effect of the declared errors exceeds its limit, (errors, cases)."""
     limit, cubic, location = limits
     is_over = does.judged(gain) / limit > LIMIT_RATIO
     if cubic is not None:
@@ -123,13 +123,13 @@ def _is_over(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ErrorRow(FamilyRow):
-    """The row of one error in many cases; `limit` is the limit on its quadratic phase. [rad]"""
+    """The row of one error, for an array of cases; `limit` is the limit on its quadratic phase [rad]."""
 
     source: ErrorSource
     limit: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """Describe the row of one case in words; `gating` is the model that judges it."""
+        """Build the report row of one case, with its texts; `gating` names the model that judges the row."""
         mission, row, source = case.mission, self.judged, self.source
         model, other_model = case.analysis.models(gating)
         gain, status = case.allocation.autofocus_gain, row.status[case.place]
@@ -172,7 +172,7 @@ class ErrorRow(FamilyRow):
 
 # ---------------------------------------------------------------------- in words
 def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Declared, limit: float) -> Note:
-    """Reason why the row fails: the requirement that the declared error exceeds."""
+    """Write the reason why the row fails, with the requirement that the declared error exceeds."""
     requirements, binding = case.mission.requirements, row.requirement(case)
     if binding == END_OF_IMAGE:
         return phrases.note("beyond-the-image", end=case.number(row.allowable), unit=source.unit)
@@ -190,7 +190,7 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
 
 
 def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
-    """Reason for a warning: the model that does not gate fails the declared error, and why; otherwise empty."""
+    """Write the reason why the model that does not gate fails the declared error; empty if it does not."""
     needs, theirs = case.mission.requirements, case.does(other, source)
     uses = [(float(theirs.judged(case.allocation.autofocus_gain)), limit, QUADRATIC)]
     if source.is_motion and needs.cubic_phase_error is not None:
@@ -208,7 +208,7 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
 
 
 def _cause(source: ErrorSource) -> Note:
-    """Note with the effect that only the full model takes into account."""
+    """Name the effect of an error that only the full model takes into account."""
     if source.subject.kind == "terrain":
         return phrases.note("wrong-height-defocuses")
     if source.unit == "m":
@@ -225,10 +225,11 @@ def _stated_elsewhere(case: Case, source: ErrorSource) -> Note:
 
 # ---------------------------------------------------------------------- specifications
 def specification_rows(judging: Judging, analysis: Analysis) -> Iterator["SpecificationRow"]:
-    """Yield the row of each specification, which the largest declared value of the axes must not exceed.
+    """Yield the row of each specification, which compares the declared value with the specified value.
 
-    The coverage factor does not count. The row of an error that is specified but not declared is not evaluated. An
-    error may use its full specification without a warning.
+    The largest value over the axes must not exceed the specified value. The coverage factor is not applied. The row
+    of an error that is specified but not declared is not evaluated. An error may use its full specification without a
+    warning.
     """
     for number in analysis.mission.specifications.values():
         most, largest_declared = judging.array(number.value), judging.array(largest_at(analysis.mission, number))
@@ -244,12 +245,12 @@ def specification_rows(judging: Judging, analysis: Analysis) -> Iterator["Specif
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpecificationRow(FamilyRow):
-    """The row of one specification in many cases."""
+    """The row of one specification, for an array of cases."""
 
     number: Number
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Describe the row of one case in words, which are the same for both models."""
+        """Build the report row of one case, with its texts. The row is the same for both models."""
         return worded(
             case,
             self.judged,

@@ -1,8 +1,8 @@
 """Warnings about a mission file: functions that decide when to warn. The sentences are in `phrases`.
 
 Most warnings do not change the verdict. A warning that casts doubt on the checked mission sets the status to at least
-`warn`. Each function yields a sentence and the key that it refers to. The line of the key in the file is looked up
-here, in one place.
+`warn`. Each function yields a sentence and the key to which it refers. `file_warnings` finds the line of the key in
+the file.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,7 +29,7 @@ from bisar_budget.ranges.resolution import Resolution
 
 _SENSITIVITY = "acceleration_sensitivity"
 
-_MIN_ORBIT_SPEED_MPS = 100.0  # over the ground, above 100 km; a geostationary satellite is slower
+_MIN_ORBIT_SPEED_MPS = 100.0  # over the ground, of satellites above 100 km that are not geostationary
 
 
 class _Warned(NamedTuple):
@@ -44,7 +44,7 @@ class _Warned(NamedTuple):
 def file_warnings(
     case: Case, rows: Sequence[Row], waivers: Sequence[tuple[KeyPath, Note]]
 ) -> tuple[FileWarning, ...]:
-    """All warnings about the file of a mission.
+    """Collect all warnings about the file of a mission.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def _nothing_declared(rows: Sequence[Row]) -> Iterator[_Warned]:
 
 # ---------------------------------------------------------------------- how platforms fly
 def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
-    """Warn of inaccurate paths that no row reports.
+    """Yield warnings of possibly inaccurate paths that no row reports.
 
     Doubts about the position and about the residual of a log are treated separately.
     """
@@ -118,7 +118,7 @@ def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
 
 
 def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
-    """Warn of logs whose noise changes the allowables, because the path is fitted to the log."""
+    """Yield warnings of logs whose noise changes the allowables, because the path is fitted to the log."""
     for name in PLATFORMS:
         noise = allowable_noise(mission, name)
         if noise is not None and noise.change > MAX_UNSAID_CHANGE_FRACTION:
@@ -127,10 +127,11 @@ def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
 
 
 def straight_orbits(mission: Mission) -> Iterator[_Warned]:
-    """Warn of platforms that are as fast or as high as a satellite but have no `acceleration`, and give its value.
+    """Yield warnings of platforms that move like a satellite but have no `acceleration`, with the value to add.
 
-    Over an aperture time T, a missing acceleration a moves the true path away from the straight path by aT²/8, for
-    example 25 m in 5 s. A file that states an acceleration, including zero, has made the choice.
+    A platform moves like a satellite if it is as fast or as high as one. Over an aperture time T, a missing
+    acceleration a moves the true path away from the straight path by aT²/8, for example 25 m in 5 s. There is no
+    warning if the file states an acceleration, including zero.
     """
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
@@ -141,7 +142,7 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
         if platform.acceleration is not None or platform.is_of_the_earth:
             continue
         key = ("platforms", name, "speed" if platform.velocity is None else "velocity")
-        from bisar_budget.paths.earth import free_fall  # takes 8 ms; most missions do not need it
+        from bisar_budget.paths.earth import free_fall  # the import takes 8 ms and most missions do not need it
 
         acceleration = free_fall(plain_vector(platform.state.position), plain_vector(platform.state.velocity), axes)
         yield _Warned(
@@ -151,7 +152,7 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
 
 # ---------------------------------------------------------------------- how errors are stated
 def _of_instruments(case: Case) -> Iterator[_Warned]:
-    """Warn of rare exchanges of pulses, missing errors of clocks after setting, and errors that are stated twice."""
+    """Yield warnings of rare exchanges of pulses, of missing clock errors, and of errors that are stated twice."""
     mission, sync = case.mission, case.mission.synchronization
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
@@ -165,7 +166,7 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
 
 
 def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
-    """Warn of lever arms for which the file states no attitude error that would rotate them."""
+    """Yield warnings of lever arms for which the file states no attitude error that would rotate them."""
     for name in PLATFORMS:
         if swings_nothing(getattr(mission.platforms, name)):
             key = ("platforms", name, "motion_error", "lever_arm", "arm")
@@ -173,7 +174,7 @@ def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
 
 
 def calm_oscillators(mission: Mission) -> list[str]:
-    """List the platforms whose oscillators have an acceleration sensitivity but neither vibration nor a turn."""
+    """List the platforms whose oscillators are sensitive to acceleration but neither vibrate nor rotate."""
     return [
         name
         for name in PLATFORMS
@@ -182,14 +183,14 @@ def calm_oscillators(mission: Mission) -> list[str]:
 
 
 def _of_calm_oscillators(mission: Mission) -> Iterator[_Warned]:
-    """Warn of acceleration sensitivities of oscillators that neither vibrate nor turn."""
+    """Yield warnings of acceleration sensitivities of oscillators that neither vibrate nor rotate."""
     for name in calm_oscillators(mission):
         key = ("platforms", name, "oscillator", _SENSITIVITY)
         yield _Warned(key, phrases.note("nothing-shakes-the-oscillator", platform=name), is_doubt=True)
 
 
 def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
-    """Warn of oscillators with doubtful noise that no row reports because no requirement depends on the noise."""
+    """Yield warnings of doubtful oscillator noise that no row reports, because no requirement depends on it."""
     for name in PLATFORMS:
         for key, sentence in noise_doubts(mission, name):
             if not any(row.reason is not None and row.reason.includes(sentence) for row in rows):
@@ -197,7 +198,7 @@ def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned
 
 
 def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
-    """Warn of correlations that no row of a sum uses."""
+    """Yield warnings of correlations between errors that are not used, because `combine: each` forms no sums."""
     for name in PLATFORMS if mission.allocation.combine == "each" else ():
         covariance = getattr(mission.platforms, name).motion_error.covariance
         if covariance is not None and covariance.has_correlations():
@@ -209,7 +210,7 @@ def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
 
 # ---------------------------------------------------------------------- autofocus
 def _of_autofocus(mission: Mission, resolution: Resolution) -> Iterator[_Warned]:
-    """Warn if `autofocus.n_pull` is larger than range walk or the size of the scene permits."""
+    """Yield warnings if `autofocus.n_pull` is larger than range walk or the size of the scene permits."""
     n_pull, algorithm, radius = mission.autofocus.n_pull, mission.autofocus.algorithm, mission.scene.radius
     if n_pull is None:
         return

@@ -1,9 +1,9 @@
 """Changes of the allowables that the noise of a log causes, because the path is fitted to the log.
 
-The allowable of a position or velocity error depends on how the line of sight to the platform turns. A fit to a noisy
-log has an error at each time of the aperture, and therefore each allowable has an error too. The error of the fit is
-a sum of independent modes along each axis. Each mode is added to the path with one sigma of either sign, and the
-resulting changes are added as squares.
+The allowable of a position or velocity error depends on how the line of sight to the platform rotates. A fit to a
+noisy log has an error at each time of the aperture, and therefore each allowable has an error too. The error of the
+fit is a sum of independent modes along each axis. Each mode is added to the path with plus and minus one sigma, and
+the resulting changes are combined as a root-sum-square.
 """
 
 from dataclasses import dataclass, replace
@@ -20,14 +20,14 @@ from bisar_budget.mission.platforms import Platform
 
 MAX_UNSAID_CHANGE_FRACTION = 0.05  # largest change of an allowable without a warning
 _DECISIVE_EFFECT_FRACTION = (
-    0.1  # of the largest effect per unit of a kind: the allowable of a smaller effect decides nothing
+    0.1  # of the largest effect per unit of a kind; errors with smaller effects do not decide a verdict
 )
 _MOTION_KINDS = ("position", "velocity")
 
 
 @dataclass(frozen=True)
 class AllowableNoise:
-    """The allowable that the noise of the fit to a platform's log changes most.
+    """The allowable that changes most due to the noise of the fit to a platform's log.
 
     `acceleration` is one sigma of the error of the path's acceleration along the line of sight at mid-aperture
     [m/s²]. `change` is one sigma of the relative change of the allowable. `row_id` is the row of the allowable.
@@ -39,7 +39,10 @@ class AllowableNoise:
 
 
 def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
-    """Find the allowable of either platform that the noise of one platform's fit changes most; None without a fit."""
+    """Find the allowable that changes most due to the noise of one platform's fit; None without a fit.
+
+    The allowables are those of the position and velocity errors of both platforms.
+    """
     platform: Platform = getattr(mission.platforms, name)
     path = platform.path
     if path is None or path.path_noise is None or path.acceleration_noise is None:

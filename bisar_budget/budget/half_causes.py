@@ -1,8 +1,9 @@
 """Causes of error of which the file states only one half. Rows that depend on such a cause are not evaluated.
 
-Deleting the worse half of a cause must not turn a failing mission into a pass. No check of the file requires both
-halves for two kinds of cause. Two clocks need both oscillators. The vibration that an oscillator feels needs tones
-and noise if the airframe has both, because `oscillator.vibration` may state only tones or only noise.
+Without this rule, a failing mission could pass after the worse half of a cause is deleted from its file. The checks
+of the file do not require both halves for two kinds of cause. The first is a pair of clocks, which needs both
+oscillators. The second is the vibration that an oscillator feels: if the airframe has tones and noise,
+`oscillator.vibration` needs both, but may state only one of them.
 """
 
 from collections.abc import Iterator
@@ -68,7 +69,10 @@ def half_causes(mission: Mission) -> Iterator[HalfCause]:
 
 
 def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
-    """Find clocks without an oscillator in the file: clocks in holdover, or one of two that exchange pulses."""
+    """Yield the clocks of which the file states no oscillator, or only one of two.
+
+    This concerns clocks in holdover, and clocks that exchange pulses if one oscillator is stated.
+    """
     sync = mission.synchronization
     stated = tuple(name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is not None)
     unstated = tuple(name for name in PLATFORMS if name not in stated)
@@ -87,11 +91,11 @@ def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
 
 
 def _required(mission: Mission, keys: tuple[str, ...]) -> tuple[str, ...]:
-    """Return those keys whose requirements the file states."""
+    """Select the keys whose requirements the file states."""
     return tuple(key for key in keys if getattr(mission.requirements, key) is not None)
 
 
 def half_cause_of(mission: Mission, key: str) -> Note:
-    """Note with the key to add if a requirement depends on a cause that is only half stated; otherwise empty."""
+    """Name the key to add if a requirement depends on a cause that is only half stated; empty otherwise."""
     notes = [half.note for half in half_causes(mission) if key in half.requirements]
     return notes[0].then(*notes[1:]) if notes else NOTHING

@@ -1,8 +1,8 @@
-"""All rows and requirements of a mission, judged in many cases at once. A check is a single case.
+"""All rows and requirements of a mission, judged for an array of cases. The check of one mission is a single case.
 
-Each family of rows is judged by every gating model. With two models the stricter verdict counts. Then follow the
-judgements that need more than one row: required declarations, inaccurate paths, effects that no requirement covers,
-and waivers.
+Each family of rows is judged by every gating model. With two models, the stricter verdict is used. Judgements that
+need more than one row follow: required declarations, inaccurate paths, effects that no requirement covers, and
+waivers.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -54,11 +54,11 @@ _OWNERS = (*PLATFORMS, "clock", "mission")
 
 @dataclass(frozen=True, eq=False)
 class JudgedMission:
-    """A mission that is judged in many cases.
+    """The result of judging a mission for an array of cases.
 
-    `rows` are the rows after waivers, in the order of the contract. `before` are the same rows before waivers. Their
-    field `why` gives the reason if the numbers of a row do not decide its status. `families` holds the rows of each
-    family by gating model.
+    `rows` are the rows after waivers, in the order of the JSON output. `before` are the same rows before waivers.
+    Their field `why` gives the reason if the numbers of a row do not decide its status. `families` holds the rows of
+    each gating model before the models are merged.
     """
 
     analysis: Analysis
@@ -70,9 +70,9 @@ class JudgedMission:
     unplaced: Mapping[str, Booleans]
     air: StayingAir
     scene: JudgedScene | None
-    floor: Codes  # the best status that each case can have
+    floor: Codes  # best possible status of each case
     waivers: NDArray[np.intp]  # index in the file of each row's waiver, (rows, n); -1: no waiver
-    waived_requirements: Sequence[tuple[Booleans, int]]  # cases in which each is waived, index of its waiver or -1
+    waived_requirements: Sequence[tuple[Booleans, int]]  # waived cases, and index of waiver or -1
 
     @property
     def is_empty(self) -> bool:
@@ -85,9 +85,10 @@ class JudgedMission:
         return all(nothing)
 
     def covering(self, row_id: str | None = None) -> Iterator[tuple[str, Booleans]]:
-        """Yield the ids of the waivers in the order of the file, each with the cases in which it covers something.
+        """Yield the id of each waiver, with a mask of the cases in which it covers something.
 
-        With `row_id`, only cases count in which the waiver covers this row.
+        The waivers are in the order of the file. With `row_id`, only the cases are marked in which the waiver covers
+        this row.
         """
         rows = [row_id is None or row.subject.id == row_id for row in self.rows]
         requirements = self.waived_requirements if row_id is None else ()
@@ -97,14 +98,14 @@ class JudgedMission:
 
     @cached_property
     def status(self) -> Codes:
-        """Status of the mission in each case: the worst status that gates, or the floor if that is worse."""
+        """Status of the mission in each case: the worst gating status of its rows, or `floor` if that is worse."""
         codes = np.array([row.status for row in self.rows])
         worst = np.where(_GATES[codes], codes, CODE["pass"]).min(axis=0)
         return np.asarray(np.minimum(worst, self.floor), dtype=np.int8)
 
 
 def judged_mission(analysis: Analysis, today: date) -> JudgedMission:
-    """Judge every row and every requirement of the analysed cases.
+    """Judge every row and every requirement for the analysed cases.
 
     Parameters
     ----------
@@ -124,7 +125,7 @@ class _Judgement:
         self.judging = Judging(self.cases, self.mission.allocation.warn_above, analysis.is_complete)
 
     def judge(self) -> JudgedMission:
-        """Judge every row and every requirement."""
+        """Judge every row and every requirement, and return the result."""
         analysis, mission = self.analysis, self.mission
         families = {model: list(self._families(model)) for model in analysis.gates}
         by_model = [self._rows(model, rows_of_model) for model, rows_of_model in families.items()]
@@ -155,7 +156,7 @@ class _Judgement:
         of_requirements = {key: holding_place(mission, self.today, [f"mission.{key}"]) for key in REQUIREMENT_KEYS}
         states = requirement_states(
             mission,
-            # A requirement judges its effects without the row's status, but a waiver of its row waives it too.
+            # The status of a row for other reasons does not matter here, but a waiver of the row counts.
             np.where(
                 (after == CODE["waived"]) & np.isin(by_themselves, _BROKEN_CODES), CODE["waived"], by_themselves
             ),
@@ -186,7 +187,7 @@ class _Judgement:
 
     # ---------------------------------------------------------------- rows of the families
     def _families(self, model: str) -> Iterator[FamilyRow]:
-        """Yield all rows judged by a model, in the order of the contract."""
+        """Yield all rows under one gating model, in the order of the JSON output."""
         needs = self.mission.requirements
         yield from self._errors.rows(model)
         if self._vibrates or self._shows_vibration:
@@ -207,9 +208,9 @@ class _Judgement:
         yield from specification_rows(self.judging, self.analysis)
 
     def _rows(self, model: str, families: Sequence[FamilyRow]) -> dict[str, Judged]:
-        """Collect the rows by id.
+        """Collect the rows of a model by id, without rows that exist in no case.
 
-        A row may come from different families in different cases. It exists in at least one case.
+        Different families may give the same row in different cases. These are merged into one row.
         """
         rows: dict[str, Judged] = {}
         by_model = np.full(self.cases, MODELS.index(model), np.int8)
@@ -232,7 +233,7 @@ class _Judgement:
 
     @cached_property
     def _limits(self) -> Mapping[str, Floats]:
-        """Limit on the quadratic phase of each owner, including the gain of autofocus. [rad]"""
+        """Limit on the quadratic phase of each owner, including the autofocus gain, (cases,). [rad]"""
         allocation = self.analysis.allocation
         return {owner: self.judging.array(allocation.qpe_allowed(owner)) for owner in _OWNERS}
 
@@ -266,14 +267,14 @@ class _Judgement:
     # ---------------------------------------------------------------- judgements beyond single rows
     @cached_property
     def _in_doubt(self) -> dict[tuple[str, str], Booleans]:
-        """Mark the cases in which a path may be less accurate than is declared, by platform and kind of error."""
+        """Masks of the cases with a path that may be less accurate than declared, by platform and kind of error."""
         return doubted_platforms(self.mission, self.cases)
 
     def _undeclared(self, judged_rows: Mapping[str, Judged]) -> Iterator[Judged]:
-        """Yield rows that no case declares: rows that are always shown, and rows of errors of inaccurate paths."""
+        """Yield rows for errors that no case declares: rows that are always shown, and rows of inaccurate paths."""
         subjects = dict(self.shown or {})
         for (name, kind), is_doubtful in self._in_doubt.items():
-            is_shown = is_doubtful.any() and kind != RESIDUAL  # the residual has a family of its own
+            is_shown = is_doubtful.any() and kind != RESIDUAL  # the residual of a log has its own rows
             axes = (subject(name, kind, axis) for axis in "xyz") if is_shown else ()
             subjects |= {
                 axis_subject.id: axis_subject
@@ -288,7 +289,7 @@ class _Judgement:
         )
 
     def _has_noise(self) -> Booleans:
-        """Mark the cases that declare an error that spreads power, or a tone that ISLR limits.
+        """Find the cases that declare an error that spreads power, or a tone that ISLR limits, (cases,).
 
         The phase of a motion error beyond the cubic term spreads power if it is not negligible.
         """
@@ -303,7 +304,7 @@ class _Judgement:
         return np.asarray(np.any([np.zeros(self.cases, bool), *has_any], axis=0))
 
     def _doubted_rows(self, rows: Sequence[Judged]) -> Booleans:
-        """Mark the rows of oscillators with doubtful noise, (rows, cases)."""
+        """Find the rows of oscillators with doubtful noise, (rows, cases)."""
         doubted = {error.id: error.is_in_doubt for error in self.analysis.random if np.any(error.is_in_doubt)}
         in_doubt = np.zeros((len(rows), self.cases), dtype=bool)
         for row_index, row in enumerate(rows) if doubted else ():
@@ -311,7 +312,7 @@ class _Judgement:
         return in_doubt
 
     def _floor(self) -> Codes:
-        """Best possible status of each case.
+        """Return the best possible status of each case, (cases,).
 
         It is `warn` if the input casts doubt on a path, an oscillator or a lever arm, `not_evaluated` if no error is
         declared, and `pass` otherwise.
@@ -336,9 +337,9 @@ class _Judgement:
 
 
 class RowStatuses:
-    """Statuses of rows in many cases, (rows, cases), with the reasons for changes that single rows cannot decide.
+    """Statuses of rows, (rows, cases), and the reasons for status changes that depend on more than one row.
 
-    Each step sets some rows to not evaluated. A row that fails still fails.
+    Each method sets some rows to `not_evaluated`. A row that fails keeps the status `fail`.
     """
 
     def __init__(self, rows: Sequence[Judged], mission: Mission) -> None:
@@ -347,7 +348,7 @@ class RowStatuses:
         self.status, self.why = np.array([row.status for row in rows]), np.array([row.why for row in rows])
 
     def _settle(self, rows: Sequence[bool], is_so: PerCaseFlag, why: Why) -> None:
-        """Set `rows` to not evaluated where `is_so` is true, and record the reason `why`.
+        """Set `rows` to `not_evaluated` where `is_so` is true, and record the reason `why`.
 
         `is_so` has the shape (rows, cases) or (cases,).
         """
@@ -356,11 +357,14 @@ class RowStatuses:
         self.why = np.where(are_settled, np.int8(why), self.why)
 
     def require_declarations(self, geometry: BistaticGeometry) -> None:
-        """Set required errors that are not declared to not evaluated. The first row shows whether any is missing."""
+        """Set the rows of required errors that are not declared to `not_evaluated`.
+
+        The first row, which stands for all required declarations, becomes `not_evaluated` if any is missing.
+        """
         if not self.mission.requirements.declare:
             return
         still = np.array([np.broadcast_to(path.is_still, self.status.shape[1:]) for path in geometry.both])
-        # There is nearly always one combination: a moving platform moves in every case.
+        # There is nearly always one combination, because a moving platform moves in every case.
         for still_platforms in np.unique(still, axis=1).T:
             cases = (still == still_platforms[:, None]).all(axis=0)
             names = [name for name, is_still in zip(PLATFORMS, still_platforms, strict=True) if is_still]
@@ -370,27 +374,29 @@ class RowStatuses:
             self._settle(owed, cases & (self.status == CODE["not_declared"]), Why.NOT_DECLARED_AS_REQUIRED)
 
     def doubt_inputs(self, in_doubt: Mapping[tuple[str, str], Booleans]) -> None:
-        """Set the rows of errors to not evaluated if the path may be less accurate than the file declares."""
+        """Set the rows of errors to `not_evaluated` if the path may be less accurate than the file declares."""
         for (name, kind), is_doubtful in in_doubt.items():
             if is_doubtful.any():
                 owed = [is_in_doubt(row_subject, name, self.mission, kind) for row_subject in self.subjects]
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
     def doubt_air(self, doubted: Mapping[str, Booleans]) -> None:
-        """Set the given rows to not evaluated in the given cases, because they depend on delays taken as constant.
+        """Set the given rows to `not_evaluated` in the given cases.
 
-        `doubted` maps row ids to cases.
+        These rows depend on atmospheric delays that are assumed to be constant. `doubted` maps row ids to masks,
+        (cases,).
         """
         for row_id, is_doubted in doubted.items():
             if is_doubted.any():
                 rows = [row_subject.id == row_id for row_subject in self.subjects]
-                is_new = self.why != Why.EFFECT_NOT_TAKEN  # that reason names the requirement to add
+                is_new = self.why != Why.EFFECT_NOT_TAKEN  # keep the reason that names the requirement to add
                 self._settle(rows, is_doubted & self._is_open & is_new, Why.AIR_STAYS)
 
     def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
-        """Set rows to not evaluated if they contribute to an effect that no requirement covers.
+        """Set rows to `not_evaluated` if they contribute to an effect that no requirement limits.
 
-        A row without a limit and with a negligible effect judges nothing. Its status becomes `info`.
+        A row that passes because it has no limit judges nothing. If its effect is negligible, its status becomes
+        `info`.
         """
         for row_index, row in enumerate(self.rows):
             row_id, status = row.subject.id, self.status[row_index]
@@ -408,18 +414,18 @@ class RowStatuses:
             self.why[row_index] = np.where(makes_up, np.int8(Why.EFFECT_NOT_TAKEN), self.why[row_index])
 
     def judge_place(self, is_misplaced: Booleans) -> None:
-        """Set the location row to not evaluated if an error displaces the image by an amount that no row limits."""
+        """Set the location row to `not_evaluated` if an error displaces the image by an amount that no row limits."""
         if self.mission.requirements.location_error is not None:
             rows = [row_subject.id == f"mission.{LOCATION}" for row_subject in self.subjects]
             self._settle(rows, is_misplaced & self._is_open, Why.NO_PLACE)
 
     def judge_halves(self, halves: Sequence[HalfCause]) -> None:
-        """Set rows to not evaluated if they depend on a cause of which the file states only one half."""
+        """Set rows to `not_evaluated` if they depend on a cause of which the file states only one half."""
         for half in halves:
             self._settle([half.holds(row_subject) for row_subject in self.subjects], self._is_open, Why.HALF_A_CAUSE)
 
     def judge_spread(self, has_noise: Booleans) -> None:
-        """Set the ISLR rows to not evaluated if nothing but a cubic phase contributes to them."""
+        """Set the ISLR rows to `not_evaluated` in the cases in which nothing but a cubic phase contributes."""
         if not has_noise.all():
             rows = [row_subject.kind == "islr" for row_subject in self.subjects]
             is_new = ~np.isin(self.why, (Why.INPUT_IN_DOUBT, Why.AIR_STAYS))
@@ -430,9 +436,9 @@ class RowStatuses:
         return np.asarray((self.status != CODE["fail"]) & (self.status != CODE["not_declared"]))
 
     def waivers(self, today: date) -> NDArray[np.intp]:
-        """Index in the file of the first valid waiver that covers each broken row; -1: no such waiver.
+        """Find the first valid waiver that covers each broken row; -1 if there is none, (rows, cases).
 
-        A row is broken if it fails or is not evaluated.
+        The result is the index of the waiver in the file. A row is broken if it fails or is not evaluated.
         """
         indices = np.full(self.status.shape, -1)
         if not self.mission.waivers:
@@ -446,7 +452,7 @@ class RowStatuses:
         return np.where(np.isin(self.status, _BROKEN_CODES), indices, -1)
 
     def judges(self) -> Codes:
-        """Index in `REQUIREMENT_KEYS` of the requirement that judges each row.
+        """Find the requirement that judges each row, as an index in `REQUIREMENT_KEYS`, (rows, cases).
 
         The index is -1 for a row that no requirement judges, and for a required error that is not declared.
         """
@@ -458,7 +464,7 @@ class RowStatuses:
         return np.where(self.why == Why.NOT_DECLARED_AS_REQUIRED, -1, judges).astype(np.int8)
 
     def rows_with(self, status: Codes) -> tuple[Judged, ...]:
-        """Return the rows with the given statuses. A row that has become `info` has no utilization."""
+        """Return the rows with the given statuses (rows, cases). A row that has become `info` has no utilization."""
         rows = []
         for row, code, why in zip(self.rows, status, self.why, strict=True):
             is_info = (code == CODE["info"]) & (row.status != code)
@@ -468,9 +474,9 @@ class RowStatuses:
 
 
 def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None = None) -> list[Judged]:
-    """Merge the rows of both models. For each row, the model with the stricter verdict is used.
+    """Merge the rows of both models. For each row and case, the model with the stricter verdict is used.
 
-    If both verdicts are equal, the model with the higher utilization is used.
+    If both statuses are equal, the model with the higher utilization is used.
     """
     if published is None:
         return list(full.values())
@@ -487,4 +493,4 @@ def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None
         takes_published = (by_published.status < by_full.status) | (tie & ~is_equal & (use[1] > use[0]))
         takes_published |= tie & is_equal & ~is_as_high(size[1], size[0])
         stricter.append(by_full.where(takes_published, by_published))
-    return [*stricter, *only_published.values()]  # an aggregate that only one model has
+    return [*stricter, *only_published.values()]  # sums that only the published model has

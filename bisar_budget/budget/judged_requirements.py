@@ -1,6 +1,7 @@
-"""Judge every requirement from its rows, the effects that no requirement covers, and the declared errors.
+"""Judges every requirement from its rows, the effects that no requirement covers, and the declared errors.
 
-Exit code 0 means that every requirement was judged and is met. Each effect of each declared error is judged once:
+The exit code 0 of a check means that every requirement was judged and is met. Each effect of each declared error is
+judged once:
 
 - quadratic phase: by the quadratic requirement;
 - cubic phase: by the cubic requirement, or by ISLR if there is none;
@@ -11,7 +12,7 @@ Exit code 0 means that every requirement was judged and is met. Each effect of e
 An effect that no requirement covers is negligible if its total is below a tenth of the quadratic requirement and
 below 0.08 rad. Otherwise the rows that cause it are `not_evaluated`.
 
-Every number is an array over the cases, (n,). A check is a single case.
+All numbers are arrays over n cases, (n,). The check of one mission is a single case.
 """
 
 from collections.abc import Mapping
@@ -29,28 +30,28 @@ from bisar_budget.mission.model import Mission
 
 REQUIREMENT_KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
 REQUIREMENT_UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
-EQUAL_USE_FRACTION = 1e-9  # relative difference below which utilizations are equal, but for rounding
+EQUAL_USE_FRACTION = 1e-9  # relative difference up to which utilizations are treated as equal
 NEGLIGIBLE_FRACTION, SMALL_RAD = 0.1, 0.08  # of the quadratic requirement; phase that is small in any image
-# Relative to the largest part: rows with smaller parts do not make up an effect if their sum is negligible.
+# Fraction of the largest part; rows with smaller parts are not named if their sum is negligible.
 MAKER_FRACTION = 0.1
 
 # Requirements that cover an effect, in the order in which they are suggested.
 TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "islr")}
 
-EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}  # values of suggested lines
+EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}  # example values for lines to add to a file
 
 _NONE = np.int8(len(STATUS))  # code of a row that judges nothing
 IS_JUDGED = np.array([status.is_judged for status in STATUS.values()])
-# Whether a requirement is met with a status, with or without a warning; the last value belongs to `_NONE`.
+# Whether a requirement with a given status is met; the last value belongs to `_NONE`.
 IS_MET = np.array([*(status.complies for status in STATUS.values()), False])
 
 
 class UntakenEffect(NamedTuple):
-    """An effect that no requirement covers, in many cases, and the rows that cause it.
+    """An effect that no requirement covers, for an array of cases, and the rows that cause it.
 
-    `total` is the effect of all errors together, and `parts` gives the magnitude of each error's effect by row id.
-    [rad] `is_negligible` marks the cases with a small total. `makers` marks, by row id, the rows that cause the
-    effect in the cases with a large total. Each of these rows has an effect of at least `least`. [rad]
+    `total` is the effect of all errors together [rad], and `parts` gives the magnitude of each error's effect [rad]
+    by row id. `is_negligible` marks the cases with a small total. `makers` marks, by row id, the rows that cause the
+    effect in the cases with a large total. Each of these rows has an effect of at least `least` [rad].
     """
 
     kind: str  # cubic, spread or tone
@@ -62,12 +63,13 @@ class UntakenEffect(NamedTuple):
 
 
 class RequirementState(NamedTuple):
-    """A judged requirement: its status, the rows that judge it, and the index of the row that decides it (or -1).
+    """A judged requirement for an array of cases: its status, the rows that judge it, and the row that decides it.
 
-    `user` is the index of the row that gives the requirement's `utilization`. If the requirement is met, with or
-    without a warning, this is the row with the largest utilization. It may differ from the row that decides: a
-    warning that only the second model causes may come with a smaller utilization. `is_unjudged` marks the cases in
-    which the requirement cannot be judged, whether it is waived or not.
+    `decider` is the index of the row that decides the status, or -1. `user` is the index of the row that gives the
+    `utilization` of the requirement, or -1. If the requirement is met, with or without a warning, this is the row
+    with the largest utilization. It may differ from the row that decides, because a warning that only the second
+    model causes may come with a smaller utilization. `is_unjudged` marks the cases in which the requirement cannot be
+    judged, whether it is waived or not.
     """
 
     key: str
@@ -80,7 +82,7 @@ class RequirementState(NamedTuple):
 
 
 def first_highest(uses: Floats) -> NDArray[np.intp]:
-    """Index of the row with the highest utilization in each case, (cases,).
+    """Find the row with the highest utilization in each case, as an index, (cases,).
 
     If several rows are equal except for rounding, the first of them is returned.
     """
@@ -89,7 +91,7 @@ def first_highest(uses: Floats) -> NDArray[np.intp]:
 
 def is_as_high(uses: PerCase, other_uses: PerCase) -> Booleans:
     """Whether `uses` are at least as high as `other_uses`, except for rounding."""
-    with np.errstate(invalid="ignore"):  # an infinite utilization is as high as itself
+    with np.errstate(invalid="ignore"):  # infinite utilizations are equal, but their difference is NaN
         return np.asarray((uses >= other_uses - EQUAL_USE_FRACTION * np.abs(other_uses)) | (uses == other_uses))
 
 
@@ -99,7 +101,7 @@ def negligible_rad(mission: Mission) -> PerCase:
 
 
 def required_keys(mission: Mission) -> tuple[str, ...]:
-    """Keys of the requirements of a mission, including the quadratic phase, which has a default."""
+    """List the keys of the requirements of a mission, including the quadratic phase, which has a default."""
     needs = mission.requirements
     return tuple(
         key for key in REQUIREMENT_KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None)
@@ -120,7 +122,7 @@ def requirement_states(
     is_misplaced: PerCaseFlag,
     unjudged: Mapping[str, PerCaseFlag],
 ) -> list[RequirementState]:
-    """Judge every requirement of a mission in many cases.
+    """Judge every requirement of a mission for an array of n cases.
 
     Parameters
     ----------
@@ -154,12 +156,12 @@ def requirement_states(
     for key in required_keys(mission):
         mine = IS_JUDGED[codes] & (judges == REQUIREMENT_KEYS.index(key))
         levels, used = np.where(mine, codes, _NONE), uses
-        if key == QUADRATIC:  # this requirement also limits a row that another requirement binds
+        if key == QUADRATIC:  # a row whose allowable another requirement sets is judged by this one too
             is_of_other = IS_JUDGED[codes] & ~mine & ~np.isnan(quadratic_use)
             by_autofocus = np.where(codes == RANK["pass_with_autofocus"], codes, RANK["pass"])
             broken = np.where(
                 codes == RANK["waived"], codes, RANK["fail"]
-            )  # a waiver of the row covers all that the row breaks
+            )  # a waiver of a row covers every requirement that the row breaks
             breaks = np.nan_to_num(quadratic_use) > LIMIT_RATIO
             rests_on = in_doubt & is_open & (np.nan_to_num(quadratic_use) > MIN_USE_FRACTION)
             kept = np.where(rests_on, codes, by_autofocus)

@@ -1,4 +1,7 @@
-"""A row of the budget in many cases at once, and the rules that judge it. A check is a single case."""
+"""One row of the budget for an array of cases, and the rules that judge it.
+
+The check of one mission is a single case.
+"""
 
 import math
 from abc import ABC, abstractmethod
@@ -22,7 +25,7 @@ from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.phrases import NOTHING, Note
 
-Codes = NDArray[np.int8]  # indices of statuses in STATUS: the worst has the lowest
+Codes = NDArray[np.int8]  # indices of statuses in `STATUS`, from the worst to the best
 
 LIMIT_RATIO = 1 + UTILIZATION_TOLERANCE_FRACTION
 CODE = {name: np.int8(rank) for name, rank in RANK.items()}
@@ -32,7 +35,7 @@ EFFECT_WORDS = {
     QUADRATIC: ("rad", "QPE"),
     CUBIC: ("rad", "cubic phase"),
     LOCATION: ("m", "displacement"),
-}  # in a sentence
+}  # unit and name of each effect in a sentence
 
 COMPLETE_FIELDS = (
     "allowable_published",
@@ -40,7 +43,7 @@ COMPLETE_FIELDS = (
     "qpe_full_rad",
     "qpe_exact_rad",
     "islr_db",
-)  # see `Judging`
+)  # computed only if `Judging.is_complete` is set
 NUMBERS = (
     "declared",
     "allowable",
@@ -51,20 +54,20 @@ NUMBERS = (
     "islr_db",
     "equal_loss_qpe_rad",
     "rest_rad",
-)  # names of columns
+)  # names of the numbers of a row in reports
 _columns_of_numbers = attrgetter(*NUMBERS)
-IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # columns in the unit of their row
+IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # numbers in the unit of the row's error
 
 
 def statuses(codes: Codes | np.int8) -> Any:
-    """Convert the code of a status to its name, or an array of codes to an array of names."""
+    """Convert the code of a status to its name. An array of codes gives an array of names."""
     return _STATUS_NAMES[codes]
 
 
 class Why(IntEnum):
-    """Reason why the status of a row differs from the status that its own numbers give."""
+    """Reason for the status of a row if the row's own numbers do not decide it."""
 
-    OWN = 0  # the row's own numbers decide
+    OWN = 0  # no reason: the row's own numbers decide
     NOT_DECLARED_AS_REQUIRED = 1
     INPUT_IN_DOUBT = 2
     EFFECT_NOT_TAKEN = 3
@@ -75,7 +78,7 @@ class Why(IntEnum):
 
 
 class Judged(NamedTuple):
-    """One row of the budget in many cases: codes of statuses (indices in `STATUS`) and numbers.
+    """One row of the budget for an array of cases: codes of statuses (indices in `STATUS`) and numbers, (cases,).
 
     A number is NaN where it does not exist. Numbers from `allowable_published` on are computed only for complete rows
     (`Judging.is_complete`).
@@ -87,11 +90,11 @@ class Judged(NamedTuple):
     allowable: Floats
     utilization: Floats
     binding: Codes  # index in REQUIREMENTS of the requirement that sets the allowable, or -1: the row's metric
-    why: Codes  # of `Why`
+    why: Codes  # values of `Why`
     model: Codes  # index in MODELS of the model that judges
     qpe_published_rad: Floats
     cubic_rad: Floats
-    quadratic_use: Floats  # quadratic phase over its limit, for any binding; NaN without a quadratic phase
+    quadratic_use: Floats  # quadratic phase divided by its limit, for any `binding`; NaN without such a phase
     allowable_published: Floats
     allowable_full: Floats
     qpe_full_rad: Floats
@@ -99,11 +102,11 @@ class Judged(NamedTuple):
     equal_loss_qpe_rad: Floats
     rest_rad: Floats
     metric: str = QUADRATIC
-    is_of_ranges: bool = False  # `qpe_full_rad` comes from exact ranges
+    is_of_ranges: bool = False  # whether `qpe_full_rad` is computed from exact ranges
 
     @classmethod
     def of_none(cls, row_subject: Subject, cases: int) -> "Judged":
-        """Return a row that is not declared in any case."""
+        """Create a row that no case declares."""
         status = np.full(cases, RANK["not_declared"], np.int8)
         return cls._with(row_subject, status, *(np.full(cases, math.nan) for _ in range(3)))
 
@@ -130,42 +133,42 @@ class Judged(NamedTuple):
         return self._replace(**columns)
 
     def in_decibel(self) -> "Judged":
-        """Return the row with its amplitude factors in decibels. The utilization remains a ratio of amplitudes."""
+        """Return the row with its sizes converted to decibels. The utilization remains a ratio of amplitudes."""
         return self._of_columns(decibels, IN_UNIT)
 
     def in_unit(self, factor: PerCase) -> "Judged":
-        """Return the row with its sizes in another unit: each size is multiplied by `factor`."""
+        """Return the row in another unit. Each size is multiplied by `factor`."""
         return self._of_columns(lambda column: column * factor, IN_UNIT)
 
     def held_to(self, key: str) -> "Judged":
-        """Return the row with requirement `key` as its metric.
+        """Return the row with the requirement `key` as its metric.
 
         This requirement then sets the allowable in every case.
         """
         return self._replace(metric=key, binding=np.full_like(self.binding, REQUIREMENTS.index(key)))
 
     def allowable_by(self, model: str) -> Floats:
-        """The allowable by a model, regardless of the gating model."""
+        """Return the allowable by the model `model`, which need not be the gating model."""
         return self.allowable_published if model == "published" else self.allowable_full
 
     def requirement(self, case: Case) -> str | None:
-        """Key of the requirement that sets the allowable in a case; None if the metric of the row sets it."""
+        """Return the key of the requirement that sets the allowable in a case; None if the row's metric sets it."""
         requirement_index = self.binding[case.place]
         return None if requirement_index < 0 else REQUIREMENTS[requirement_index]
 
     def numbers(self, case: int) -> dict[str, float | None]:
-        """The numbers of the row in one case, by column name; None where a value does not exist."""
+        """Return the numbers of the row in one case, by name; None where a number does not exist."""
         columns = [column.item(case) for column in _columns_of_numbers(self)]
         return {name: None if math.isnan(number) else number for name, number in zip(NUMBERS, columns, strict=True)}
 
     @property
     def qpe_exact_rad(self) -> Floats:
-        """Quadratic phase by exact ranges; NaN for a row whose error is not computed from exact ranges. [rad]"""
+        """Quadratic phase computed from exact ranges; NaN for a row whose error is not computed from them. [rad]"""
         return self.qpe_full_rad if self.is_of_ranges else np.full(self.qpe_full_rad.shape, math.nan)
 
     @property
     def margin(self) -> Floats:
-        """Allowable divided by declared size, minus one; for a row in decibels, the ratio of amplitudes is used."""
+        """Allowable divided by the declared size, minus one. For a row in decibels, both are amplitudes."""
         with np.errstate(all="ignore"):
             margin = 1 / self.utilization - 1
         margin[~np.isfinite(margin)] = math.nan
@@ -176,13 +179,13 @@ _ARRAY_FIELDS = tuple(name for name in Judged._fields if name not in ("subject",
 
 
 def decibels(amplitude: PerCase) -> Floats:
-    """Convert amplitude factors to levels; NaN for a factor that is not above 0. [dB]"""
+    """Convert amplitude factors to levels [dB]; NaN for a factor that is not above 0."""
     with np.errstate(all="ignore"):
         return np.where(amplitude > 0, 20 * np.log10(amplitude) + 0.0, math.nan)
 
 
 class Judging(NamedTuple):
-    """Rules that judge rows: the number of cases, and the utilization above which a pass becomes a warning.
+    """Rules that judge rows, for a number of `cases`. A utilization above `warn_above` turns a pass into a warning.
 
     If `is_complete` is set, all numbers of each row are computed, otherwise only the numbers that decide the status.
     """
@@ -192,7 +195,7 @@ class Judging(NamedTuple):
     is_complete: bool = False
 
     def array(self, value: PerCase | None) -> Floats:
-        """Expand a number to one value for each case, (cases,); NaN for None."""
+        """Expand a number to an array with one value for each case, (cases,); NaN for None."""
         return np.full(self.cases, math.nan if value is None else value, dtype=float)
 
     def row(
@@ -207,10 +210,20 @@ class Judging(NamedTuple):
         is_unknown: PerCaseFlag = False,
         never_fails: bool = False,
     ) -> Judged:
-        """Judge a row in each case. The first status that applies is used.
+        """Judge a row in each case, by the first rule that applies.
 
-        `declared` is NaN in the cases that do not declare the error. Where `is_unknown` is true, the declared value
-        cannot be judged.
+        The rules are applied in this order:
+
+        - the error is not declared: `not_declared`;
+        - `is_info` is true: `info`;
+        - `is_unknown` is true, because the declared value cannot be judged: `not_evaluated`;
+        - the utilization exceeds the limit: `fail`, or `warn` if the row `never_fails`;
+        - `doubt` is true: `warn`;
+        - the utilization without autofocus exceeds the limit: `pass_with_autofocus`;
+        - the utilization exceeds `warn_above`: `warn`;
+        - otherwise: `pass`.
+
+        `declared` is NaN in the cases that do not declare the error.
         """
         shape = (self.cases,) if declared is None else declared.shape  # several rows at once: (rows, cases)
         none = np.full(shape, math.nan)
@@ -247,9 +260,9 @@ class Judging(NamedTuple):
 # ---------------------------------------------------------------------- one case in words
 @dataclass(frozen=True, slots=True, eq=False)
 class FamilyRow(ABC):
-    """Base class of the rows of a family, judged by one model in many cases.
+    """Base class of the rows of a family, judged by one model for an array of cases.
 
-    `judged` holds the numbers. `is_there` marks the cases that have the row.
+    `judged` holds the numbers. `is_there` marks the cases in which the row exists.
     """
 
     judged: Judged
@@ -257,7 +270,7 @@ class FamilyRow(ABC):
 
     @abstractmethod
     def in_words(self, case: Case, model: str) -> Row:
-        """Describe the row of one case in words; `model` is the model that judges it."""
+        """Build the report row of one case, with its texts; `model` names the model that judges the row."""
 
 
 def worded(
@@ -275,7 +288,7 @@ def worded(
     without_autofocus: float = 0.0,  # utilization without the gain of autofocus
     **more_fields: Any,  # further fields of the row
 ) -> Row:
-    """Describe a judged row in one case in words. The words follow from the status and do not change it."""
+    """Build the report row of one case from a judged row and its texts. The texts do not change the status."""
     mission, status, numbers = case.mission, statuses(row.status[case.place]), row.numbers(case.place)
     allowable, utilization, full = numbers["allowable"], numbers["utilization"], numbers["qpe_full_rad"]
     reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...](more_fields.pop("remarks", ()))

@@ -2,8 +2,8 @@
 
 The residual is the difference between the fixes of the log and the smooth path through them. A processor that uses
 the fixes has the residual as a random error, which has a row of its own (`effects.navigation_errors`). A processor
-that uses the smooth path has no residual. If the file does not state the choice, the residual cannot be judged. This
-row is then not evaluated, whatever the requirements are.
+that uses the smooth path has no residual. If the file does not state which path is used, the residual cannot be
+judged. This row is then not evaluated, whatever the requirements are.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,10 @@ from bisar_budget.mission.model import Mission
 
 
 def log_rows(judging: Judging, mission: Mission) -> Iterator["UnsaidResidual"]:
-    """Yield a row for each platform whose log has too large a residual. The row exists in those cases only."""
+    """Yield a row for each platform with a log whose residual is too large.
+
+    The row exists only in the cases in which the residual is too large.
+    """
     for name in PLATFORMS:
         is_there = np.broadcast_to(leaves_unsaid(mission, name), (judging.cases,))
         if is_there.any():
@@ -36,9 +39,9 @@ def log_rows(judging: Judging, mission: Mission) -> Iterator["UnsaidResidual"]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UnsaidResidual(FamilyRow):
-    """The row for the residual of a log, in many cases. Its reason is the note of the doubt about the input."""
+    """The row for the residual of a log, for an array of cases. The note on the inaccurate path gives its reason."""
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Describe the row of one case in words, which are the same for both models."""
+        """Build the report row of one case, with its texts. The row is the same for both models."""
         path = ("platforms", self.judged.subject.owner, "trajectory", "processed")
         return worded(case, self.judged, unit="m", path=path, equation="residual of the smoothed log")

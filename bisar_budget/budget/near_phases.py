@@ -1,8 +1,9 @@
-"""Phase limits of tones between one and three cycles per aperture, which apply besides the limit on their echoes.
+"""Phase limits of tones between one and three cycles per aperture, in addition to the limit on their echoes.
 
-Such a tone makes echoes and, in its worst phase, a quadratic and a cubic phase error. No sum includes these phases,
-because PSLR or ISLR already limits the motion. Therefore the row of the tone limits them. The limit on the quadratic
-phase is the platform's share, with the gain of autofocus. The limit on the cubic phase is the full requirement.
+Such a tone makes echoes. At its worst starting phase it also causes a quadratic and a cubic phase error. No sum of
+errors includes these phases, because PSLR or ISLR already limits the motion. Therefore the row of the tone itself
+limits them. The limit on the quadratic phase is the platform's share, including the autofocus gain. The limit on the
+cubic phase is the full requirement.
 """
 
 import math
@@ -22,10 +23,10 @@ from bisar_budget.phrases import NOTHING, Note
 
 
 class NearPhases(NamedTuple):
-    """Phases of a declared tone at its worst phase, in many cases; NaN for a faster tone. [rad]
+    """Phases of a declared tone at its worst starting phase [rad], for an array of cases.
 
-    `use` is the utilization of the stricter limit. `quadratic_use` is the utilization of the quadratic limit, and
-    `without_autofocus` is the same without the gain of autofocus.
+    The numbers are NaN for a faster tone. `use` is the utilization of the stricter limit, `quadratic_use` is that of
+    the quadratic limit, and `without_autofocus` is the same without the autofocus gain.
     """
 
     use: Floats
@@ -44,10 +45,10 @@ class NearPhases(NamedTuple):
         is_near: Booleans,
         phases: tuple[PerCase, PerCase, PerCase, PerCase],
     ) -> "NearPhases":
-        """Compute the utilizations from the phases of an owner's tone.
+        """Compute the utilizations of a tone from its phases.
 
-        `phases` are the quadratic, cubic, equal-loss and judged phase. [rad] `is_near` marks the cases in which the
-        tone is slow enough to have them.
+        `owner` is the platform of the tone. `phases` are its quadratic, cubic, equal-loss and judged phase [rad].
+        `is_near` marks the cases in which the tone is slow enough to cause these phases.
         """
         quadratic, cubic, equal_loss, judged = (np.where(is_near, phase, math.nan) for phase in phases)
         use = quadratic_use = judged / allocation.qpe_allowed(owner)
@@ -59,11 +60,11 @@ class NearPhases(NamedTuple):
 
     @property
     def is_over(self) -> Booleans:
-        """Whether the phases exceed a requirement, in each case."""
+        """Whether the phases exceed a requirement, (cases,)."""
         return np.asarray(self.use > LIMIT_RATIO)
 
     def limit(self, declared: Floats) -> Floats:
-        """Size of the tone at which it reaches the stricter limit; infinite if its phase is zero or not limited."""
+        """Size at which the tone reaches the stricter limit, in the unit of `declared`; infinite if never."""
         with np.errstate(all="ignore"):
             return np.where(self.use > 0, declared / self.use, math.inf)
 
@@ -78,10 +79,11 @@ class NearPhases(NamedTuple):
         doubt: PerCaseFlag = False,
         is_unknown: PerCaseFlag = False,
     ) -> Judged:
-        """Judge a tone by both its echoes and its phases.
+        """Judge a tone by its echoes and by its phases.
 
-        `by_echoes` is the allowable size by the echoes; None if no requirement limits them. Where `is_unknown` is
-        true, the level of the echoes is unknown, but the tone still fails if its phases exceed a requirement.
+        `by_echoes` is the size at which the echoes reach their requirement; None without such a requirement. Where
+        `is_unknown` is true, the level of the echoes is unknown, but the tone still fails if its phases exceed a
+        requirement.
         """
         limit = self.limit(declared)
         echoes = np.full(declared.shape, math.inf) if by_echoes is None else by_echoes
@@ -108,7 +110,7 @@ class NearPhases(NamedTuple):
 
 
 def phase_over(case: Case, judged: Judged) -> Note:
-    """Reason why the phase of a tone exceeds a requirement; empty if no requirement on a phase limits the tone."""
+    """Write the reason why a tone fails by its phase; empty if no phase requirement sets its allowable."""
     mission, allocation, owner = case.mission, case.allocation, judged.subject.owner
     binding = phase_requirement(case, judged)
     if binding is None:
@@ -122,6 +124,6 @@ def phase_over(case: Case, judged: Judged) -> Note:
 
 
 def phase_requirement(case: Case, judged: Judged) -> str | None:
-    """Key of the phase requirement that sets the allowable of a tone; None if the echoes set the allowable."""
+    """Return the key of the phase requirement that sets the allowable of a tone; None if its echoes set it."""
     binding = judged.requirement(case)
     return binding if binding in (QUADRATIC, CUBIC) else None

@@ -1,7 +1,7 @@
-"""Rows of sensors, clocks and the air: allowable sizes from their phases, displacements and spread power.
+"""Rows of random errors (sensors, clocks, atmosphere): allowable sizes by their phase, displacement and spread power.
 
-Independent processes add their powers. The rule `allocation.combine` is for phases and does not apply to powers. The
-share of ISLR of each platform limits the sum of the powers that wideband vibration, sensor noise and phase noise
+The powers of independent processes add. The rule `allocation.combine` is for phases and does not apply to powers.
+Each platform's share of the ISLR limits the sum of the powers that wideband vibration, sensor noise and phase noise
 spread.
 """
 
@@ -56,12 +56,12 @@ from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
 
 ISLR = "islr"
-RANDOM_REQUIREMENTS = (QUADRATIC, CUBIC, ISLR, LOCATION)  # in the order of the effects of an error
-_GOOD_FIT_FRACTION = 0.005  # misfit to an Allan deviation, up to which a power law needs no remark
+RANDOM_REQUIREMENTS = (QUADRATIC, CUBIC, ISLR, LOCATION)  # in the order of the fields of `Limits`
+_GOOD_FIT_FRACTION = 0.005  # largest misfit of a power law to an Allan deviation that needs no remark
 
 
 class Limits(NamedTuple):
-    """Limits on a single error of an owner: phases, rms phase that spreads power [rad], and displacement [m]."""
+    """Limits on a single error: quadratic and cubic phase, rms phase that spreads power [rad], displacement [m]."""
 
     quadratic: Any
     cubic: Any
@@ -70,9 +70,9 @@ class Limits(NamedTuple):
 
 
 def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: PerCase = 1.0) -> Limits:
-    """Limits on the errors of an owner by a model.
+    """Return the limits on a single error of an owner under one model.
 
-    `gain` is the gain of autofocus. It multiplies the limit on the quadratic phase.
+    `gain` is the autofocus gain. It multiplies the limit on the quadratic phase.
     """
     spread = spread_limit(mission, allocation, owner, model)
     needs = mission.requirements
@@ -80,11 +80,11 @@ def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str,
 
 
 def held_effect(mission: Mission, effect: RandomEffect, coverage: PerCase, gain: PerCase = 1.0) -> RandomEffect:
-    """Convert an effect to the form that the requirements limit.
+    """Convert an effect to the quantities that the requirements limit.
 
-    The quadratic phase of the result is the judged phase, with the `gain` of autofocus. Without a cubic requirement,
-    the cubic phase at one sigma is added to the phase that spreads power. `coverage` is the coverage factor that
-    `effect` includes.
+    The quadratic phase of the result is the judged phase, for the autofocus gain `gain`. Without a cubic requirement,
+    the power of the cubic phase at one sigma is added to the power that spreads. `coverage` is the coverage factor
+    that `effect` includes.
     """
     effect = effect._replace(quadratic=effect.judged(gain))
     if mission.requirements.cubic_phase_error is not None:
@@ -94,7 +94,7 @@ def held_effect(mission: Mission, effect: RandomEffect, coverage: PerCase, gain:
 
 
 def sizes_at(effect: RandomEffect, limits: Limits) -> list[PerCase]:
-    """Size at which an error reaches each of `RANDOM_REQUIREMENTS`, in their order; infinite if never.
+    """Compute the size at which an error reaches each of `RANDOM_REQUIREMENTS`, in their order; infinite if never.
 
     The sizes are in the unit of the error.
     """
@@ -108,21 +108,21 @@ def sizes_at(effect: RandomEffect, limits: Limits) -> list[PerCase]:
 
 
 class RandomRows:
-    """Builds the rows of sensors, clocks and the air, and of the power that they and vibration spread together."""
+    """Builds the rows of random errors, and the rows of the total power that these errors and vibration spread."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         self.judging, self.analysis, self.mission = judging, analysis, analysis.mission
         self.allocation, self.errors = analysis.allocation, analysis.random
 
     def _table(self, values: Sequence[PerCase | PerCaseFlag]) -> Floats:
-        """Stack values, which are numbers or arrays (cases,), into a table (values, cases)."""
+        """Stack values, each a number or an array (cases,), into a table (values, cases)."""
         table = np.empty((len(values), self.judging.cases))
         for row, value in zip(table, values, strict=True):
             row[:] = value
         return table
 
     def _effects(self, model: str) -> RandomEffect:
-        """Effects per unit of each error, (errors, cases)."""
+        """Compute the effects per unit of each error with one model, (errors, cases)."""
         effects = [error.effect(model) for error in self.errors]
         quadratic, cubic, spread, east, north, hidden, rest = (
             self._table(column)
@@ -131,9 +131,9 @@ class RandomRows:
         return RandomEffect(quadratic, cubic, spread, east, north, hidden=hidden, rest=rest)
 
     def _sizes(self, model: str, effects: RandomEffect) -> Floats:
-        """Size at which each error reaches each requirement, (requirements, errors, cases).
+        """Compute the size at which each error reaches each requirement, (requirements, errors, cases).
 
-        The sizes are in the unit of the error.
+        The sizes are in the unit of the error. They are infinite without a requirement or an effect.
         """
         gain, owners = self.allocation.autofocus_gain, [error.owner for error in self.errors]
         by_owner = {
@@ -149,7 +149,7 @@ class RandomRows:
         return sizes
 
     def rows(self, model: str) -> Iterator["RandomRow"]:
-        """Yield the rows of all errors by a model, `published` or `full`, declared or not."""
+        """Yield the rows of all random errors, declared or not, under one model, `published` or `full`."""
         if not self.errors:
             return
         other_model = OTHER_MODEL[model]
@@ -188,7 +188,7 @@ class RandomRows:
             binding=np.array([-1, *map(REQUIREMENTS.index, RANDOM_REQUIREMENTS)], np.int8)[binds + 1],
             qpe_published_rad=published.quadratic * declared,
             cubic_rad=mine.cubic * declared,
-            # If an aggregate limits the phase, a row that cannot be judged breaks no quadratic requirement.
+            # If a sum limits the phase, a row that cannot be judged does not break the quadratic requirement.
             quadratic_use=np.where(
                 is_open & (combine != "each"), math.nan, mine.judged(gain) * declared / (limit * gain)
             ),
@@ -221,7 +221,7 @@ class RandomRows:
                     size = part_of(effects, effect_kind)[row] * error.declared
                     reached = (
                         limit[row] * part_of(effects, effect_kind)[row]
-                    )  # effect of the error at the size that meets the requirement
+                    )  # effect of the error at the size that just meets the requirement
                     rests_on_mask[row] |= np.isfinite(limit[row]) & rests_on_masks(
                         [error], effect_kind, size, reached
                     )
@@ -231,8 +231,8 @@ class RandomRows:
     def islr_rows(self, model: str) -> Iterator["IslrRow"]:
         """Yield the rows for the total power that errors spread (ISLR): one for each owner and one for the mission.
 
-        In a case in which only wideband vibration and errors with a stated ISLR spread power, the rows of the owners
-        have neither a size nor a limit.
+        If only wideband vibration and errors with a stated ISLR spread power in a case, the rows of the owners do not
+        exist in that case.
         """
         mission, split = self.mission, self.allocation.islr
         owners = ("transmitter", "receiver", *(["clock"] if split.clock is not None else []), "mission")
@@ -247,7 +247,7 @@ class RandomRows:
             phase.row_id.endswith("vibration.wideband") or phase.row_id in stated for phase in members[-1]
         ]
         is_there = np.array([has_variance[-1][~np.array(is_held_by_shares, dtype=bool)].any(axis=0)] * len(owners))
-        # If only vibration spreads, its own rows apply the shares; a stated ISLR has no share.
+        # The rows of vibration apply the shares themselves, and a stated ISLR has no share.
         is_there[-1] = True
         is_declared = np.array([has_phase.any(axis=0) for has_phase in has_variance]) & is_there
         shares = np.sqrt(self._table([split.of(owner) for owner in owners]))
@@ -272,7 +272,7 @@ class RandomRows:
             is_unknown=is_in_doubt & is_there & ~(rms > limit * LIMIT_RATIO),
         )
         published, full = (limit, limit_of_other) if model == "published" else (limit_of_other, limit)
-        # The rule of one model for all columns: the total reads as the requirement.
+        # All columns are converted by one model, so that a total at its limit equals the requirement.
         columns = (judged.declared, judged.allowable, published, full)
         declared, allowable, by_published, by_full = (self._level(column, model) for column in columns)
         judged = judged._replace(
@@ -289,7 +289,7 @@ class RandomRows:
             )
 
     def stated_rows(self, model: str) -> Iterator["StatedRow"]:
-        """Yield the rows of errors from elsewhere that are stated by their ISLR.
+        """Yield the rows of `other_errors` that the file states by their ISLR.
 
         Each row may use the full requirement.
         """
@@ -315,16 +315,16 @@ class RandomRows:
             )
 
     def _level(self, rms: Floats, model: str) -> Floats:
-        """Convert rms phases to ISLR by a model; NaN without a phase. [dB]"""
+        """Convert rms phases [rad] to ISLR [dB] with one model; NaN without a phase."""
         return np.where(rms > 0, islr_db(rms**2, model, mainlobe_energy(self.mission)), math.nan)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RandomRow(FamilyRow):
-    """The row of one error in many cases; `place` is the index of the error among the errors.
+    """The row of one random error, for an array of cases; `place` is the index of the error in the list of errors.
 
     `is_over_other` marks the cases in which the model that does not gate fails the error. `bound_by_other` is the
-    index in `RANDOM_REQUIREMENTS` of the requirement that limits the error by that model.
+    index in `RANDOM_REQUIREMENTS` of the requirement that limits the error under that model.
     """
 
     place: int
@@ -333,7 +333,7 @@ class RandomRow(FamilyRow):
     without_autofocus: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """Describe the row of one case in words; `gating` is the model that judges it."""
+        """Build the report row of one case, with its texts; `gating` names the model that judges the row."""
         mission, allocation, error = case.mission, case.allocation, case.random[self.place]
         combine, binding, over, doubt = mission.allocation.combine, self.judged.requirement(case), NOTHING, NOTHING
         if self.judged.status[case.place] == CODE["fail"]:
@@ -372,10 +372,10 @@ class RandomRow(FamilyRow):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IslrRow(FamilyRow):
-    """The row for the power that all phases of one owner spread together, in many cases.
+    """The row for the total power that the errors of one owner spread (ISLR), for an array of cases.
 
-    `variance` is the variance of the phase [rad²]. `limit` is the rms phase that the gating model allows, and
-    `limit_of_other` is the rms phase that the second model allows [rad].
+    `variance` is the variance of the total phase [rad²]. `limit` is the rms phase that the gating model allows, and
+    `limit_of_other` is the rms phase that the other model allows [rad].
     """
 
     members: Sequence[SpreadPhase]
@@ -384,7 +384,7 @@ class IslrRow(FamilyRow):
     limit_of_other: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """Describe the row of one case in words; `gating` is the model that judges it."""
+        """Build the report row of one case, with its texts; `gating` names the model that judges the row."""
         level = _levels(case.mission, gating)
         other_model, over, doubt = OTHER_MODEL[gating], NOTHING, NOTHING
         variance, limit, limit_by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
@@ -421,10 +421,10 @@ class IslrRow(FamilyRow):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StatedRow(FamilyRow):
-    """The row of an error from elsewhere that is stated by its ISLR, in many cases. [dB]"""
+    """The row of one of the `other_errors` that the file states by its ISLR [dB], for an array of cases."""
 
     def in_words(self, case: Case, _: str) -> Row:
-        """Describe the row of one case in words."""
+        """Build the report row of one case, with its texts. The row is the same for both models."""
         mission, row = case.mission, self.judged
         index, is_limited = row.subject.entry or 0, not math.isnan(row.allowable[case.place])
         missing, over = phrases.note("no-requirement-of", metric=ISLR), NOTHING
@@ -447,14 +447,17 @@ class StatedRow(FamilyRow):
 
 
 def _is_open(mission: Mission, error: RandomError) -> PerCaseFlag:
-    """Whether the file lacks a spectrum that an error depends on, in each case. ISLR cannot be judged without it."""
+    """Whether an error depends on a vibration spectrum that the file lacks, as a Boolean or an array (cases,).
+
+    The ISLR cannot be judged without the spectrum.
+    """
     is_shaken = error.subject.kind == "oscillator" and error.subject.axis == "acceleration"
     return is_shaken and lacks_a_spectrum(mission, error.owner)
 
 
 # ---------------------------------------------------------------------- in words
 def _displacement(error: RandomError, model: str) -> GroundVector | None:
-    """Sigmas of the displacement east and north, including the coverage factor; None if not known. [m]"""
+    """Return the sigmas of the displacement east and north [m], including the coverage factor; None if unknown."""
     effect = error.effect(model)
     if error.declared is None or math.isnan(effect.displacement):
         return None
@@ -462,7 +465,7 @@ def _displacement(error: RandomError, model: str) -> GroundVector | None:
 
 
 def _wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
-    """Texts for the row of an error: equation, evidence and notes."""
+    """Return the equation, the source and the notes of the row of a random error."""
     kind, figure, sync = error.subject.kind, error.subject.axis, mission.synchronization
     if sync is not None and kind == "synchronization":
         return "synchronisation", sync.source, () if sync.interval else (phrases.note("another-for-each-pulse"),)
@@ -493,7 +496,7 @@ def _wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tup
         source = motion.imu.source if motion.imu and is_of_imu else None
         equation = "lever arm" if kind == "lever_arm" else "inertial sensor"
     notes = override_notes(error.owner, motion.overridden, figure)
-    if error.counted_in and error.declared is None:  # otherwise the note is the reason of the row
+    if error.counted_in and error.declared is None:  # otherwise this note is the reason of the row
         notes = (phrases.note("counted-in-another-row", row_id=error.counted_in), *notes)
     return equation, source or motion.evidence(figure), notes
 
@@ -537,7 +540,7 @@ def _oscillator_wording(mission: Mission, error: RandomError) -> tuple[str, str 
 
 
 def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
-    """Yield a note on the noise of an oscillator that remains after synchronisation; none without synchronisation."""
+    """Yield a note on the oscillator noise that remains after synchronisation; none without synchronisation."""
     if sync is None:
         return
     if sync.interval is not None:
@@ -549,23 +552,23 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
 
 
 def _air_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
-    """Texts for the row of a delay on a leg: equation, evidence and notes."""
+    """Return the equation, the source and the notes of the row of an atmospheric delay."""
     source = None if mission.propagation is None else mission.propagation.source_of(legs_of(error.owner)[0])
-    if error.counted_in and error.declared is None:  # otherwise the note is the reason of the row
+    if error.counted_in and error.declared is None:  # otherwise this note is the reason of the row
         return "delay of the air", source, (phrases.note("counted-in-another-row", row_id=error.counted_in),)
     notes = () if error.owner in PLATFORMS else (phrases.note("held-to-the-total", owners="both legs, by one air"),)
     return "delay of the air", source, notes
 
 
 def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> Note:
-    """Reason why an error has no limit: it has no effect, or no requirement limits its effects."""
+    """Explain why an error has no allowable: it has no effect, or no requirement limits its effects."""
     effects = (("cubic phase", effect.cubic), ("ISLR", effect.spread), ("displacement", effect.displacement))
     does = [name for name, size in effects if size > 0]
     return phrases.note("no-requirement-limits", effects=does) if does else no_effect(mission, error)
 
 
 def no_effect(mission: Mission, error: RandomError) -> Note:
-    """Reason why an error has no effect."""
+    """Explain why an error has no effect on the image."""
     if error.subject.kind in ("imu", *CORRELATED, "lever_arm", "vibration"):
         return phrases.note("across-the-line-of-sight")
     if error.subject.kind == "propagation":
@@ -597,9 +600,10 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
 
 
 def _continuation(case: Case, error: RandomError, model: str) -> Note:
-    """Note on how much of an oscillator's effect comes from noise below the first point of its mask.
+    """Write the note on the part of an oscillator's effect that comes from noise below the first point of its mask.
 
-    Of all kinds of effect, the one with the largest fraction of such noise is reported.
+    The note is about the kind of effect with the largest fraction of such noise. It is empty if no kind of effect
+    depends on this noise.
     """
     effect, size, worst = error.effect(model), error.declared, NOTHING
     limits = limits_for(case.mission, case.allocation, error.owner, model, case.allocation.autofocus_gain)
@@ -615,7 +619,7 @@ def _continuation(case: Case, error: RandomError, model: str) -> Note:
 
 
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:
-    """Note that the model that does not gate fails a declared error, with the requirement that the error exceeds."""
+    """Write the note that the model that does not gate fails an error, with the limit that the error exceeds."""
     other_model, size = OTHER_MODEL[gating], error.declared
     effect = held_effect(mission, error.effect(other_model), error.coverage(mission), autofocus_gain_of(mission))
     if binding == ISLR:
@@ -628,6 +632,6 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
 
 
 def _levels(mission: Mission, model: str) -> Callable[[float], float]:
-    """Return a function that converts an rms phase [rad] to its ISLR [dB] by a model."""
+    """Return a function that converts an rms phase [rad] to an ISLR [dB] with one model; 0 for a phase of 0."""
     energy = mainlobe_energy(mission)
     return lambda rms: float(islr_db(rms**2, model, energy)) if rms else 0.0

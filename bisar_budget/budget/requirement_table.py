@@ -1,4 +1,4 @@
-"""Judged rows and requirements of one mission in words, with limits, values reached, and deciding rows."""
+"""The report rows and requirements of one case, with texts, limits, values reached, and deciding rows."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -37,7 +37,7 @@ from bisar_budget.phrases import NOTHING, Note
 
 # ---------------------------------------------------------------------- rows
 def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
-    """Yield the rows of one case in words, before waivers, in the order of the contract."""
+    """Yield the report rows of one case, before waivers, in the order of the JSON output."""
     families: dict[tuple[str, str], FamilyRow] = {
         (model, judged_row.judged.subject.id): judged_row
         for model, family in judged.families.items()
@@ -50,7 +50,7 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
             continue
         model = MODELS[judged_row.model[case.place]]
         family = families.get((model, judged_row.subject.id))
-        if family is None:  # only other cases have the row
+        if family is None:  # the row exists only in other cases
             continue
         row, status = family.in_words(case, model), statuses(judged_row.status[case.place])
         changes: dict[str, Any] = {"model": model, "status": status, "is_unjudged": status == "not_evaluated"}
@@ -61,7 +61,10 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
 
 
 def _declarations(case: Case, judged_row: Judged) -> Row:
-    """The row that judges whether the file declares every required kind of error, including kinds without a row."""
+    """Build the row that judges whether the file declares every required kind of error.
+
+    It includes kinds of error that have no row of their own.
+    """
     mission = case.mission
     missing, shifted = missing_declarations(mission), shifted_figures(mission)
     return Row(
@@ -83,7 +86,7 @@ def _declarations(case: Case, judged_row: Judged) -> Row:
 
 
 def _declarations_missing(missing: Sequence[Missing]) -> Note:
-    """Note with the required errors that the file does not declare: missing errors first, then half-stated errors."""
+    """List the required errors that the file does not declare: missing errors first, then half-stated errors."""
     halves = [
         phrases.not_declared_as_required(declaration.key, declaration.lacks)
         for declaration in missing
@@ -96,7 +99,7 @@ def _declarations_missing(missing: Sequence[Missing]) -> Note:
 
 
 def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Note:
-    """Reason why the status of a row does not follow from its numbers."""
+    """Explain the status of a row that its own numbers do not decide."""
     mission, why = case.mission, Why(judged_row.why[case.place])
     if why is Why.NOT_DECLARED_AS_REQUIRED:
         missing = (each for each in missing_declarations(mission) if is_asked_for(judged_row.subject, each))
@@ -125,7 +128,7 @@ def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Not
 
 
 def unknown_place(judged: JudgedMission, case: Case) -> Note:
-    """Note with the cause of a displacement that no row limits: clocks that are not set, or an inaccurate path."""
+    """State the cause of a displacement that no row limits: clocks that are not set, or an inaccurate path."""
     clocks = [row_id for row_id, is_there in judged.unplaced.items() if is_there[case.place]]
     if clocks:
         return phrases.note("clocks-are-not-set", row_ids=clocks)
@@ -134,7 +137,7 @@ def unknown_place(judged: JudgedMission, case: Case) -> Note:
 
 
 def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
-    """Yield a note for each effect that no requirement limits and that is too small to need a requirement."""
+    """Yield a note for each effect that no requirement limits and that is negligible."""
     for effect in judged.untaken:
         if effect.is_negligible[case.place]:
             yield phrases.effect_is_negligible(effect.kind, case.number(effect.total), list(TAKEN_BY[effect.kind]))
@@ -143,7 +146,10 @@ def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
 
 # ---------------------------------------------------------------------- requirements
 def requirements_in_words(judged: JudgedMission, case: Case, waived: Waived) -> tuple[JudgedRequirement, ...]:
-    """Describe every judged requirement of one case; `waived` holds the rows of the case in words, after waivers."""
+    """Build the report entries of all judged requirements of one case.
+
+    `waived` holds the report rows of the case after waivers.
+    """
     rows = {row.id: row for row in waived.rows}
     of_all = [rows.get(judged_row.subject.id) for judged_row in judged.before]  # None: only other cases have the row
     return tuple(_entry(state, judged, case, of_all, waived) for state in judged.requirements)
@@ -157,7 +163,7 @@ def _entry(
     status, decider_index = statuses(state.status[case.place]), state.decider[case.place]
     decider, user = (rows[index] if index >= 0 else None for index in (decider_index, state.user[case.place]))
     is_open = bool(state.is_unjudged[case.place])
-    utilization = case.number(state.utilization)  # an error without an image has no phase to compare
+    utilization = case.number(state.utilization)  # not finite if the point has no image with the error
     has_use = user is not None and user.utilization is not None and math.isfinite(utilization)
     use = utilization if has_use and not is_open else None
     reason: Note | None = None
@@ -193,15 +199,15 @@ def _entry(
 def _waivers(
     status: str, of_requirement: Sequence[AppliedWaiver], judges: Sequence[Row]
 ) -> tuple[AppliedWaiver, ...]:
-    """Waivers that cover a waived requirement: its own waivers and those of the rows that judge it."""
+    """List the waivers that cover a waived requirement: its own waivers and those of the rows that judge it."""
     return holding(status, in_order([*of_requirement, *(waiver for row in judges for waiver in row.waived_by)]))
 
 
 def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | None]) -> float | None:
-    """Value that the mission reaches for a requirement; None if there is no such value.
+    """Return the value that the mission reaches for a requirement, in its unit; None if there is no such value.
 
-    It is the value of the mission's row. For the quadratic phase without such a row, it is the largest quadratic
-    phase of a single error.
+    It is the value of the mission's row for this requirement. If no such row exists for the quadratic phase, it is
+    the largest quadratic phase of a single error [rad].
     """
     row_of_mission = next((row for row in rows if row is not None and row.id == f"mission.{key}"), None)
     if row_of_mission is not None and key != DECLARE:
@@ -216,7 +222,7 @@ def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | Non
 
 
 def _share(row: Row, key: str, case: Case, utilization: float | None) -> DecidingShare | None:
-    """The share of a requirement that limits a row; None if the row may use the full requirement."""
+    """Return the share of a requirement that limits a row; None if the row may use the full requirement."""
     of_kinds = {PULL_IN: "autofocus", "spatial_variance": "scene", "dispersion": "band"}
     if key == QUADRATIC and row.subject.kind in of_kinds:
         return DecidingShare(
@@ -234,7 +240,10 @@ def _share(row: Row, key: str, case: Case, utilization: float | None) -> Decidin
 
 
 def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
-    """The owner's share of a requirement and the value that the row reaches, both without the gain of autofocus."""
+    """Return the owner's share of a requirement and the value that the row reaches, both without the autofocus gain.
+
+    The unit is that of the requirement, [rad] or [dB]. A value that does not exist is None.
+    """
     mission, allocation = case.mission, case.allocation
     if key == QUADRATIC:
         qpe = row.qpe_published_rad

@@ -1,10 +1,10 @@
-"""Delays of the air that are taken as constant in a long aperture, because the file does not state how they change.
+"""Doubts about atmospheric delays that are assumed to be constant over a long aperture.
 
-In apertures of one minute or longer, the air differs between the two ends. A delay without `correlation_time` is
-constant: it moves the image, and its phase curves only with the elevation. That is half of the effect of the air.
-Therefore the delays are also computed with a correlation time of ten minutes. A requirement is not evaluated if such
-changing delays would use more than a tenth of it, or would exceed it together with the declared errors. Effects of
-changing delays that no requirement covers follow the rule of `UntakenEffect`.
+In apertures of one minute or longer, the atmosphere differs between the two ends. A delay without `correlation_time`
+is treated as constant: it displaces the image, and its phase changes only with the elevation. This is only part of
+the true effect. Therefore the delays are also computed with a correlation time of ten minutes. A requirement is not
+evaluated if such changing delays would use more than a tenth of it, or would exceed it together with the declared
+errors. Effects of changing delays that no requirement covers follow the rule of `UntakenEffect`.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,19 +29,19 @@ from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note
 
-LONG_APERTURE_S = 60.0  # aperture time from which on the air differs at both ends
+LONG_APERTURE_S = 60.0  # shortest aperture time for which the atmosphere changes noticeably
 AIR_CHANGES_IN_S = 600.0  # correlation time of the zenith delay that remains after correction by a model or a map
 
 
 class AirUse(NamedTuple):
-    """Size of the effect that changing delays would have on a row, and its utilization of the row's limit, (cases,).
+    """Effect that changing delays would have on a row: its size, and its utilization of the limit, (cases,).
 
     The size is a phase or rms phase [rad], or a displacement [m]. `is_doubted` marks the cases in which no verdict
     may rely on constant delays.
     """
 
     row_id: str
-    key: str  # of the requirement that limits the row
+    key: str  # key of the requirement that limits the row
     size: Floats
     use: Floats
     is_doubted: Booleans
@@ -50,10 +50,10 @@ class AirUse(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StayingAir:
-    """Effects that constant delays in long apertures would have if they changed.
+    """Effects that the delays assumed as constant in long apertures would have if they changed.
 
-    `uses` gives, by row id, the utilization that the changing delays would cause. `untaken` are the effects that no
-    requirement covers, including the effects of the changing delays. Both are empty if no case has such a delay.
+    `uses` gives, by row id, the utilization that changing delays would cause. `untaken` are the effects that no
+    requirement covers, including those of the changing delays. Both are empty if no case has such a delay.
     """
 
     errors: Sequence[RandomError] = ()
@@ -63,19 +63,19 @@ class StayingAir:
 
     @property
     def _delays(self) -> frozenset[str]:
-        """Ids of the rows of the delays themselves, which the quadratic requirement limits with `combine: each`.
+        """Ids of the rows of the delays themselves.
 
-        Another requirement may set the limit of such a row. The status of the row is then not the status of the
-        quadratic requirement.
+        With `combine: each`, the quadratic requirement limits these rows directly. Another requirement may set the
+        allowable of such a row, so that its status is not the status of the quadratic requirement.
         """
         return frozenset(error.id for error in self.errors)
 
     def doubted_rows(self) -> dict[str, Booleans]:
-        """Rows of sums that are not evaluated, by row id, with the cases (cases,)."""
+        """Return the rows of sums that are not evaluated: masks of their cases (cases,), by row id."""
         return {row_id: use.is_doubted for row_id, use in self.uses.items() if row_id not in self._delays}
 
     def doubted_requirements(self) -> dict[str, Booleans]:
-        """Requirements that are not evaluated, by key, with the cases.
+        """Return the requirements that are not evaluated: masks of their cases (cases,), by requirement key.
 
         A doubt about a platform's share affects only the row of that share.
         """
@@ -86,7 +86,7 @@ class StayingAir:
         return doubted
 
     def untaken_rows(self) -> dict[str, Booleans]:
-        """Rows of delays that would contribute to an effect that no requirement covers, by row id, with the cases."""
+        """Return the rows of delays that would cause an effect without a requirement: masks (cases,) by row id."""
         return {
             error.id: np.any([effect.makers.get(error.id, False) & self.is_long for effect in self.untaken], axis=0)
             for error in self.errors
@@ -94,19 +94,19 @@ class StayingAir:
         }
 
     def reason(self, case: Case, row_id: str) -> Note:
-        """Note on the effect that changing delays would have on a row of a case, with the key to add to the file."""
+        """Describe the effect of changing delays on a row in one case, and name the key to add to the file."""
         use = self.uses.get(row_id)
         if use is not None:
             return self._says(case, use)
         return self._says_of_untaken(case, row_id)
 
     def reason_of_requirement(self, case: Case, key: str) -> Note:
-        """Note on the effect that changing delays would have on a requirement; empty if no verdict depends on it."""
+        """Describe the effect that changing delays would have on a requirement; empty if no verdict depends on it."""
         doubted = [use for use in self.uses.values() if use.key == key and case.number(use.is_doubted)]
         return self._says(case, max(doubted, key=lambda use: case.number(use.use))) if doubted else phrases.NOTHING
 
     def note(self, case: Case) -> Iterator[Note]:
-        """Yield a note that delays are taken as constant, if no verdict depends on this."""
+        """Yield a note that delays are assumed to be constant, if this does not affect any verdict."""
         uses = [case.number(use.use) for use in self.uses.values()]
         is_open = any(case.number(use.is_doubted) for use in self.uses.values())
         is_open = is_open or any(case.number(is_made) for is_made in self.untaken_rows().values())
@@ -149,7 +149,7 @@ class StayingAir:
 
 
 def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
-    """Find the delays taken as constant in long apertures, and the effects on each row if the delays changed."""
+    """Find the delays assumed as constant in long apertures, and their effects on the rows if they changed."""
     mission, cases = analysis.mission, analysis.cases
     is_long = np.broadcast_to(np.asarray(mission.collection.aperture_time) >= LONG_APERTURE_S, (cases,))
     if mission.propagation is None or not is_long.any():
@@ -173,7 +173,7 @@ def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
 
 
 def _rests_on(mission: Mission, use: AirUse, declared_use: Floats) -> Booleans:
-    """Whether a verdict on a row depends on delays being constant, in each case.
+    """Whether the verdict on a row depends on the assumption of constant delays, (cases,).
 
     It does if changing delays would use more than a tenth of the limit, or would exceed it together with the declared
     errors.
@@ -184,7 +184,7 @@ def _rests_on(mission: Mission, use: AirUse, declared_use: Floats) -> Booleans:
 
 
 def _uses(analysis: Analysis, errors: Sequence[RandomError], model: str) -> Iterator[AirUse]:
-    """Yield the utilization of each limited row that changing delays would cause, by one model."""
+    """Yield the effect of changing delays on each row that a requirement limits, under one model."""
     mission, allocation = analysis.mission, analysis.allocation
     rule = mission.allocation.combine
     for key in RANDOM_REQUIREMENTS:
@@ -215,10 +215,10 @@ def _use(analysis: Analysis, row_id: str, key: str, size: PerCase, limit: PerCas
 
 
 def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCase:
-    """Size of the effect of a changing delay in the form that a requirement limits. [rad] or [m]
+    """Compute the effect of a changing delay that a requirement limits: a phase [rad] or a displacement [m].
 
-    A quadratic phase includes the gain of autofocus. For a displacement, the size is only the part that the change of
-    the delay adds: the root of the difference of squares with and without the change.
+    The quadratic phase is the judged phase with autofocus. The displacement is only the part that the change of the
+    delay adds: the root of the difference of the squares with and without the change.
     """
     effect = error.effect(model)
     judged_effect = held_effect(
@@ -238,9 +238,10 @@ def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCa
 
 
 def _keys(mission: Mission) -> list[str]:
-    """List the keys to add to the file.
+    """List the keys to add to the file, which state how the delays change.
 
-    This is one key if one air, or both legs, lack a correlation time, otherwise the key of the leg that lacks it.
+    There is one key if both legs lack a correlation time, or if both have the same atmosphere. Otherwise it is the
+    key of the leg that lacks one.
     """
     propagation = mission.propagation
     if propagation is None:

@@ -1,4 +1,4 @@
-"""Rows of tones: spurs of oscillators, tones of vibrating oscillators, and the echoes of all tones together."""
+"""Rows of tones: spurs of oscillators, tones of vibrating oscillators, and the highest echo of all tones together."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -37,8 +37,8 @@ SENSITIVITY = "acceleration_sensitivity"
 def pslr_row(judging: Judging, tones: Sequence[Tone], required: PerCase) -> "PslrRow":
     """Judge the highest echo that all tones together can make, with the worst combination of their phases.
 
-    Both models use first principles here, because shares by the rule of the paper are 3 dB stricter. Tones that are
-    at most 2.5 cycles per aperture apart raise each other's echo, even if they come from different sources.
+    Both models use first principles here, because the shares by the rule of the paper are 3 dB stricter. Tones that
+    are at most 2.5 cycles per aperture apart raise each other's echo, even if they come from different sources.
     """
     highest, allowed = highest_echo(tones, (judging.cases,)), judging.array(10 ** (np.asarray(required) / 20))
     row_subject = subject("mission", "pslr")
@@ -52,7 +52,7 @@ def pslr_row(judging: Judging, tones: Sequence[Tone], required: PerCase) -> "Psl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PslrRow(FamilyRow):
-    """The row for the highest echo of all tones together, in many cases.
+    """The row for the highest echo of all tones together, for an array of cases.
 
     It exists only for missions with a required PSLR.
     """
@@ -61,7 +61,7 @@ class PslrRow(FamilyRow):
     highest: Echo | None
 
     def in_words(self, case: Case, _: str) -> Row:
-        """Describe the row of one case in words."""
+        """Build the report row of one case, with its texts. The row is the same for both models."""
         over = NOTHING
         if self.highest is not None:
             makers = [
@@ -83,9 +83,9 @@ class PslrRow(FamilyRow):
 
 # ---------------------------------------------------------------------- spurs
 def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["SpurRow"]:
-    """Judge the spurs of the oscillators by a model. Like vibrations, they make paired echoes.
+    """Yield the rows of the oscillators' spurs under one model. Like vibrations, spurs make paired echoes.
 
-    Sizes are levels of the echo relative to the response. [dB]
+    Sizes are levels of the echo relative to the response [dB].
     """
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
@@ -93,7 +93,7 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
         row_subject, phase, T = spur.subject, judging.array(spur.phase), mission.collection.aperture_time
         limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
         phases = _near_phases(judging, analysis, spur.name, _phases_beside(spur.left, spur.free, T))
-        level = phase / 2  # amplitude of an echo over the amplitude of the response
+        level = phase / 2  # amplitude of an echo divided by the amplitude of the response
         if limits is None:
             judged = phases.row(judging, row_subject, metric, level, None)
         else:
@@ -116,22 +116,26 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
 
 
 def _is_used(size: PerCase, limit: PerCase) -> Booleans:
-    """Whether a size uses so much of its limit that a doubt about the size matters, but does not exceed the limit."""
+    """Whether a size is so large that a doubt about it affects the verdict, but does not exceed the limit.
+
+    This is the case between a tenth of the limit and the limit.
+    """
     return np.asarray((size > MIN_USE_FRACTION * limit) & ~(size > limit * LIMIT_RATIO))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpurRow(FamilyRow):
-    """The row of one spur of an oscillator in many cases, as the level of its echo relative to the response. [dB]
+    """The row of one spur of an oscillator, for an array of cases. Its size is the level of the spur's echo [dB].
 
-    `spur_index` is the index among the spurs. See `VibrationRow` for the other fields.
+    The level is relative to the response. `spur_index` is the index of the spur. `is_over_other` marks the cases in
+    which the model that does not gate fails the row.
     """
 
     spur_index: int
     is_over_other: Booleans
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Describe the row of one case in words; `model` is the model that judges it."""
+        """Build the report row of one case, with its texts; `model` names the model that judges the row."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         spur = spurs_of(mission)[self.spur_index]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
@@ -179,9 +183,9 @@ class SpurRow(FamilyRow):
 
 
 def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> tuple[Note, ...]:
-    """Note that exchanges of pulses fold part of a tone below one cycle per aperture; empty without such a part.
+    """Note that the part of a tone below one cycle per aperture is judged in the row `row_id`.
 
-    The row `row_id` includes the phases of that part.
+    Exchanges of pulses fold a tone to low frequencies. The result is empty if no part of the tone is folded that low.
     """
     slow = [
         (float(share), float(frequency))
@@ -207,12 +211,10 @@ def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> 
 
 # ---------------------------------------------------------------------- oscillators that vibrate
 def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["AcceleratedRow"]:
-    """Judge the effect of each vibration on an oscillator by a model.
+    """Yield the rows of the vibrations that act on oscillators, under one model.
 
-    The allowable is an acceleration sensitivity. [s²/m]
-
-    Tones below one cycle per aperture act as phases. The row of the oscillator's random vibration includes these
-    phases.
+    The allowable is an acceleration sensitivity [s²/m]. A tone below one cycle per aperture causes quadratic and
+    cubic phase instead of echoes. It is part of the row of the oscillator's random vibration.
     """
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
@@ -247,17 +249,17 @@ def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AcceleratedRow(FamilyRow):
-    """The row of one vibration that acts on an oscillator, in many cases.
+    """The row of one tone that an oscillator feels as an acceleration, for an array of cases.
 
-    `is_there` marks the cases in which the vibration is fast enough for this row. `tone_index` is its index among the
-    accelerated tones.
+    `is_there` marks the cases in which the tone is fast enough for this row. `tone_index` is the index of the tone in
+    `accelerated_tones`. `is_over_other` marks the cases in which the model that does not gate fails the row.
     """
 
     tone_index: int
     is_over_other: Booleans
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Describe the row of one case in words; `model` is the model that judges it."""
+        """Build the report row of one case, with its texts; `model` names the model that judges the row."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         tone = accelerated_tones(mission)[self.tone_index]
         T, missing = mission.collection.aperture_time, phrases.note("no-requirement-of", metric="pslr")
@@ -300,7 +302,10 @@ class AcceleratedRow(FamilyRow):
 
 
 def _phases_beside(folded: LeftTone, free: PerCase, aperture_time: PerCase) -> tuple[PerCase, PerCase]:
-    """Quadratic and cubic phase of a tone's echoes below three cycles per aperture, in their worst phases. [rad]"""
+    """Quadratic and cubic phase [rad] of a tone's parts below three cycles per aperture, in their worst phases.
+
+    `free` is the peak phase of the tone without synchronisation [rad].
+    """
     qpe: PerCase = 0.0
     cubic: PerCase = 0.0
     for frequency, share in zip(folded.frequencies, folded.echoes(aperture_time), strict=True):
@@ -311,20 +316,20 @@ def _phases_beside(folded: LeftTone, free: PerCase, aperture_time: PerCase) -> t
 
 
 def _near_phases(judging: Judging, analysis: Analysis, name: str, phases: tuple[PerCase, PerCase]) -> NearPhases:
-    """Collect the quadratic and cubic phase that limit the row of a platform's tone. [rad]"""
+    """Compare the quadratic and cubic phase [rad] of a tone with the limits of its platform."""
     qpe, cubic = map(judging.array, phases)
     return NearPhases.of(analysis.mission, analysis.allocation, name, qpe + cubic > 0, (qpe, cubic, qpe, qpe))
 
 
 def evidence(oscillator: Oscillator) -> str | None:
-    """Source of an oscillator's acceleration sensitivity: its catalogue part, or else the `source` in the file."""
+    """Return the source of an oscillator's acceleration sensitivity: its catalogue part, or else its `source`."""
     return dict(oscillator.of_parts).get(SENSITIVITY, oscillator.source)
 
 
 def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
     """Note that an oscillator is assumed to feel the vibration of its platform.
 
-    There is no note if the file states a vibration for the oscillator itself.
+    The result is empty if the file states a vibration for the oscillator itself.
     """
     felt_vibration = felt(mission, name)
     return (
@@ -333,7 +338,7 @@ def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
 
 
 def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
-    """Notes on the row of an oscillator's acceleration: which effects it includes, and which it cannot include."""
+    """Return the notes on an oscillator's acceleration row: which effects it includes and which it cannot include."""
     felt_vibration = felt(mission, name)
     oscillator: Oscillator = getattr(mission.platforms, name).oscillator
     notes = list[Note]()

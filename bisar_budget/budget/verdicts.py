@@ -1,4 +1,4 @@
-"""Effects of image verdicts on the rows of a check, and the choice of images to show."""
+"""Transfers the verdicts of images to the rows of a check, and selects the images to show."""
 
 from collections.abc import Mapping, Sequence
 from datetime import date
@@ -13,7 +13,7 @@ from bisar_budget.findings.status import RANK
 from bisar_budget.phrases import NOTHING
 from bisar_budget.units import format_limit
 
-_SHOWN_ROWS = 4  # rows of a mission, at most
+_SHOWN_ROWS = 4  # largest number of rows shown for a mission
 
 
 def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: date | None = None) -> MissionFindings:
@@ -21,8 +21,8 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: d
 
     If an image refutes the limit of a declared row, the row fails, and so does its requirement. A row that passes
     only with autofocus also fails if the image refutes the autofocus. If the file does not declare the error of a
-    row, the row reports that its limit is refuted. A refuted limit for which the check has no row is a warning. It is
-    also a warning if no image gave a verdict.
+    row, the row reports that its limit is refuted. There is a warning if a limit is refuted for which the check has
+    no row, and if no image gave a verdict.
 
     Parameters
     ----------
@@ -103,10 +103,11 @@ def _with_verdict(row: Row, verdict: Verdict) -> Row:
 
 
 def _is_gate(row: Row) -> bool:
-    """Whether a refuted limit makes a row fail: the row uses the limit and does not already fail.
+    """Whether a row fails if its limit is refuted: the row uses the limit and does not already fail.
 
-    A row that repeats an error of another frame along the scene's axes does not fail. The pull-in range of autofocus
-    is not a requirement: if it is stated too large, the gain counts only up to the limit that range walk sets.
+    A row that only converts an error from another frame to the scene's axes does not fail. The row of the pull-in
+    range of autofocus does not fail either, because it is not a requirement: if the range is stated too large, the
+    gain is used only up to the limit that range walk sets.
     """
     return (
         bool(row.utilization)
@@ -119,7 +120,7 @@ def _is_gate(row: Row) -> bool:
 def _with_refuted(
     requirement: JudgedRequirement, refuted: Sequence[Row], waivers: tuple[AppliedWaiver, ...]
 ) -> JudgedRequirement:
-    """Return the requirement with the status of a refuted row that judges it or that it limits."""
+    """Return the requirement with the status of the worst refuted row that judges it or that it limits."""
     judges = [
         row
         for row in refuted
@@ -137,13 +138,13 @@ def _with_refuted(
     )
     if row.id == requirement.row:
         return refuted_requirement
-    # The row's numbers are in its own unit and no part of the requirement: the image refutes the row's limit.
+    # The numbers of the row are not those of the requirement, but the row's limit is the one that the image refutes.
     return refuted_requirement._replace(utilization=row.utilization, use_row=row.id, share=None)
 
 
 def _shown(verdict: Verdict) -> str:
     if verdict.measured_db is not None and verdict.requirement_db is not None:
-        digits = 1 if verdict.measured_db_interval is None else 2  # for noise, half a decibel decides
+        digits = 1 if verdict.measured_db_interval is None else 2  # half a decibel decides a verdict on noise
         levels = [f"{level:.{digits}f} dB" for level in (verdict.measured_db, verdict.requirement_db)]
         return f"the image shows {levels[0]} at it, {levels[1]} allowed"
     _, measured = verdict.judged_phases_rad
@@ -154,9 +155,9 @@ def _shown(verdict: Verdict) -> str:
 
 
 def rows_worth_showing(findings: MissionFindings) -> tuple[Verdict, ...]:
-    """Select the verdicts with a measured quadratic phase that decide most: worst status first, then refuted limits.
+    """Select the most important verdicts with a measured quadratic phase: worst status first, then refuted limits.
 
-    A row without a declared error is shown only if its limit is refuted, or if there is no other row.
+    A row without a declared error is selected only if its limit is refuted, or if there is no other row.
     """
     rows = {row.id: row for row in findings.rows}
     measured = [v for v in findings.verdicts or () if v.measured_qpe_rad is not None and v.id in rows]

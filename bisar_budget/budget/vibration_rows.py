@@ -1,4 +1,4 @@
-"""Rows of vibration: each sinusoid (line) of a platform, groups of neighbouring lines, and wideband noise."""
+"""Rows of vibration: single sinusoids (lines) of a platform, groups of neighbouring lines, and wideband noise."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -41,11 +41,11 @@ from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.units import format_quantity
 
-_ROUNDING_DB = 1e-6  # by which a level may exceed the required level
+_ROUNDING_DB = 1e-6  # tolerance for rounding of a level
 
 
 class Vibrations:
-    """Builds the rows of vibrations, for many cases at once."""
+    """Builds the rows of vibrations, for an array of cases."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         mission, geometry, allocation = analysis.mission, analysis.geometry, analysis.allocation
@@ -74,11 +74,10 @@ class Vibrations:
         return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
 
     def rows(self, model: str) -> Iterator["VibrationRow"]:
-        """Yield all rows of vibration by a model, declared or not, in the order of the contract.
+        """Yield all rows of vibration under one model, in the order of the JSON output.
 
-        `model` is `published` or `full`.
-
-        A line that is slow in only some of the cases has two rows, one for slow and one for fast motion.
+        `model` is `published` or `full`. A platform without a declared line has one row for lines. A line with less
+        than one cycle per aperture in only some of the cases has two rows, one for slow and one for fast motion.
         """
         everywhere = np.ones(self.judging.cases, dtype=bool)
         for name in PLATFORMS:
@@ -116,7 +115,7 @@ class Vibrations:
         allowable, is_over_other = None, np.zeros(self.judging.cases, dtype=bool)
         if limits is not None:
             allowable = self.array(limits.by(model))
-            if declared is not None and not self.mission.has_direct_path:  # the published model has none
+            if declared is not None and not self.mission.has_direct_path:  # the published model has no direct path
                 is_over_other = declared > limits.by(OTHER_MODEL[model]) * LIMIT_RATIO
         if phases is None or declared is None:
             judged = self.judging.row(
@@ -144,11 +143,10 @@ class Vibrations:
         return judged._replace(allowable_published=published, allowable_full=full)
 
     def _line(self, model: str, name: str, index: int, is_there: Booleans) -> "VibrationRow":
-        """The row of a line at one or more cycles per aperture.
+        """Build the row of a line with one or more cycles per aperture.
 
-        It is judged by its echoes, or by their power if ISLR limits them.
-
-        Below three cycles per aperture, its quadratic and cubic phase are limited as well.
+        The line is judged by the level of its echoes, or by their power if ISLR limits them. Below three cycles per
+        aperture, its quadratic and cubic phase are limited as well.
         """
         cycles, both = self.cycles[name][index], self._both[name][index]
         is_near, phases = cycles < ECHO_CYCLES, None
@@ -179,10 +177,10 @@ class Vibrations:
         )
 
     def _slow(self, name: str, index: int, is_there: Booleans) -> "VibrationRow":
-        """The row of a line below one cycle per aperture, judged by its quadratic and cubic phase.
+        """Build the row of a line with less than one cycle per aperture.
 
-        For a vibration along three axes, the declared size is the amplitude along the line of sight that has the same
-        utilization.
+        It is judged by its quadratic and cubic phase. For a vibration along three axes, the declared size is the
+        amplitude along the line of sight that has the same utilization.
         """
         row_subject, cycles = subject(name, "vibration", "sinusoidal", entry=index), self.cycles[name][index]
         tone = self.slow_tones[row_subject.id]
@@ -223,7 +221,7 @@ class Vibrations:
     def _near_each_other(self, model: str, name: str) -> Iterator["VibrationRow"]:
         """Yield the rows of groups of lines whose frequencies are so close that their echoes add.
 
-        Each row gives the amplitude of a single line with an equally high echo.
+        The size of each row is the amplitude of a single line with an equally high echo [m].
         """
         for index, (members, amplitude) in enumerate(self._near[name]):
             row_subject = subject(name, "vibration", "sinusoidal.sum", entry=index)
@@ -232,15 +230,15 @@ class Vibrations:
 
     @cached_property
     def _near(self) -> dict[str, list[tuple[Booleans, Floats]]]:
-        """Groups of neighbouring lines by platform, and the amplitude of one line with an equally high echo. [m]"""
+        """Groups of neighbouring lines by platform, and the amplitude [m] of one line with an equally high echo."""
         return {name: list(_together(self.amplitudes[name], self.cycles[name])) for name in PLATFORMS}
 
     @cached_property
     def _both(self) -> dict[str, Floats]:
-        """Peak phase that each line has together with neighbouring lines of the other platform. [rad]
+        """Peak phase of a single line whose echo equals that of neighbouring lines of both platforms together. [rad]
 
-        The echoes add in the worst phases. The value is NaN without a neighbouring line, without an amplitude, or
-        without a required PSLR.
+        The echoes add in their worst phases. The value is given for each line of each platform, (lines, cases). It is
+        NaN without a neighbouring line, without an amplitude, or without a required PSLR.
         """
         ours = self.count[PLATFORMS[0]]
         amplitudes, cycles = (
@@ -257,7 +255,7 @@ class Vibrations:
 def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Booleans, Floats]]:
     """Yield each group of neighbouring lines, and the amplitude of a single line with an equally high echo. [m]
 
-    The amplitude is 0 in the cases without a line of the group.
+    A group is a mask, (lines, cases). The amplitude, (cases,), is 0 in the cases without a line of the group.
     """
     groups = near_groups(cycles)
     for index in range(groups.max(initial=-1) + 1):
@@ -269,14 +267,14 @@ def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Booleans, Fl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VibrationRow(FamilyRow):
-    """One row of vibration in many cases: a line, a group of neighbouring lines, or the noise of a platform.
+    """The row of a line, of a group of neighbouring lines, or of a platform's noise, for an array of cases.
 
     `members` marks the lines of a group. `qpe` and `cubic` are the quadratic and cubic phase of a motion below three
-    cycles per aperture at its worst phase [rad]. If `is_slow` is set, the motion is judged by these phases alone; a
-    faster motion is judged by its echoes too. `is_over_other` marks the cases in which the model that does not gate
-    fails the row. `both` concerns neighbouring lines of the two platforms: it is the peak phase of a single line
-    whose echo is as high as the sum of their echoes [rad]. `level` is the level of that echo [dB], and `is_over_both`
-    marks the cases in which it is too high. Sizes of the row are `per_metre` times the sizes in metres.
+    cycles per aperture at its worst starting phase [rad]. If `is_slow` is set, the motion is judged by these phases
+    alone; a faster motion is judged by its echoes too. `is_over_other` marks the cases in which the model that does
+    not gate fails the row. `both` is the peak phase of a single line whose echo is as high as the sum of the echoes
+    of neighbouring lines of the two platforms [rad]. `level` is the level of that echo [dB], and `is_over_both` marks
+    the cases in which it is too high. Sizes of the row are `per_metre` times the sizes in metres.
     """
 
     limits: VibrationLimits | None = None
@@ -293,13 +291,13 @@ class VibrationRow(FamilyRow):
     per_metre: PerCase = 1.0
 
     def in_unit(self, per_metre: Floats) -> "VibrationRow":
-        """Return the row in the unit that the file uses for the line."""
+        """Return the row in the unit in which the file states the line; `per_metre` converts metres to this unit."""
         if np.all(per_metre == 1):
             return self
         return replace(self, judged=self.judged.in_unit(per_metre), per_metre=per_metre)
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Describe the row of one case in words; `model` is the model that judges it."""
+        """Build the report row of one case, with its texts; `model` names the model that judges the row."""
         row_subject = self.judged.subject
         error: MotionError = getattr(case.mission.platforms, row_subject.owner).motion_error
         if self.is_slow:
@@ -365,7 +363,10 @@ def _row(
     more: Sequence[Note] = (),
     doubt: Note = NOTHING,
 ) -> Row:
-    """Build the row of echoes or noise in words. `notes` come before the notes on its limit, `more` after them."""
+    """Build the report row of a line, a group of lines or noise that is judged by echoes or spread power.
+
+    `notes` come before the notes on its limit, `more` after them.
+    """
     row_subject, metric = vibration_row.judged.subject, vibration_row.judged.metric
     equation = f"Section V, {key[0]}" if model == "published" else "first principles"
     missing, margin = phrases.note("no-requirement-of", metric=metric), None

@@ -1,7 +1,7 @@
 """Waivers of rows and requirements, and influences on the verdict from outside the mission file.
 
 The findings list valid, expired and unused waivers. They also list the options, settings, environment variables and
-catalogue parts of a project that affect the verdict.
+catalogue parts of the project that affect the verdict.
 """
 
 import os
@@ -37,12 +37,12 @@ class Waived(NamedTuple):
     mission: Mission
     rows: list[Row]
     requirements: Mapping[str, tuple[AppliedWaiver, ...]]
-    covered: Sequence[tuple[int, int]]  # per waiver: numbers of named rows and of broken rows among them
+    covered: Sequence[tuple[int, int]]  # per waiver: number of named rows, and number of broken rows among them
 
     def unused(self, judged: Sequence[JudgedRequirement]) -> Iterator[tuple[KeyPath, Note]]:
-        """Yield a warning for each waiver that names no row, every row, or no broken row.
+        """Yield a warning for each waiver that has no effect or that covers everything.
 
-        A row is broken if it fails or is not evaluated.
+        Such a waiver names no row, every row, or no broken row. A row is broken if it fails or is not evaluated.
         """
         broken = {requirement.id for requirement in judged if requirement.status in (*BROKEN, "waived")}
         ids = [requirement.id for requirement in judged]
@@ -58,7 +58,7 @@ class Waived(NamedTuple):
 
 
 def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
-    """Apply waivers to the rows that fail or are not evaluated and that a valid waiver names.
+    """Apply valid waivers to the rows that they name and that fail or are not evaluated.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
     broken = {position for position, row in enumerate(rows) if row.status in BROKEN}
     requirements = [f"mission.{key}" for key in REQUIREMENT_KEYS]
     missing = [n for n, row in enumerate(rows) if row.is_of_declare and row.status == "not_evaluated"]
-    # A thousand waivers of one row would fill a report: a row has its first valid waiver and its last expired waiver.
+    # A row shows only its first valid and its last expired waiver, because a thousand waivers would fill a report.
     holding: dict[int, AppliedWaiver] = {}
     of_requirements: dict[str, tuple[AppliedWaiver, ...]] = {}
     over: list[tuple[AppliedWaiver, set[int]]] = []
@@ -106,7 +106,7 @@ def _waived(row: Row, holding: AppliedWaiver | None, last: AppliedWaiver | None)
 
 
 def holding_place(mission: Mission, today: date, ids: Sequence[str]) -> int:
-    """Index in the file of the first valid waiver that names any of the ids; -1: no such waiver."""
+    """Index in the file of the first valid waiver that names any of the ids; -1 if there is none."""
     valid = (
         waiver_index
         for waiver_index, waiver in enumerate(mission.waivers)
@@ -116,7 +116,10 @@ def holding_place(mission: Mission, today: date, ids: Sequence[str]) -> int:
 
 
 def named_by(pattern: str, ids: Sequence[str]) -> list[int]:
-    """Indices of the ids that match the pattern of a waiver. An id may itself contain a bracket."""
+    """Indices of the ids that match the pattern of a waiver.
+
+    The pattern may contain the wildcards `*`, `?` and `[…]`. An id that contains a bracket also matches itself.
+    """
     if not any(char in pattern for char in "*?["):
         return [id_index for id_index, row_id in enumerate(ids) if row_id == pattern]
     matches = map(re.compile(translate(pattern)).match, ids)
@@ -125,7 +128,7 @@ def named_by(pattern: str, ids: Sequence[str]) -> list[int]:
 
 # ---------------------------------------------------------------------- from outside the file
 def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override, ...]:
-    """Gather everything outside the mission file that affects the verdict on one mission.
+    """Collect all options, settings and files outside the mission file that affect the verdict on one mission.
 
     Parameters
     ----------
@@ -147,9 +150,10 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
 
 
 def _planned_orbits(mission: Mission) -> Iterator[Override]:
-    """Yield the orbits that are assumed to be flown as planned.
+    """Yield an entry for each orbit that the file states as planned.
 
-    The verdict then depends on the plan, and not on the age or interpolation of the orbit.
+    The platform is then assumed to follow the plan. Neither the age nor the interpolation of the orbit affects the
+    verdict.
     """
     for name in PLATFORMS:
         orbit = getattr(mission.platforms, name).orbit
@@ -158,7 +162,7 @@ def _planned_orbits(mission: Mission) -> Iterator[Override]:
 
 
 def _own_parts(mission: Mission) -> Iterator[Override]:
-    """Yield the parts of the project that replace catalogue parts of the same name."""
+    """Yield an entry for each part of the project that replaces a catalogue part of the same name."""
     catalogue = str(resource("specs", "sensors")) if mission.parts else ""
     for name, file, _ in mission.parts:
         if name.endswith((".yaml", ".yml")) or os.path.dirname(file) == catalogue:
@@ -170,9 +174,9 @@ def _own_parts(mission: Mission) -> Iterator[Override]:
 
 
 def _shown(file: str, mission_file: str) -> str:
-    """Path of a file relative to the folder of the mission file, whatever the current folder is."""
+    """Path of a file relative to the folder of the mission file. It does not depend on the current folder."""
     try:
         path = os.path.relpath(file, os.path.dirname(mission_file) or os.curdir)
-    except (OSError, ValueError):  # the current folder is gone; another drive
+    except (OSError, ValueError):  # the current folder no longer exists, or the file is on another drive
         path = file
     return printable(path.replace(os.sep, "/"))

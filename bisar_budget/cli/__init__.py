@@ -19,7 +19,7 @@ from bisar_budget.front.progress import SAYING
 from bisar_budget.resources import docstring, hold_files, release_files
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
-# Each command to the module that has it, imported when it is asked for.
+# Module of each command, which is imported only when the command is used.
 _MODULES = {
     "allocate": "allocate",
     "check": "check",
@@ -36,11 +36,14 @@ _MODULES = {
     "sweep": "sweep",
     "verify": "images",
 }
-_FRUGAL = ("init", "schema")  # commands without NumPy
+_FRUGAL = ("init", "schema")  # commands that do not use NumPy
 
 
 class _Commands(click.Group):
-    """A group of late imports, whose crashes exit with 3: 1 means a requirement that is broken or not judged."""
+    """A command group that imports each command at its first use, and exits with 3 if a command crashes.
+
+    Exit code 1, which Python gives for a crash, means a requirement that is broken or not judged.
+    """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_MODULES)
@@ -66,7 +69,7 @@ class _Commands(click.Group):
         try:
             sys.exit(super().main(*args, **kwargs))
         except SystemExit:
-            if sys.stdout is not output:  # click put it away, with 1: nobody reads on, and nothing was to be judged
+            if sys.stdout is not output:  # by click after a broken pipe, with 1; nothing was to be judged
                 sys.exit(0)
             raise
         except click.ClickException as error:
@@ -75,7 +78,7 @@ class _Commands(click.Group):
             complain(message.getvalue().rstrip("\n"))
             sys.exit(error.exit_code)
         except (click.Abort, KeyboardInterrupt) as error:
-            if isinstance(error.__cause__, EOFError):  # Click takes it for Ctrl-D, and nothing here asks a question
+            if isinstance(error.__cause__, EOFError):  # Click takes it for Ctrl-D, but there are no prompts
                 _own_fault(error.__cause__)
             sys.exit(INTERRUPTED_EXIT_CODE)
         except OSError as error:
@@ -101,7 +104,10 @@ class _Commands(click.Group):
 
 
 def _own_fault(error: BaseException) -> NoReturn:
-    """Report a crash of the tool, or exhausted memory, and exit; BISAR_BUDGET_DEBUG adds the traceback."""
+    """Report a crash of the tool, or exhausted memory, and exit.
+
+    If the variable BISAR_BUDGET_DEBUG is set, the traceback is written too.
+    """
     if os.environ.get("BISAR_BUDGET_DEBUG"):
         import traceback
 
@@ -130,26 +136,26 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Run the command; a signal that asks it to end leaves no worker and no temporary file.
+    """Run the command-line program. SIGTERM and SIGHUP end it without leftover workers or temporary files.
 
     Warnings of libraries are ignored: users cannot mend them, and PYTHONWARNINGS could turn them into errors.
     """
     warnings.simplefilter("ignore")
-    # Workers begin with `python -c`, which imports from the current folder, where no installed command does.
+    # Workers start as `python -c`, which would import from the current folder, unlike an installed command.
     os.environ["PYTHONSAFEPATH"] = "1"
     if (
         len(sys.argv) > 1
-    ):  # a completion has no arguments; a check with this variable would write one, and exit with 0
+    ):  # completion runs without arguments; with arguments, this variable would turn a check into a completion
         os.environ.pop("_BISAR_BUDGET_COMPLETE", None)
     for name in ("SIGTERM", "SIGHUP"):
         signal_number = getattr(signal, name, None)
         if signal_number is not None and signal.getsignal(signal_number) is signal.SIG_DFL:
             signal.signal(signal_number, _end)
-    gc.set_threshold(50_000)  # imports make objects that stay: to look through them each 700 takes 6 ms
+    gc.set_threshold(50_000)  # imported objects stay; a collection after every 700 of them would cost 6 ms
     try:
         cli()
     finally:
-        gc.freeze()  # the process ends: to look through all objects for cycles would take a tenth of a check
+        gc.freeze()  # a last collection before the exit would take a tenth of the time of a check
 
 
 def _end(number: int, frame: object) -> NoReturn:

@@ -97,7 +97,7 @@ def allocate(
     kept_free = None if reserve is None else reserve / 100
     ask = partial(questions.allocate, keys=keys, reserve=kept_free, offer=offer)
     sheets = [(answer.found, answer.offer) for answer in ask_each(loaded, model, today, ask)]
-    if is_mission and output is not None:  # first, so that a failure leaves no output at all
+    if is_mission and output is not None:  # before the report, so that a failure leaves no output
         _write_mission(sheets[0][0], output, model)
         output = None
     deliver_found(specification_sheet, sheets, format_name, output)
@@ -106,9 +106,9 @@ def allocate(
 
 
 def _write_mission(sheet: "SpecificationSheet", output: str, model: str | None) -> None:
-    """Write the mission with the ordered sizes as its errors and as its specifications, if there are any.
+    """Write the mission file with the specified sizes as its errors and specifications; nothing without any.
 
-    First the text is read as a file of its folder, with the files that it names.
+    Before that, the text is read as if it were in its folder, with the files that it names.
     """
     from bisar_budget.faults import MissionError, SetValue
     from bisar_budget.mission.edited import in_folder, with_section, with_values

@@ -1,4 +1,4 @@
-"""`bisar-budget check`: the gate, its defaults, its reports."""
+"""`bisar-budget check`: the command that judges missions, its defaults from settings, and its reports."""
 
 import os
 import sys
@@ -56,12 +56,12 @@ if TYPE_CHECKING:
 
 Arguments = dict[str, Any]
 """Arguments of a function by name."""
-_PROJECTS = "bisar_budget.projects"  # in the context of a command
+_PROJECTS = "bisar_budget.projects"  # key of the projects in the `meta` of a context
 _OF_RUN = ("format", "color")  # settings of a whole run, if all its projects agree
 
 
 class _Gate(click.Command):
-    """A command whose options default to the settings nearest to each mission; variables override them."""
+    """A command whose options default to environment variables, else to the settings nearest to each mission."""
 
     def make_context(self, info_name: str | None, args: list[str], *more: Any, **extra: Any) -> click.Context:
         first_context = self._context({}, info_name, list(args), *more, **extra)
@@ -87,7 +87,7 @@ class _Gate(click.Command):
         return context
 
     def _common_defaults(self, settings: "Sequence[Settings | None]") -> JsonObject:
-        """Defaults of a run of several projects: options of the whole run on which all settings agree."""
+        """Defaults for a run of several projects: the options `_OF_RUN` that have one value in all settings."""
         agreed = {}
         for key in _OF_RUN:
             values = {each.values.get(key) if each else None for each in settings}
@@ -107,7 +107,7 @@ class _Gate(click.Command):
                 if source is ParameterSource.ENVIRONMENT:
                     error.param_hint = str(
                         error.param.envvar
-                    )  # the variable, and not the option, which the user did not write
+                    )  # name the variable, since the user did not write the option
             raise
 
     def _defaults(self, settings: "Settings | None") -> JsonObject:
@@ -124,7 +124,7 @@ class _Gate(click.Command):
                 raise click.UsageError(f"{printable(name)}: {closed(problem)}")
         defaults = {}
         for key, value in settings.values.items() if settings else ():
-            if key == "sensors":  # `parts` reads it
+            if key == "sensors":  # no option: the catalogue reads it
                 continue
             option = options[key]
             try:
@@ -163,7 +163,7 @@ def _hold_below(folder: str, report: str) -> None:
 
 
 class _Draws(ParamType[int]):
-    """A number of draws: 1000000 or 1e6."""
+    """Parameter type for a number of draws, such as 1000000 or 1e6."""
 
     name = "number"
 
@@ -379,9 +379,9 @@ def check(
             found |= zip(project.files, results_of_project, strict=True)
 
         def report_of(of: Sequence[Project], its_files: Sequence[str]) -> Report:
-            """The report of some files, with the options of their projects."""
+            """Make the report of the missions `its_files`, with the options of their projects `of`."""
             its_missions = tuple(found[file] for file in its_files)
-            # Only a day that was given, or that decides: without a day the report is reproducible.
+            # The day is reported only if it was given or decides a waiver, so that other reports are reproducible.
             is_given = today is not None or os.environ.get("SOURCE_DATE_EPOCH")
             reported = [each.name for mission in its_missions for each in getattr(mission, "overrides", ())]
             shown_day = judged_on if is_given or "--date" in reported else None
@@ -404,7 +404,7 @@ def check(
 
 
 def _code_of(project: Project, statuses: "Sequence[frozenset[str]]") -> int:
-    """Exit code of the missions of a project, by its own options."""
+    """Exit code for the missions of a project, with the options `strict` and `exit_zero` of the project."""
     from bisar_budget.findings.status import exit_code
 
     strict, exit_zero = (project.context.params[name] for name in ("strict", "exit_zero"))
@@ -413,7 +413,10 @@ def _code_of(project: Project, statuses: "Sequence[frozenset[str]]") -> int:
 
 
 def _reports_of(projects: Sequence[Project]) -> list[tuple[Project, str, str]]:
-    """Reports that the settings of several projects ask for, each of its own missions: project, file and format."""
+    """Reports that the settings of projects request, each as project, file name and format.
+
+    Such a report contains only the missions of its project.
+    """
     return [
         (project, name, _format_of(name))
         for project in projects
@@ -425,7 +428,10 @@ def _reports_of(projects: Sequence[Project]) -> list[tuple[Project, str, str]]:
 def _asked(
     project: Project, is_among_others: bool, today: datetime | None, changes: "Sequence[SetValue]"
 ) -> tuple[date, Arguments]:
-    """Day of waivers and arguments of the check for a project; one of several projects also names its settings."""
+    """Day on which waivers are judged, and arguments of the check, for the missions of a project.
+
+    With `is_among_others`, the arguments also record the settings file, because the run has several projects.
+    """
     from bisar_budget.findings.requirement import Override
 
     with project.options() as context:
@@ -437,7 +443,7 @@ def _asked(
 
 
 def _options(project: Project, judged_on: date | None, today: datetime | None) -> "list[Override]":
-    """Options with influence on the result, and their origins."""
+    """Options that influence the result of a project, each with its value and origin."""
     with project.options() as context:
         return list(_options_in(context, judged_on, today))
 
@@ -487,7 +493,7 @@ def _check_draws(context: click.Context, scheduler: str | None) -> None:
 
 
 def _check_sweep(texts: Sequence[str], formats: Sequence[str]) -> None:
-    """Refuse a sweep that no report shows, and a sweep of more keys than a drawing has axes."""
+    """Refuse a sweep if no requested report can show it, or if it has more than two keys."""
     if not texts:
         return
     if not any(FORMATS[name].is_illustrated for name in formats):
@@ -546,7 +552,7 @@ def _explain(
 
 
 def _format_of(name: str) -> str:
-    """Format of a report by the suffix of its name."""
+    """Format of a report from the suffix of its file name; raises `click.UsageError` for an unknown suffix."""
     from bisar_budget.report import format_of
 
     format_name = format_of(name)
@@ -557,12 +563,12 @@ def _format_of(name: str) -> str:
 
 
 def _step_summary(format_name: str) -> str | None:
-    """File that GitHub shows on the page of a run; None without such a file."""
+    """Path of the file that GitHub shows on the page of a run; None outside GitHub, and for other formats."""
     return (os.environ.get("GITHUB_STEP_SUMMARY") or None) if format_name == "github" else None
 
 
 def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
-    """Append to the page of the run on GitHub; a failure to write changes no exit code."""
+    """Append the summary to the file that GitHub shows on the page of a run. A failure is only a warning."""
     from bisar_budget.report.formats.annotations import step_summary
 
     try:
@@ -595,7 +601,7 @@ def _write_report(path: str, format_name: str, report: "Report", style: "Style")
 
 
 def _folder_of_pictures(path: str, format_name: str) -> str:
-    """Folder next to a report for its pictures; empty if the format has none, or the report is no file."""
+    """Folder for the pictures of a report, beside it; empty if the format has none or the output is no file."""
     if not FORMATS[format_name].has_pictures or path == "-" or (os.path.exists(path) and not os.path.isfile(path)):
         return ""
     return f"{os.path.splitext(path)[0]}.assets"

@@ -1,4 +1,4 @@
-"""`bisar-budget diff`: what a change to a mission does to every margin."""
+"""`bisar-budget diff`: the effect of a change to a mission on every margin."""
 
 import os
 import sys
@@ -35,7 +35,7 @@ _Read = Callable[[], "Mission"]
 
 
 class _Part(ParamType[float]):
-    """A part of something: `10%` or 0.1."""
+    """Parameter type for a fraction, such as `10%` or 0.1."""
 
     name = "percent"
 
@@ -131,7 +131,7 @@ def diff(
 def _with_files(
     files: Sequence[str], changes: "tuple[SetValue, ...]", output: str | None, today: datetime | None
 ) -> "ChangeSet":
-    """Compare two files, or each file with itself with changed values."""
+    """Compare two mission files, or, with `changes`, each mission file with the same file after these changes."""
     from bisar_budget.mission.load import load_mission
     from bisar_budget.report.change.comparison import ChangeSet, loosened_settings
 
@@ -153,7 +153,7 @@ def _with_files(
 
 
 def _with_revision(patterns: Sequence[str], base: str, output: str | None, today: datetime | None) -> "ChangeSet":
-    """Compare missions with themselves in a revision; patterns name missions of both."""
+    """Compare mission files with their versions in the Git revision `base`; patterns match files of both versions."""
     from bisar_budget.mission.load import load_mission
     from bisar_budget.mission.revision import Revision, RevisionError, mission_at
     from bisar_budget.report.change.comparison import ChangeSet, loosened_settings
@@ -206,7 +206,7 @@ def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime |
 
 
 def _settings(mission: str, files: Files = DISK) -> "SettingValues":
-    """Settings nearest to a mission, as for `check`, on disk or in a revision."""
+    """Values of the settings nearest to a mission, on disk or in a revision; empty without settings."""
     from bisar_budget.settings import TABLE
 
     settings = settings_here(files, None if mission == "-" else folder_of_file(mission))

@@ -8,7 +8,7 @@ import click
 from bisar_budget.cli.options import FILE, OUTPUT
 from bisar_budget.cli.streams import complain, deliver, fail
 
-_WAVELENGTH_PER_VISIBLE_OFFSET = 20  # a distance of a 20th from the path turns the phase by 0.3 rad
+_WAVELENGTH_PER_VISIBLE_OFFSET = 20  # an offset of λ/20 from the path turns the phase by 0.3 rad
 _FORCE = click.option("--force", is_flag=True, help="Replace an existing file.")
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 else:
 
     class ParamType(click.ParamType):
-        """Type of a parameter that accepts the type of its values in brackets, which Click before 8.4 does not."""
+        """Base of parameter types that can be written with a value type in brackets, also with Click before 8.4."""
 
         def __class_getitem__(cls, values: object) -> type:  # noqa: D105
             return cls
@@ -35,16 +35,16 @@ Answer = TypeVar("Answer")
 COMMAND_LINE = "command line"
 _Function = Callable[..., object]
 _Option = Callable[[_Function], _Function]  # a decorator of a command
-_BEARING = ("model", "strict", "exit_zero")  # options with influence on the verdict, besides the day and --set
+_BEARING = ("model", "strict", "exit_zero")  # options that influence the verdict, besides --date and --set
 
 
 class FileName(click.types.StringParamType):
-    """Name of a file, which a shell completes; reading checks whether it is readable."""
+    """Parameter type for a file name, which the shell completes. The file is not opened to check the name."""
 
     name = "file"
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem]":
-        """Leave the completion to the shell, which knows the files."""
+        """Tell the shell to complete the value as a file name."""
         from click.shell_completion import CompletionItem
 
         return [CompletionItem(incomplete, type="file")]
@@ -56,17 +56,17 @@ MISSIONS_OR_NONE = click.argument("missions", type=FILE, nargs=-1, metavar="MISS
 
 
 def output_option(words: str = "Write to FILE instead of standard output.", metavar: str = "FILE") -> _Option:
-    """The option `--output`."""
+    """Make the option `--output`; `words` are its help."""
     return click.option("-o", "--output", type=FILE, metavar=metavar, help=words)
 
 
 def plot_option(words: str) -> _Option:
-    """The option `--plot`."""
+    """Make the option `--plot`; `words` are its help."""
     return click.option("--plot", type=FILE, metavar="FILE", help=words)
 
 
 def format_option(formats: Iterable[str], words: str, **overrides: Any) -> _Option:
-    """The option `--format`; its default is text."""
+    """Make the option `--format` with the choices `formats`; its default is text."""
     settings: dict[str, Any] = {"default": "text", "show_default": True, **overrides}
     return click.option("--format", "format_name", type=click.Choice([*formats]), help=words, **settings)
 
@@ -76,7 +76,7 @@ TEXT_OR_JSON = format_option(("text", "json"), "Format of the output.")
 
 
 def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[SetValue, ...]":
-    """Values of the option `--set`; raises `click.UsageError`."""
+    """Parse the values of the option `--set`; raises `click.UsageError` for an invalid value."""
     if not texts:
         return ()
     from bisar_budget.faults import InvalidValueError
@@ -89,7 +89,7 @@ def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, 
 
 
 def set_option(effect: str) -> _Option:
-    """The option `--set`; `effect` are words of the help.
+    """Make the option `--set`; `effect` is the beginning of its help.
 
     Settings and variables cannot set it, because a gate judges the file of the repository.
     """
@@ -110,13 +110,13 @@ GATING_MODEL = click.Choice(GATING_MODELS)
 
 
 def model_option(variable: str | None = None) -> _Option:
-    """The option `--model`, whose value may come from an environment variable instead."""
+    """Make the option `--model`; `variable` is an environment variable that may give its value instead."""
     words = "Model that decides, instead of that of the mission file."
     return click.option("--model", envvar=variable, type=GATING_MODEL, help=words)
 
 
 def date_option(more: str = "") -> _Option:
-    """The option `--date`; `more` are further words of the help."""
+    """Make the option `--date`; `more` is added to its help."""
     words = "Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC)." + more
     return click.option("--date", "today", type=click.DateTime(["%Y-%m-%d"]), help=words)
 
@@ -125,7 +125,7 @@ MODEL, DATE = model_option(), date_option()
 
 
 def scheduler_options(doing: str, more: str = "") -> _Option:
-    """The options `--scheduler` and its time-out; `doing` and `more` are words of the help."""
+    """Make the options `--scheduler` and `--scheduler-timeout`; the help begins with `doing` and ends with `more`."""
     named = click.option(
         "--scheduler",
         metavar="ADDRESS",
@@ -145,7 +145,7 @@ def scheduler_options(doing: str, more: str = "") -> _Option:
 
 
 def origin_of(parameter: click.Parameter) -> str:
-    """Origin of the value of a parameter, in words."""
+    """Text about the origin of the value of a parameter: command line, environment, default or a settings file."""
     source = click.get_current_context().get_parameter_source(str(parameter.name))
     if source is ParameterSource.COMMANDLINE:
         return COMMAND_LINE
@@ -158,19 +158,22 @@ def origin_of(parameter: click.Parameter) -> str:
 
 
 def settings_here(files: Files = DISK, folder: str | None = None) -> "Settings | None":
-    """Settings of the project of a folder, by default the current one, on disk or in a revision; None without any."""
+    """Settings of the project that contains a folder, by default the current one; None without settings.
+
+    `files` are those of the disk or of a revision.
+    """
     from bisar_budget.settings import SettingsError, project_settings
 
     try:
         return project_settings(os.getcwd() if folder is None else folder, files)
     except SettingsError as error:
         raise click.UsageError(printable(str(error))) from None
-    except OSError:  # somebody removed the current folder
+    except OSError:  # the current folder was removed
         return None
 
 
 def day_and_outside(today: datetime | None) -> "tuple[date, Outside]":
-    """Day on which waivers are judged, and the options of the command with influence on verdicts.
+    """Day on which waivers are judged, and the options of the current command that influence verdicts.
 
     `today` is the value of --date. Without it the day is that of SOURCE_DATE_EPOCH, or else today, UTC.
     """
@@ -206,7 +209,7 @@ def wrong_usage() -> Iterator[None]:
 def ask_each(
     missions: "Sequence[Mission]", model: str | None, today: datetime | None, ask: Callable[..., Answer]
 ) -> Iterator[Answer]:
-    """Answers of each mission in turn; exits if a mission cannot answer the question."""
+    """Yield the result of `ask` for each mission in turn; ends the command if it is impossible for a mission."""
     from bisar_budget.mission.quantities import QuestionError
 
     judged_on, from_outside = day_and_outside(today)

@@ -1,4 +1,4 @@
-"""`bisar-budget passes`: when an orbit sees the scene, and how the mission stands in each pass."""
+"""`bisar-budget passes`: the passes of a satellite over the scene, and the status of the mission in each pass."""
 
 import math
 import os
@@ -170,9 +170,10 @@ def passes(
 
 # ---------------------------------------------------------------- a mission file for each pass
 def _write_missions(result: "PassesResult", folder: str, today: date) -> None:
-    """Write the mission of each pass that complies or is waived, or none if one would get another status.
+    """Write a mission file for each pass that complies or is waived.
 
-    First the missions are read as files of the folder, with the files that they name.
+    Before that, each text is checked as if it were in the folder, with the files that it names. If a check fails or
+    gives another status than the pass, no file is written.
     """
     texts = {
         os.path.join(folder, _name(each, result.file)): result.mission_text(each, folder) for each in result.accepted
@@ -200,7 +201,7 @@ def _write_missions(result: "PassesResult", folder: str, today: date) -> None:
 
 
 def _name(satellite_pass: "SatellitePass", file: str) -> str:
-    """Name of the file of a pass: the name of the mission file, and the mid-time."""
+    """Name of the mission file of a pass: the name of the original file with the mid-time of the pass (UTC)."""
     stem, suffix = os.path.splitext(os.path.basename(file) if file != "-" else "mission.yaml")
     stem, suffix = (stem, suffix) if suffix.lower() in MISSION_SUFFIXES else (stem + suffix, MISSION_SUFFIXES[0])
     time = (
@@ -212,7 +213,10 @@ def _name(satellite_pass: "SatellitePass", file: str) -> str:
 
 
 def _hold_to_statuses(passes: "Sequence[SatellitePass]", texts: dict[str, str], today: date) -> None:
-    """Exit if a file cannot be read in its folder, or its check has another status than its pass."""
+    """End the command if a mission text cannot be used in its folder, or has another status there than its pass.
+
+    `texts` are the texts of the mission files by path, in the order of `passes`.
+    """
     from bisar_budget.faults import MissionError
     from bisar_budget.front.checks import check
     from bisar_budget.front.missions import loads

@@ -29,13 +29,13 @@ class Project:
 
     @contextmanager
     def options(self) -> Iterator[click.Context]:
-        """Use the options of this project as the options of the command."""
+        """Make a context in which the options of this project are those of the current command."""
         with self.context.scope(cleanup=False):
             yield self.context
 
 
 def folder_of_file(file: str) -> str | None:
-    """Folder of a mission file, which may be missing; None for a folder that does not exist."""
+    """Absolute path of the folder of a mission file; None if the folder does not exist. The file may be missing."""
     folder = os.path.dirname(file) or os.curdir
     return os.path.abspath(folder) if "\0" not in file and os.path.isdir(folder) else None
 

@@ -1,4 +1,4 @@
-"""`bisar-budget sensors`: parts whose figures a mission can take."""
+"""`bisar-budget sensors`: the catalogue of parts whose figures a mission can use."""
 
 import json
 import os
@@ -56,7 +56,7 @@ def sensors(patterns: Sequence[str], kind: str | None, checking: bool, format_na
 
 
 def _listed(patterns: Sequence[str], kind: str | None) -> "list[Entry]":
-    """Parts of the catalogue that match patterns; ends the command if a pattern matches none."""
+    """Parts of the catalogue whose names match a pattern; ends the command if a pattern matches none."""
     from fnmatch import fnmatchcase
 
     from bisar_budget.mission.parts import PartError, entries, folders
@@ -86,7 +86,7 @@ def _listed(patterns: Sequence[str], kind: str | None) -> "list[Entry]":
 
 
 def _check(names: Sequence[str], format_name: str) -> None:
-    """Write for each file whether it is a part that missions can use; ends the command with 2 if a file is not."""
+    """Report for each file whether missions can use it as a part; exits with 2 if they cannot use all files."""
     from bisar_budget.mission.parts import PartError, part_files, read_entry
 
     files: list[str] = []
@@ -143,7 +143,7 @@ def _document(content: JsonObject) -> str:
 
 
 def _as_text(chosen: "list[Entry]") -> str:
-    """Text of parts, by kind, with their figures and sources."""
+    """Text that lists parts by kind, with their figures and sources."""
     from bisar_budget.mission.parts import evidence
     from bisar_budget.report.words.sentences import wrapped
 

@@ -1,4 +1,8 @@
-"""`bisar-budget solve` and `sensitivity`: where a number of a mission begins to comply, and what each number does."""
+"""`bisar-budget solve` and `sensitivity`: the effect of the numbers of a mission on its verdict.
+
+`solve` finds the values of a number at which the mission begins or ceases to comply. `sensitivity` ranks the numbers
+by their effect on the worst utilization.
+"""
 
 import sys
 from collections.abc import Sequence

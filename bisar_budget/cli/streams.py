@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 MISSION_SUFFIXES = (".yaml", ".yml")
 PICTURE_SUFFIXES = (".svg", ".png", ".pdf")
-_TEMPORARY = (".bisar-budget.", ".tmp")  # first and last letters of the name of a temporary folder
+_TEMPORARY = (".bisar-budget.", ".tmp")  # prefix and suffix of the name of a temporary folder
 BROKEN_EXIT_CODE, USAGE_EXIT_CODE, DEFECT_EXIT_CODE, INTERRUPTED_EXIT_CODE = 1, 2, 3, 130
 
 
 def expand(patterns: Iterable[str]) -> list[str]:
-    """Expand the glob patterns that the shell left; a pattern without a match stays and fails to load.
+    """Expand glob patterns that the shell did not expand. A pattern without a match is kept, and fails to load.
 
-    A file with the name of a pattern is added to the matches. Otherwise a file named `*.yaml` would hide all matches.
+    A file whose name is the pattern itself is added to the matches, so that a file named `*.yaml` is found too.
     """
     files: list[str] = []
     for pattern in patterns:
@@ -47,14 +47,14 @@ def expand(patterns: Iterable[str]) -> list[str]:
 
 
 def load_all(files: Sequence[str], model: str | None = None, changes: "Sequence[SetValue]" = ()) -> "list[Mission]":
-    """Load every mission with changed values, or write every fault of every file and exit."""
+    """Load missions with changed values. If any is unusable, write all faults of all files and exit."""
     from bisar_budget.mission.load import load_mission
 
     return read_all(partial(load_mission, file, model, changes) for file in files)
 
 
 def read_all(reads: "Iterable[Callable[[], Mission]]") -> "list[Mission]":
-    """Missions that are read in turn; where one cannot be used, says every fault of all and exits."""
+    """Read missions one after the other. If any is unusable, write all faults of all files and exit."""
     found, is_usable = [], True
     for read in reads:
         try:
@@ -74,7 +74,7 @@ def say_faults(file: str, faults: "tuple[Fault, ...]") -> None:
 
 
 def suffix_of(name: str | None, suffixes: Sequence[str]) -> str:
-    """Suffix of the name of a file, which must be one of `suffixes`; empty without a name."""
+    """Suffix of a file name in lower case; empty without a name. Raises `click.UsageError` if not in `suffixes`."""
     suffix = os.path.splitext(name or "")[1].lower()
     if name is not None and suffix not in suffixes:
         raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
@@ -82,10 +82,10 @@ def suffix_of(name: str | None, suffixes: Sequence[str]) -> str:
 
 
 def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable[str] = ()) -> None:
-    """Refuse to write over files that are to be read, and to write two outputs to one file.
+    """End the command if an output would replace an input file, or if two outputs would be the same file.
 
-    The files of standard input and standard output count too. No other file may be in `folders`, which an output
-    fills with files of its own.
+    Files to which standard input and standard output are redirected are checked too. Also, no input or output may be
+    in one of `folders`, which are for the pictures of a report.
     """
     written: dict[str, str] = {}
     for target in [*targets, *folders]:
@@ -109,33 +109,36 @@ def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable
 
 
 def _real_path(path: str) -> str:
-    """A path with its links resolved; ends the command if that fails."""
+    """Resolve the links of a path; ends the command if that fails."""
     try:
         return os.path.realpath(path)
-    except (OSError, ValueError) as error:  # a deleted working folder, a NUL in the name
+    except (OSError, ValueError) as error:  # the working folder was deleted, or the name has a NUL
         fail(f"cannot write {path}: {getattr(error, 'strerror', None) or error}")
 
 
 def _is_open_as(file: str | int, path: str) -> bool:
-    """Whether a path, or an open stream, and another path are one regular file."""
+    """Whether `file`, a path or the number of an open stream, is the same regular file as `path`."""
     try:
         return os.path.isfile(file) and os.path.samestat(os.stat(file), os.stat(path))
-    except (OSError, ValueError):  # one of them is missing
+    except (OSError, ValueError):  # one of the files is missing
         return False
 
 
 def root_of_names() -> tuple[str, bool]:
-    """Folder to which names of files without a repository are relative, and whether it is GitHub's checkout."""
+    """Folder to which reports give names of files outside any repository, and whether it is GitHub's checkout.
+
+    The folder is empty if the current folder was removed.
+    """
     try:
         here = os.getcwd()
-    except OSError:  # somebody removed the current folder
+    except OSError:  # the current folder was removed
         return "", False
     checkout = os.environ.get("GITHUB_WORKSPACE")
     return os.path.realpath(checkout or here), bool(checkout)
 
 
 def is_terminal() -> bool:
-    """Whether both standard streams are terminals."""
+    """Whether standard output and standard error are both terminals."""
     return all(stream is not None and stream.isatty() for stream in (sys.stdout, sys.stderr))
 
 
@@ -153,7 +156,7 @@ _TABLE_WIDTHS = (80, 100)  # columns of the narrowest and of the widest table
 
 
 def table_width() -> int:
-    """Columns for a table on standard output, by COLUMNS or the terminal; 80 without either."""
+    """Number of columns for a table on standard output, from 80 to 100, from COLUMNS or the terminal; else 80."""
     least, most = _TABLE_WIDTHS
     return min(max(shutil.get_terminal_size((least, 24)).columns, least), most)
 
@@ -165,7 +168,7 @@ _COLOR = re.compile(r"\x1b\[[0-9;]*m")
 # Texts that a CI runner takes for commands: `::error` at the start of a line, `##[group]` and `##vso[...]` anywhere.
 _COMMAND = re.compile(r"(?m)^([^\S\n]*):(?=:)")
 _COMMAND_WITHIN = re.compile(r"(?<=#)#(?=[\w.]*\[)")
-# Escapes of formats whose readers decode them to the character; readers of other formats see the escape.
+# Escapes that the readers of a format decode to the character. In other formats the escape itself is visible.
 _ESCAPES = dict.fromkeys(("json", "sarif", "needs", "yaml"), "\\u{:04x}")
 _ESCAPES |= dict.fromkeys(("html", "markdown", "junit", "mathml"), "&#{};")
 _ESCAPES["ics"] = "\\\\x{:02x}"
@@ -173,9 +176,10 @@ _LINE_ENDS = {"ics": "\r\n"}  # RFC 5545; lines of other formats end with a line
 
 
 def harmless(text: str, format_name: str = "") -> str:
-    """Text without effect on a terminal, or on a CI runner that reads the log.
+    """Escape the characters of a text that would act on a terminal, or on a CI runner that reads the log.
 
-    `github` keeps its own commands, `text` the colours of a report; a message has none.
+    The format `github` keeps its workflow commands, and `text` keeps the colours of a report. Messages, without a
+    format name, keep neither.
     """
 
     def escaped(match: re.Match[str]) -> str:
@@ -192,10 +196,10 @@ def harmless(text: str, format_name: str = "") -> str:
 
 
 def deliver_parts(texts: Iterable[str], format_name: str) -> None:
-    """Write texts to standard output one by one; a reader that went away ends this and changes no exit code.
+    """Write texts to standard output one after the other.
 
-    The format `text` is for people: characters that the terminal's encoding lacks are escaped. Other formats are for
-    programs, and always UTF-8.
+    If the reader has closed the pipe, the remaining texts are dropped without an error. In the format `text`,
+    characters that the encoding of the terminal lacks are escaped. Other formats are always written in UTF-8.
     """
     if sys.stdout is None:
         fail("cannot write: standard output is closed")
@@ -216,25 +220,25 @@ def deliver_parts(texts: Iterable[str], format_name: str) -> None:
 
 
 def drop_output() -> None:
-    """Discard the remaining standard output, because Python would complain about it again at exit."""
+    """Discard the remaining standard output. Otherwise Python would report the failed write again at exit."""
     with suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def complain(message: str) -> None:
-    """Write a message to standard error; a failure to write changes no exit code."""
+    """Write a message to standard error. A failure to write it is ignored."""
     with suppress(OSError):
         click.echo(harmless(message), err=True)
 
 
 def fail(message: str) -> NoReturn:
-    """Write an error about the usage of the command, and exit with 2."""
+    """Write an error message to standard error, and exit with 2."""
     complain(f"Error: {printable(message)}")
     sys.exit(USAGE_EXIT_CODE)
 
 
 def deliver(text: str, output: str | None = None, format_name: str = "text") -> None:
-    """Write to a file, or without a file, or for `-`, to standard output."""
+    """Write a text to the file `output`, or to standard output if `output` is None or `-`."""
     if output is None or output == "-":
         deliver_parts([text], format_name)
     else:
@@ -242,7 +246,7 @@ def deliver(text: str, output: str | None = None, format_name: str = "text") -> 
 
 
 def deliver_found(form: "ModuleType", results: object, format_name: str, output: str | None) -> None:
-    """Write results in a format; `form` is the module with a function for each format."""
+    """Write results in a format; `form` is the module with a function `as_NAME` for each format."""
     from bisar_budget.report import Style
 
     root, is_checkout = root_of_names()
@@ -253,7 +257,7 @@ def deliver_found(form: "ModuleType", results: object, format_name: str, output:
 
 
 def write_file(path: str, content: str | bytes) -> None:
-    """Replace a file whole, as `replacing` does."""
+    """Write content to a file through a temporary file, as in `replacing`."""
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     with replacing(path) as name, open(name, "wb") as file:
         file.write(data)
@@ -261,17 +265,18 @@ def write_file(path: str, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: str) -> Iterator[str]:
-    """Yield the name of a temporary file that replaces `path` at the end; it is in a folder next to `path`.
+    """Yield the name of a temporary file that replaces the file `path` at the end.
 
-    Links keep their target. Devices and pipes are written to directly. An error or an interrupt leaves the old file.
-    Temporary folders of killed commands are removed.
+    It is in a temporary folder beside `path`. A symbolic link remains a link, and its target is replaced. After an
+    error or an interrupt the old file remains. Named pipes, sockets and devices are refused, except open streams of
+    this process, which are written to directly. Temporary folders of killed commands are removed.
     """
     temporary = lock = None
     try:
         if kind := special_file(path):
             fail(f"cannot write {path}: {kind}; accepted: a regular file, or - for standard output")
         target = os.path.realpath(path)
-        with suppress(OSError):  # a file that a mission or the project names: an orbit, a log, a part, a list
+        with suppress(OSError):  # refuse a file that was read, such as an orbit, a log or a part
             status = os.stat(target)
             if (status.st_dev, status.st_ino) in FILES_READ:
                 fail(f"{path} was read by this command; a result would replace it")
@@ -291,27 +296,30 @@ def replacing(path: str) -> Iterator[str]:
     except BaseException as error:
         if not isinstance(error, OSError) and not (isinstance(error, ValueError) and temporary is None):  # a NUL
             raise
-        number = getattr(error, "errno", None)  # libraries change the words of the system
+        number = getattr(error, "errno", None)  # libraries change the message of the system
         fail(f"cannot write {path}: {os.strerror(number) if number else error}")
     finally:
         if temporary is not None:
             with suppress(OSError):
                 os.unlink(file)
-            with suppress(OSError):  # a listing would need memory, which may be exhausted
+            with suppress(OSError):  # without listing the folder, since memory may be exhausted
                 os.rmdir(temporary)
         if lock is not None:
             os.close(lock)
 
 
 def _own_folder(folder: str) -> tuple[str, int | None]:
-    """Make a folder in a folder, locked as long as this process lives, so that no other command removes it."""
+    """Make a temporary folder below `folder`, and lock it, so that no other command removes it.
+
+    Returns its path and the descriptor of the lock, None where locks are impossible. The lock ends with the process.
+    """
     import tempfile
 
     while True:
         temporary = tempfile.mkdtemp(_TEMPORARY[1], _TEMPORARY[0], folder)
         try:
             lock = locked(temporary)
-        except (BlockingIOError, FileNotFoundError):  # another command found it unlocked, and removes it
+        except (BlockingIOError, FileNotFoundError):  # another command is removing it, since it was not yet locked
             continue
         if os.path.isdir(temporary):
             return temporary, lock
@@ -320,14 +328,14 @@ def _own_folder(folder: str) -> tuple[str, int | None]:
 
 
 def _remove_abandoned(folder: str) -> None:
-    """Remove temporary folders of ended commands, which nobody locks."""
+    """Remove the temporary folders below `folder` that ended commands left. Their locks are released."""
     import shutil
 
     prefix, suffix = _TEMPORARY
     with os.scandir(folder) as entries:
         paths = [entry.path for entry in entries if entry.name.startswith(prefix) and entry.name.endswith(suffix)]
     for path in paths:
-        with suppress(OSError):  # the command lives, the folder is gone by now, or belongs to another user
+        with suppress(OSError):  # the command still runs, or the folder is gone or belongs to another user
             lock = locked(path)
             if lock is not None:
                 shutil.rmtree(path, ignore_errors=True)

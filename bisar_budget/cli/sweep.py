@@ -1,4 +1,4 @@
-"""`bisar-budget sweep`: a mission checked for many values of its numbers."""
+"""`bisar-budget sweep`: a table of checks of a mission for many values of its keys."""
 
 import os
 import sys
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
     from bisar_budget.front.sweeps import SweepResult
 
-MAX_UNFORCED_CASES = 100_000_000  # started without --force: tens of gigabytes
+MAX_UNFORCED_CASES = 100_000_000  # more need --force, since the table has tens of gigabytes
 
 
 @click.command()
@@ -159,7 +159,7 @@ def sweep(
 
 
 def _foresee(run: "SweepResult", force: bool) -> None:
-    """Announce a long time, and refuse more than `MAX_UNFORCED_CASES` cases without --force."""
+    """Announce the expected time if it is long; refuse more than `MAX_UNFORCED_CASES` cases without --force."""
     from bisar_budget.front.progress import foretell, lasting
 
     count, seconds = run.cases.count, run.foreseen()
@@ -172,7 +172,7 @@ def _foresee(run: "SweepResult", force: bool) -> None:
 
 
 def _write(run: "SweepResult", output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
-    """Write the table while cases are checked, then the plot, and a summary."""
+    """Write the table while the cases are checked, then the plot, and a summary to standard error."""
     from bisar_budget.report.drawing.figure import drawing_file
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.report.tables import texts, writer_of

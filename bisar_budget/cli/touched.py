@@ -1,4 +1,4 @@
-"""Missions that a change of files touches: changed missions, and missions that read a changed file."""
+"""Find the missions that a change of files affects: changed missions, and missions that read a changed file."""
 
 import os
 import re
@@ -20,7 +20,7 @@ _SETTINGS_FILE = "pyproject.toml"
 
 
 class _ReadFiles:
-    """The files of the disk, and the real paths of the files that were read."""
+    """Access to the files on disk that records the real paths of the files that were read."""
 
     def __init__(self) -> None:
         self.read: set[str] = set()
@@ -36,11 +36,11 @@ class _ReadFiles:
 
 
 def touched_missions(changed: Sequence[str]) -> list[str]:
-    """List the missions below the current folder that a change of files touches, sorted.
+    """List the missions below the current folder that a change of files affects, sorted.
 
-    A mission is a YAML file with the sections of a mission, or below a folder `missions`. The settings of a
-    `pyproject.toml` touch every mission below its folder. A mission that names files and cannot be read is touched,
-    because a deleted file is in no list of changes.
+    A mission is a YAML file with the sections of a mission, or any YAML file below a folder `missions` except parts.
+    A changed `pyproject.toml` affects every mission below its folder. A mission that names files and is unusable is
+    always listed, because a deleted file is in no list of changes.
     """
     paths = {os.path.realpath(file) for file in changed}
     tops = [os.path.join(os.path.dirname(path), "") for path in paths if os.path.basename(path) == _SETTINGS_FILE]
@@ -54,7 +54,7 @@ def touched_missions(changed: Sequence[str]) -> list[str]:
 
 
 def _missions_below(top: str) -> Iterator[str]:
-    """Mission files below a folder, without hidden folders."""
+    """Yield the mission files below a folder. Hidden folders are skipped."""
     for folder, folders, names in os.walk(top):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         yield from (file for name in names if _is_mission(file := os.path.join(folder, name)))
@@ -67,7 +67,7 @@ def _is_mission(file: str) -> bool:
     try:
         data = DISK.content(file, MAX_BYTES, file)
     except UnreadableError:
-        return True  # a check gives the reason
+        return True  # listed, so that its check reports the reason
     parts = os.path.relpath(file).replace(os.sep, "/").split("/")
     return bool(_IS_MISSION.search(data)) or (_FOLDER in parts[:-1] and not _IS_PART.search(data))
 
@@ -87,5 +87,5 @@ def _reads_any(file: str, paths: set[str]) -> bool:
         try:
             return names_files(read_tree(data, file).root)
         except MissionError:
-            return False  # no YAML, which no change of other files causes
+            return False  # the file is no valid YAML, whatever the other files
     return not paths.isdisjoint(files.read)

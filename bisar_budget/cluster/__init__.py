@@ -1,4 +1,4 @@
-"""Sweeps and draws on other machines: a folder for parts of a sweep, and the scheduler whose workers compute them."""
+"""Sweeps and Monte Carlo draws on other machines: storage of finished parts, and a scheduler with workers."""
 
 # What other rooms may use.
 __all__ = ["parts_folder", "scheduler"]

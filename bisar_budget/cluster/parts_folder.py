@@ -1,8 +1,9 @@
 """Finished parts of a sweep, stored as a Parquet data set with one file for each block of cases.
 
-A data set belongs to one question, which each file states in its metadata. A file is written under a temporary name
-and then renamed, so that every stored part is complete. Values are stored as the engine computes them, in SI units.
-The table of the command is written from them at the end.
+A data set belongs to one question, which is the set of all inputs that determine its values. Each file states the
+question in its metadata. A file is written under a temporary name and then renamed, so that every stored part is
+complete. Values are stored as the engine computes them, in SI units. At the end, the command builds its table from
+the parts.
 """
 
 import json
@@ -29,11 +30,11 @@ _PART_NAME = re.compile(r"part-\d{12}\.parquet", re.ASCII)
 
 
 def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
-    """Refuse an option whose libraries are not installed.
+    """Check that the libraries that an option needs are installed.
 
-    `room` is the memory that the libraries need [B]; raises `MemoryError` if it is not available. `extra` is the
-    extra of the package that installs the libraries, `modules` are the modules to import. Raises `ClusterError` if a
-    module is missing.
+    `room` is the memory that the libraries need [B]. `extra` is the extra of the package that installs the libraries,
+    and `modules` are the modules to import. Raises `MemoryError` if the memory is not available, and `ClusterError`
+    if a module is missing.
     """
     hold_room(room, option)
     try:
@@ -45,7 +46,7 @@ def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
 
 
 def question_of(asked: Asked) -> Question:
-    """All inputs that determine the values of parts, each by the words that describe it in messages.
+    """Collect all inputs that determine the values of parts, keyed by the words that describe them in messages.
 
     Parts with equal questions can be combined.
     """
@@ -66,7 +67,7 @@ def question_of(asked: Asked) -> Question:
 
 
 def _hash_of(cases: Cases) -> str:
-    """SHA-256 of the values of all keys from which the cases are made."""
+    """SHA-256 hash of the values of all keys that the cases vary."""
     digest = sha256(repr((cases.is_grid, cases.shape)).encode())
     for values in cases.columns:
         is_words = values.dtype == object
@@ -88,7 +89,7 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
             if (lock := locked(os.path.realpath(path))) is not None:
                 ends.callback(os.close, lock)
                 for name in os.listdir(path):
-                    if name.startswith(".part-"):  # from a killed command
+                    if name.startswith(".part-"):  # left by a command that was killed
                         os.unlink(os.path.join(path, name))
             folder = PartsFolder(path, question)
             folder.find(chunks, is_resumed)
@@ -106,7 +107,7 @@ class PartsFolder:
         self.path, self.question, self.done = path, question, set[int]()
 
     def find(self, chunks: Chunks, is_resumed: bool) -> None:
-        """Find the finished parts.
+        """Find the finished parts of the question and record them in `done`.
 
         Raises `ClusterError` if there are parts although `is_resumed` is false, or if there are parts of another
         question and none of this question.
@@ -122,10 +123,10 @@ class PartsFolder:
                     "or remove the folder"
                 )
             start = int(name[5:17])
-            # Reading a pipe would wait, and a device never ends.
+            # Opening a pipe would block, and reading a device would never end.
             if start in self.done or not os.path.isfile(self._file(start)):
                 continue
-            # A part may be damaged if the machine stopped before its disk was written.
+            # A part may be damaged if the machine stopped before the data reached the disk.
             with suppress(OSError, TypeError, ValueError, pa.ArrowException):
                 part_metadata = pq.read_metadata(self._file(start))
                 entries = part_metadata.metadata or {}
@@ -148,7 +149,7 @@ class PartsFolder:
             raise ClusterError(f"{self.path} is of another sweep: {differences}")
 
     def put(self, part: Part) -> None:
-        """Write a part; raises `ClusterError` if it cannot be written."""
+        """Write a part to the folder. Raises `ClusterError` if it cannot be written."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -181,7 +182,7 @@ class PartsFolder:
                 table = pq.ParquetFile(file, page_checksum_verification=True).read(use_threads=False)
                 values = {name: table.column(name).to_numpy() for name in table.column_names}
             except (OSError, KeyError, ValueError, pa.ArrowException) as error:
-                if getattr(error, "errno", None) is None:  # the content is at fault, not the system
+                if getattr(error, "errno", None) is None:  # the content is damaged; the system reported no error
                     self.done.discard(start)
                     with suppress(OSError):
                         os.unlink(file)

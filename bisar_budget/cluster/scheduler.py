@@ -1,8 +1,8 @@
 """Runs a function on the workers of a Dask scheduler, with common data and with each of many blocks.
 
 A block is a number of cases of a sweep, a number of draws of a Monte Carlo, or a row to verify. Common data, such as
-the mission with its files, are sent to a worker once. If a worker is lost, Dask gives its blocks to other workers. A
-worker needs nothing but the same version of bisar-budget.
+the mission with its files, are sent to a worker only once. If a worker is lost, Dask gives its blocks to other
+workers. A worker needs only the same version of bisar-budget.
 """
 
 import asyncio
@@ -36,20 +36,20 @@ _ADDRESS = re.compile(r"(?:tcp|tls)://\S+:\d{1,5}", re.ASCII)
 _LOCAL = re.compile(r"local:([1-9]\d{0,2})", re.ASCII)
 _ACCEPTED_ADDRESSES = "accepted: tcp://HOST:PORT, tls://HOST:PORT, or local:N for N processes here"
 _CONNECTION_TIMEOUT_S = 5.0
-_LOOK_PERIOD_S = 5.0  # between two counts of the workers
-_FETCH_TIMEOUT_S = 20.0  # for the result of a block; then the workers are counted
-_BLOCKS_PER_THREAD = 4  # submitted ahead for each thread of a worker
+_LOOK_PERIOD_S = 5.0  # time between two counts of the workers
+_FETCH_TIMEOUT_S = 20.0  # longest wait for the result of a block before the workers are counted again
+_BLOCKS_PER_THREAD = 4  # number of blocks submitted ahead for each thread of a worker
 _MIN_PENDING_BLOCKS_COUNT = 32
 
 
 @contextmanager
 def connected(address: str, patience: float, tell: Callable[[str], None]) -> "Iterator[Workers]":
-    """Connect to the workers of a scheduler.
+    """Connect to the workers of a scheduler, and close the connection at the end of the context.
 
     The address `local:N` starts N workers on this machine and ends them later. `patience` is the longest time to wait
     for a worker [s]. `tell` receives messages for a waiting user. Raises `ClusterError` if the scheduler cannot be
     reached, has no worker, or has a worker with another version of bisar-budget. Raises `MemoryError` if there is not
-    enough memory for its libraries.
+    enough memory for the Dask libraries.
     """
     local = _LOCAL.fullmatch(address)
     if not (local or _ADDRESS.fullmatch(address)):
@@ -73,7 +73,7 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
         client.loop.asyncio_loop.set_exception_handler(lambda *_: None)  # it would report cancelled work
         workers = Workers(client, address, patience, tell)
         workers.look()
-        # With a function of Python's library, which a worker of any version has.
+        # The function is from Python's standard library, so that workers of any version have it.
         versions = client.run(pydoc.locate, "bisar_budget.__version__", on_error="return")
         for worker, version in sorted(versions.items()):
             if version != __version__:
@@ -82,10 +82,10 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
 
 
 def _local_cluster(count: int, ends: ExitStack) -> "LocalCluster":
-    """Start a scheduler and workers on this machine; `ends` closes them.
+    """Start a scheduler and `count` workers on this machine; `ends` closes them.
 
-    They are started in a separate thread, because Ctrl-C does not interrupt a thread. A cluster that is interrupted
-    while it starts could not be closed.
+    They are started in a separate thread, because Ctrl-C does not interrupt that thread. If the start itself were
+    interrupted, the cluster could not be closed.
     """
     from distributed import LocalCluster
 
@@ -93,26 +93,29 @@ def _local_cluster(count: int, ends: ExitStack) -> "LocalCluster":
         cluster = LocalCluster(
             n_workers=count,
             threads_per_worker=1,
-            dashboard_address="127.0.0.1:0",  # a free port; by default all clusters would want 8787
+            dashboard_address="127.0.0.1:0",  # a free port; by default all clusters use port 8787
             silence_logs=logging.CRITICAL + 1,
             preload=[__name__],
         )
         ends.callback(_close, cluster, 10)
         return cluster
 
-    resource_tracker.ensure_running()  # otherwise the thread would start it, and unblock the signal there
+    resource_tracker.ensure_running()  # otherwise the thread would start it and unblock the signal
     with ThreadPoolExecutor(1, initializer=_block_interrupts) as starter:
         return starter.submit(started).result()
 
 
 def _block_interrupts() -> None:
-    """Block Ctrl-C in this thread, and in the workers that it starts until they can ignore it themselves."""
+    """Block Ctrl-C in this thread and in the workers that it starts, until these can ignore it themselves."""
     if hasattr(signal, "pthread_sigmask"):  # not on Windows
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def dask_setup(worker: object) -> None:
-    """Make a worker of a local cluster ignore Ctrl-C, which a terminal sends to every process. Dask calls this."""
+    """Make a worker of a local cluster ignore Ctrl-C, which a terminal sends to every process.
+
+    Dask calls this function by its name when a worker starts.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -122,7 +125,7 @@ def _close(opened: "Client | LocalCluster", seconds: float) -> None:
 
 
 def _greet(address: str) -> None:
-    """Check that a Dask scheduler answers at an address, and raise an error if not.
+    """Check that a Dask scheduler answers at an address. Raises `OSError` if another program answers.
 
     A Dask client would take longer to report the problem, with fewer details.
     """
@@ -139,7 +142,7 @@ def _greet(address: str) -> None:
 
     try:
         kind = asyncio.run(identity())["type"]
-    except MemoryError:  # the first bytes of a web server were taken for the length of a message
+    except MemoryError:  # the first bytes of a web server's answer were read as the length of a message
         raise OSError("what answers is no Dask scheduler") from None
     if kind != "Scheduler":
         raise OSError(f"a Dask {kind.lower()} answers, no scheduler")
@@ -147,7 +150,7 @@ def _greet(address: str) -> None:
 
 @dataclass
 class Workers:
-    """The workers of a scheduler; `threads` is the number of their threads when last counted."""
+    """The workers of a scheduler; `threads` is the number of their threads at the last count."""
 
     client: "Client"
     address: str
@@ -158,9 +161,9 @@ class Workers:
     def look(self) -> None:
         """Count the threads of the workers, and wait for a worker if there is none.
 
-        Raises `ClusterError` if no worker comes.
+        Raises `ClusterError` if no worker appears in time, or if the scheduler is lost.
         """
-        with suppress(Exception):  # the blocks report a lost scheduler
+        with suppress(Exception):  # a lost scheduler is reported later, with the blocks
             self.threads = sum(self.client.nthreads().values())
         if self.threads:
             return
@@ -183,14 +186,14 @@ class Workers:
         blocks: Iterable[Block],
         about: Callable[[Block], str],
     ) -> Iterator[tuple[Block, Result]]:
-        """Call `function(common, block)` on workers, and yield each block and its result, in any order.
+        """Call `function(common, block)` on workers, and yield each block with its result, in any order.
 
-        `about` names a block in messages. Only a few blocks are submitted ahead. Raises `ClusterError` if the
-        scheduler or all workers are lost, if a block ended every worker that had it, or if a worker cannot compute a
-        block. Raises `RuntimeError` if the function raised an error.
+        `about` returns the name of a block for messages. Only a few blocks are submitted ahead. Raises `ClusterError`
+        if the scheduler or all workers are lost, if every worker that received a block ended, or if a worker cannot
+        compute a block. Raises `RuntimeError` if the function raised an error.
         """
         finished: SimpleQueue[Future[Result]] = SimpleQueue()
-        # A task makes the common data, not the client: Dask makes them again if a worker with them is lost.
+        # The common data are the result of a task, so that Dask can create them again if their worker is lost.
         shared = self.client.submit(pickle.loads, pickle.dumps(common), pure=False)
         pending: dict[object, tuple[Future[Result], Block]] = {}
         remaining, next_look = iter(blocks), 0.0
@@ -208,12 +211,12 @@ class Workers:
                     return
                 with suppress(Empty):
                     future = finished.get(timeout=max(next_look - monotonic(), 0.05))
-                    try:  # Dask repeats a block whose worker is lost between its end and the fetch
+                    try:  # Dask repeats a block if its worker is lost before the result is fetched
                         result = future.result(timeout=_FETCH_TIMEOUT_S)
                     except Exception as error:
                         if future.status == "error":
                             raise _fault_of_block(future.exception(), about(pending[future.key][1])) from None
-                        if not isinstance(error, TimeoutError):  # cancelled, with the connection
+                        if not isinstance(error, TimeoutError):  # cancelled because the connection is lost
                             raise self._gone() from error
                         finished.put(future)
                         continue
@@ -227,10 +230,10 @@ class Workers:
 
 
 def _called(version: str, function: Callable[[Common, Block], Result], common: Common, block: Block) -> Result:
-    """Compute a block on a worker.
+    """Compute a block on a worker, after a check of the worker's version of bisar-budget.
 
-    Raises `ClusterError` if the worker has another version of bisar-budget, which can happen if it joined after the
-    check of versions, or if the worker cannot use the mission.
+    Raises `ClusterError` if the version differs, which happens if the worker joined after the first check, or if the
+    worker cannot use the mission.
     """
     from distributed import get_worker
 
@@ -253,7 +256,7 @@ def _fault_of_block(error: BaseException, about: str) -> Exception:
     """Convert the error of a failed block to the exception to raise; `about` names the block in its message."""
     from distributed.scheduler import KilledWorker
 
-    if isinstance(error, ClusterError):  # another version, or an unusable mission
+    if isinstance(error, ClusterError):  # the worker has another version or cannot use the mission
         return ClusterError(f"{about}: {error}")
     if isinstance(error, KilledWorker):
         last_worker = error.last_worker.address

@@ -1,4 +1,4 @@
-"""Design questions about one mission: complying values, effects of numbers, and sizes of errors to order."""
+"""Answers to design questions: values with which a mission complies, effects of its numbers, and specifications."""
 
 # What other rooms may use.
 __all__ = [

@@ -1,12 +1,13 @@
-"""Specifications of several errors at once: the largest sizes with which a mission meets every requirement.
+"""Specifications of several errors: the largest sizes with which a mission meets every requirement.
 
-Each row of the budget that can fail has an allowed utilization. An error adds a power of its size to the row: the
-square if errors combine by root-sum-square or powers add, the size itself if errors add linearly. The unspecified
-errors use a part of each allowed utilization. The search divides the remaining room among the specified errors so
-that the sum of weight·log(size) is largest (`geometric_program`). Exact ranges are valid for errors of any size, but
-are not proportional to it. Each step therefore makes full checks with each error a fifth larger and a fifth smaller
-than in the step before, and measures what the error adds to each row. The search ends when the sizes no longer
-change. Values are in SI and radians.
+The utilization of a row of the budget is its error divided by its limit. Each row that can fail has an allowed
+utilization. An error adds a power of its size to the row: the square if errors combine by root-sum-square or powers
+add, the size itself if errors add linearly. The unspecified errors use a part of each allowed utilization. The
+search divides the remaining room among the specified errors so that the sum of weight·log(size) is largest; the
+module `geometric_program` solves this problem. Phases follow from exact ranges, so they are valid for errors of any
+size, but not proportional to the size. Each step therefore makes full checks with each error 20 % larger and 20 %
+smaller than in the step before, and measures the contribution of the error to each row. The search ends when the
+sizes no longer change. Values are in SI and radians.
 """
 
 import math
@@ -46,17 +47,17 @@ class AllocationSettings:
     full_step_rounds : int
         Number of rounds with full steps. Later rounds make half steps, because full steps can oscillate.
     end_steps : int
-        Number of sizes between two known sizes that are tried to find the largest size with an image.
+        Number of sizes that are tried between two known sizes, to find the largest size at which an image forms.
     max_shrinks : int
         Largest number of times that all sizes are reduced by a tenth; together 18 powers of ten.
     free_ratio : float
         Ratio of the largest to the smallest size that is tried for an error that no row seems to limit.
     free_steps : int
-        Number of sizes that are tried in this range.
+        Number of sizes that are tried in the range of `free_ratio`.
     free_fraction : float
-        Fraction of an allowed utilization that an error without a limit may use.
+        Largest fraction of an allowed utilization that such an error may use.
     close_fraction : float
-        Margin below an allowed utilization when sizes are reduced, as a fraction of it.
+        Margin that is kept below an allowed utilization when sizes are reduced, as a fraction of this utilization.
     """
 
     settled_change: float = 1e-4
@@ -108,7 +109,10 @@ def allocate(
 
 
 def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None, today: date) -> str:
-    """Message of the error for `combine: each`; it lists the allowable size of each error by itself."""
+    """Make the message of the error that `combine: each` causes.
+
+    With this rule every error is judged alone, so the message lists the allowable size of each error.
+    """
     errors = specified_errors(mission, tree_of(mission), keys)
     rows = check_mission(mission if model is None else Variation(mission, model).read(), today).rows
     limits_in_words = []
@@ -152,9 +156,10 @@ class _SizeSearch:
         self.mission = mission
 
     def found(self, progress: Progress) -> tuple[Floats, tuple[RowUse, ...]]:
-        """Search for the sizes (sizes,), and for the rows that limit them, the most restrictive row first.
+        """Find the largest sizes, and the rows that limit them.
 
-        A size is NaN if no row limits it. Each step uses utilizations near the sizes of the step before.
+        Returns the sizes (sizes,), which are NaN for an error that no row limits, and the rows with the most
+        restrictive row first. Each step uses utilizations near the sizes of the step before.
         """
         sizes = self._first_sizes()
         inside, is_extended = np.minimum(self.mission.tiny, sizes), False
@@ -186,9 +191,10 @@ class _SizeSearch:
         return self._kept(sizes, before)
 
     def _free_sizes(self, sizes: Floats, is_free: Booleans) -> Floats:
-        """Enlarge the sizes of errors that no row seems to limit, until just before they use part of a limit.
+        """Enlarge the sizes of errors that no row seems to limit, and return all sizes (sizes,).
 
-        `is_free` marks these errors, (sizes,). Other sizes are returned unchanged.
+        Each size ends one step before the error uses a noticeable fraction of a limit (`free_fraction`). `is_free`
+        marks the errors to enlarge, (sizes,). Other sizes are returned unchanged.
         """
         extended = sizes.copy()
         for index in np.flatnonzero(is_free).tolist():
@@ -210,9 +216,10 @@ class _SizeSearch:
         return extended
 
     def _find_ends(self, inside: Floats, sizes: Floats) -> None:
-        """Update `ends`: the size of each error from which there is no image.
+        """Update `ends`, the size of each error at and above which no image forms.
 
-        The other errors have the sizes `inside`; only errors that have no image at `sizes` are updated.
+        One error at a time has its size in `sizes`, and the other errors have the sizes `inside`. Only the ends of
+        errors that prevent an image at this size are updated.
         """
         count = sizes.size
         cases = np.repeat(inside[:, None], count, axis=1)
@@ -221,9 +228,10 @@ class _SizeSearch:
             self.mission.ends[index] = self._end_between(index, inside, min(sizes[index], self.mission.ends[index]))
 
     def _end_between(self, index: int, inside: Floats, high: float) -> float:
-        """Find the largest size of error `index` that still gives an image.
+        """Find the largest size of the error with the number `index` at which an image still forms.
 
-        The search is between its size in `inside`, which gives an image, and `high`; other errors stay at `inside`.
+        The search is between the size in `inside`, at which an image forms, and `high`. The other errors have the
+        sizes `inside`.
         """
         low = float(inside[index])
         for _ in range(2):
@@ -236,7 +244,7 @@ class _SizeSearch:
         return low
 
     def _first_sizes(self) -> Floats:
-        """Sizes for the start of the search, (sizes,): small enough that all errors together fit into every row."""
+        """Choose the first sizes of the search, (sizes,), so small that all errors together fit into every row."""
         count = self.mission.tiny.size
         cases = np.repeat(self.mission.tiny[:, None], count + 1, axis=1)
         cases[np.arange(count), np.arange(1, count + 1)] *= 2
@@ -253,8 +261,9 @@ class _SizeSearch:
     def _kept(self, sizes: Floats, before: Rows) -> tuple[Floats, tuple[RowUse, ...]]:
         """Reduce the sizes until no row exceeds its allowed utilization.
 
-        Returns the sizes (sizes,), NaN for a size that no row limits, and the rows with the shares of each error.
-        `before` has the rows of earlier directions of a displacement.
+        Returns the sizes (sizes,), which are NaN for an error that no row limits, and the limiting rows with the
+        shares of each error. `before` has the constraints on the location error from earlier steps, in which the
+        largest displacement had another direction.
         """
         near = self.mission.near(sizes)
         for _ in range(ALLOCATION_SETTINGS.max_shrinks):
@@ -287,10 +296,10 @@ class _SizeSearch:
     def _with_earlier(
         before: Rows, program_multipliers: Floats, near: Near, sizes: Floats, shares: Floats, multipliers: Floats
     ) -> None:
-        """Merge the rows for earlier directions of the displacement into the row of the location error.
+        """Merge the constraints from earlier directions of the displacement into the row of the location error.
 
-        Their multipliers are added to the multiplier of the row. Shares are averaged with the multipliers as weights.
-        `shares` and `multipliers` are changed in place.
+        The multipliers of the constraints `before` are added to the multiplier of the row. The shares of the errors
+        are averaged with the multipliers as weights. `shares` and `multipliers` are changed in place.
         """
         if not before.room.size:
             return
@@ -304,7 +313,7 @@ class _SizeSearch:
             multipliers[index] = total
 
     def _used(self, near: Near, sizes: Floats) -> Floats:
-        """Compute the utilizations, at some sizes, of the rows in `near`, (rows,)."""
+        """Compute the utilizations (rows,) of the rows of `near`, for errors of the sizes (sizes,)."""
         row_uses = self.mission.uses(sizes[:, None])
         uses = dict(zip(row_uses.ids, row_uses.uses[:, 0].tolist(), strict=True))
         return np.array([uses.get(row, 0.0) for row in near.found.ids])
@@ -312,8 +321,9 @@ class _SizeSearch:
     def _row_uses(self, near: Near, used: Floats, parts: Floats, multipliers: Floats) -> Iterator[RowUse]:
         """Yield the rows that limit a size, with the largest multiplier first.
 
-        `used` are the utilizations (rows,). `parts` are the contributions of the errors, as fractions of the power of
-        the allowed utilization, (limiting rows, sizes); `multipliers` are (limiting rows,).
+        `used` are the utilizations (rows,). `parts` are the contributions of the errors (limiting rows, sizes), as
+        fractions of the allowed utilization raised to the power of the row. `multipliers` have the shape (limiting
+        rows,).
         """
         row_indices = np.flatnonzero(near.is_limit)
         for limit in np.argsort(-multipliers, kind="stable").tolist():
@@ -331,7 +341,7 @@ class _SizeSearch:
 
 
 def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
-    """Largest share of an error among the rows of each requirement, by requirement."""
+    """Find the share of one error in each requirement: its largest share in any row of the requirement."""
     shares: dict[str, float] = {}
     for row in rows:
         if row.requirement is not None and key in row.shares:

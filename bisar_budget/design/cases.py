@@ -30,9 +30,9 @@ from bisar_budget.units import Dimension, normal_unit, parse_quantity
 
 Values = Floats | NDArray[np.object_]  # numbers in SI, or words
 
-MAX_TABLE_VALUE_COUNT = 10_000_000  # of one key, and of all keys of a table: 80 MB
+MAX_TABLE_VALUE_COUNT = 10_000_000  # largest number of values of one key, and of all keys of a table: 80 MB
 MAX_TABLE_CHARACTERS = 256 << 20  # enough for `MAX_TABLE_VALUE_COUNT` values of 17 digits with sign and exponent
-_SHOWN_FAULT_COUNT = 20  # of a table in a message
+_SHOWN_FAULT_COUNT = 20  # largest number of faults of a table in a message
 # A sample of cases: number of stretches, and the fraction of all cases between them, which fits no step of a grid.
 _STRETCH_COUNT, _GOLDEN_FRACTION = 100, (math.sqrt(5) - 1) / 2
 _FLOAT_DIGITS = 15  # decimal digits that every float keeps
@@ -107,7 +107,7 @@ def grid_of(tree: JsonObject, values: Mapping[str, ArrayLike]) -> Cases:
         words = [str(word) for word in array.tolist()]
         choices = choices_of(tree, key, words[0])
         if choices is None:
-            number_of(tree, key)  # raises the problem of a key with neither
+            number_of(tree, key)  # raises an error if the key takes neither numbers nor words
             raise QuestionError(f"{key}: has words; accepted: numbers in SI")
         arrays.append(_texts(key, choices, words))
         varied.append(choices)
@@ -128,7 +128,10 @@ def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:
 
 
 def _wrong_word(choices: Choices, word: str) -> str:
-    """Problem of a word that a key does not accept; empty if there is none, or if only a check can find it."""
+    """Describe why a key does not accept a word.
+
+    The text is empty if the key accepts the word, or if only a check of the mission can tell.
+    """
     if word.startswith("[") or isinstance(choices.reader, TextList):
         return ""
     try:
@@ -140,7 +143,7 @@ def _wrong_word(choices: Choices, word: str) -> str:
 
 # ---------------------------------------------------------------- cases of options
 class _Asked(NamedTuple):
-    """One option `--vary`: the varied key, and its words or values in SI, or the ends and the count of a range."""
+    """A parsed option `--vary`: the varied key with its words, its values in SI, or the ends and count of a range."""
 
     option: str
     varied: Varied
@@ -176,7 +179,7 @@ def grid(tree: JsonObject, texts: Sequence[str], name: str = "--vary") -> Cases:
 
 
 def _axis(asked: _Asked) -> Values:
-    """Values of one option of a grid; raises `QuestionError` if a range has no valid count."""
+    """Compute the values of one option of a grid; raises `QuestionError` if a range has no valid count."""
     if asked.listed is not None:
         return asked.listed
     if not asked.size:
@@ -236,7 +239,7 @@ def sample(tree: JsonObject, texts: Sequence[str], how: str) -> Cases:
 
 
 def _all_asked(tree: JsonObject, texts: Sequence[str], name: str) -> Iterator[_Asked]:
-    """Yield the option of each text; raises `QuestionError` if there is no text, or if a key is repeated."""
+    """Parse the texts of all options; raises `QuestionError` if there is no text, or if a key is repeated."""
     if not texts:
         raise QuestionError(f"no {name}: nothing would vary; {_ACCEPTED_VARIATIONS}")
     seen: set[tuple[str, ...]] = set()
@@ -250,7 +253,7 @@ def _all_asked(tree: JsonObject, texts: Sequence[str], name: str) -> Iterator[_A
 
 
 def _asked(tree: JsonObject, text: str, name: str) -> _Asked:
-    """Read one option; its values are checked against the bounds of the key."""
+    """Parse the text of one option, and check its values against the bounds of the key."""
     key, equals, values_text = (field.strip() for field in text.partition("="))
     option = f"{name} {shown(text)}"
     if not (key and equals and values_text):
@@ -275,7 +278,7 @@ def _asked(tree: JsonObject, text: str, name: str) -> _Asked:
 
 
 def _range(option: str, number: Number, fields: list[str]) -> _Asked:
-    """Read the range of an option; `fields` are its texts between colons."""
+    """Parse the range of an option; `fields` are the parts of its text that colons separate."""
     if is_log := len(fields) > 2 and fields[-1] == "log":
         fields.pop()
     if len(fields) > 3 or "" in fields:
@@ -292,9 +295,9 @@ def _range(option: str, number: Number, fields: list[str]) -> _Asked:
 
 
 def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tuple[float, ...]]:
-    """Read values in SI; returns the number with the unit of the last text, and the values.
+    """Parse the texts of values; returns the number with the unit of the last text, and the values in SI.
 
-    Values without a unit have the unit of the last text.
+    A value without a unit has the unit of the last text.
     """
     units = [normal_unit(_NUMBER_PREFIX.sub("", text).strip()) for text in texts]
     values = []
@@ -308,7 +311,11 @@ def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tu
 
 
 def _usable_unit(unit: str, dimension: Dimension) -> str:
-    """Unit for scaling values: `unit`, or the SI unit if it is empty or has an offset; empty if there is none."""
+    """Choose the unit in which values are spaced or rounded.
+
+    This is `unit`, or the SI unit if `unit` is empty or has an offset. The result is empty if the dimension has no
+    such unit.
+    """
     unit = unit if unit and unit not in dimension.offsets else dimension.si
     return unit if unit in dimension.scales else ""
 
@@ -321,7 +328,7 @@ def _count(text: str, subject: str, least: int, hint: str = "") -> int:
 
 
 def _spread(asked: _Asked, fractions: Floats) -> Floats:
-    """Values at fractions of a range, from 0 to 1; the fractions 0 and 1 give exactly its ends."""
+    """Compute the values in SI at fractions of a range; the fractions 0 and 1 give exactly the ends of the range."""
     low, high = asked.ends
     factor, divisor = asked.varied.scale
     first, last = low / factor * divisor, high / factor * divisor
@@ -344,14 +351,14 @@ def sampled_cases(cases: Cases, count: int) -> Cases:
 
 
 def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
-    """Yield each varied key that takes words, with its different words."""
+    """Yield each varied key that takes words, with the list of its words without repetition."""
     for varied, words in zip(cases.varied, cases.columns, strict=True):
         if isinstance(varied, Choices):
             yield varied, list(dict.fromkeys(words.tolist()))
 
 
 def in_unit(number: Number, values: Floats) -> Floats:
-    """Convert values from SI to the unit of a number; they are rounded if this gives the same SI values again."""
+    """Convert values from SI to the unit of a number; a value is rounded if it converts back to the same SI value."""
     factor, divisor = number.scale
     values_in_unit: Floats = values / factor * divisor
     rounded = _rounded(values_in_unit)
@@ -462,7 +469,7 @@ def _cells(line: str) -> Iterator[tuple[int, str]]:
 
 
 def _headed(tree: JsonObject, header: str, line_number: int, file: str) -> tuple[Varied, ...]:
-    """Read the keys of the header, with the units that it states; raises `TableError`."""
+    """Read the keys and their units from the header of a table; raises `TableError` if a cell is faulty."""
     if not header:
         accepted = "accepted: KEY [unit], KEY [unit], ..."
         raise TableError.of_faults(file, [Fault(line_number, 1, "", "has no header", accepted=accepted)])
@@ -512,9 +519,10 @@ def _column(tree: JsonObject, cell: str) -> Varied:
 def _row(
     line: str, varied: Sequence[Varied], words: Sequence[dict[str, int]], line_number: int
 ) -> list[float] | Fault:
-    """Read the numbers of a line, or return its first fault.
+    """Read the values of one line of a table, or return the first fault of the line.
 
-    Words become numbers; `words` has the number of each word of a column, and receives new words.
+    Words are replaced by numbers. `words` has a mapping from words to numbers for each column; new words are added
+    to it.
     """
     texts = line.split(",")
     if len(texts) != len(varied):

@@ -1,4 +1,4 @@
-"""Comparison of parts of the catalogue in a mission."""
+"""Comparison of sensors and oscillators of the catalogue: the verdict of a mission with each of them."""
 
 import json
 import math
@@ -61,17 +61,18 @@ class PartState(NamedTuple):
 
     @property
     def complies(self) -> bool:
-        """Whether the mission complies with the part."""
+        """Whether the mission meets its requirements if it has this part."""
         return self.standing.complies
 
 
 class Comparison(NamedTuple):
     """Comparison of parts of the catalogue for one key of one mission.
 
-    `parts` lists the complying parts first, the smallest margin first, and then the other parts, the smallest excess
-    first. `kinds` are the compared kinds of parts, and `kept` are the parts of other kinds that stay in the mission.
-    `overridden` are figures of parts that the file states itself. `imaged` is the verdict of images with the
-    complying part of the smallest margin, if images were formed. `overrides` are influences from outside the file.
+    `parts` lists the complying parts in the order of rising margin, and then the other parts in the order of rising
+    excess. `kinds` are the compared kinds of parts, and `kept` are the parts of other kinds that stay in the mission.
+    `overridden` are figures of parts that the mission file replaces by its own. `imaged` is the verdict of images
+    with the first complying part, if images were formed. `overrides` are settings outside the mission file that
+    influence the verdict.
     """
 
     file: str
@@ -192,9 +193,10 @@ def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
 
 
 def _order(state: PartState) -> tuple[int, float, float, str]:
-    """Sort key of a part: complying parts first, then waived parts, then other parts, then parts without a mission.
+    """Make the sort key of a part: complying parts come first, then waived parts, then all other parts.
 
-    Complying parts are sorted by the smallest margin, other parts by the smallest excess.
+    Complying parts are in the order of rising margin, and other parts in the order of rising excess. Parts without a
+    utilization, such as parts with which the mission is invalid, come last.
     """
     sign = -1 if state.complies else 1
     uses = (state.standing.utilization, state.own_utilization)
@@ -205,7 +207,7 @@ def _order(state: PartState) -> tuple[int, float, float, str]:
 
 
 class _Candidate(NamedTuple):
-    """A part that is tried, with the judged mission, or with the reason why the part makes no mission.
+    """A part that is tried, with the judged mission, or with the reason why the mission is invalid with this part.
 
     `figures` are the figures that the mission takes from the part. `stated` are figures that the mission file states
     instead of the part.
@@ -221,10 +223,10 @@ class _Candidate(NamedTuple):
 
 
 class _PartSearch:
-    """Finds the parts that a key of a mission can name, and tries them in the mission.
+    """Search for the parts that a key of a mission can name, with a check of the mission for each of them.
 
-    `given` are the parts that the file names, `candidates` all parts to try. The constructor raises `PartError` if
-    the catalogue cannot be read.
+    `given` are the parts that the mission file names, and `candidates` are all parts to try. The constructor raises
+    `PartError` if the catalogue cannot be read.
     """
 
     def __init__(self, variation: Variation, key: str) -> None:
@@ -248,12 +250,15 @@ class _PartSearch:
         self.candidates = [each for each in (*project_files, *catalogued.values()) if each.part.kind in self.kinds]
 
     def value(self, name: str, kind: str) -> str:
-        """Text of the key's value that names the part `name` of a kind; parts of other kinds stay in it."""
+        """Make the text of the key's value with the part `name` in place of the given part of the same kind.
+
+        Given parts of other kinds stay in the text.
+        """
         kept = [named for named, device in self.given.items() if device.kind != kind]
         return json.dumps([*kept, name] if kept else name, ensure_ascii=False)
 
     def checked(self, candidate: _Candidate, today: date) -> _Candidate:
-        """Judge the mission with a candidate, or find the reason why the candidate makes no mission."""
+        """Judge the mission with a candidate, or find the reason why the mission is invalid with this candidate."""
         try:
             mission = self.variation.read([SetValue(self.key, self.value(candidate.id, candidate.part.kind))])
         except MissionError as error:
@@ -275,7 +280,7 @@ class _PartSearch:
         )
 
     def state(self, candidate: _Candidate, row: str | None, breaks: frozenset[str]) -> PartState:
-        """Verdict of the mission with a checked candidate; `row` is judged instead of the mission if it is set."""
+        """Make the verdict of the mission with a checked candidate, or of the row `row` alone if it is set."""
         state = PartState(
             id=candidate.id,
             name=candidate.part.name,
@@ -307,5 +312,5 @@ class _PartSearch:
 
 
 def mission_with(variation: Variation, key: str, state: PartState) -> Mission:
-    """Read the mission with the part of a state of the comparison."""
+    """Read the mission with one of the compared parts."""
     return variation.read([SetValue(key, _PartSearch(variation, key).value(state.id, state.kind))])

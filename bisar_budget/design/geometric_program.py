@@ -50,7 +50,7 @@ class Rows(NamedTuple):
     room: Floats
 
     def at(self, x: Floats) -> Floats:
-        """Fraction of the room of each row that each size takes, (rows, sizes); the sizes are e^x."""
+        """Compute the fraction of each row's room that each size takes up, (rows, sizes); the sizes are e^x."""
         fractions: Floats = self.share * np.exp(self.power[:, None] * x) / self.room[:, None]
         return fractions
 
@@ -108,9 +108,10 @@ def largest_sizes(weights: Floats, rows: Rows) -> Largest:
 
 
 def _towards(x: Floats, step: Floats, gradient: Floats, pull: Floats, rows: Rows) -> Floats:
-    """Take a Newton step, halved until the objective with the barrier falls enough and no row exceeds its room.
+    """Take a Newton step, and return the new logarithms of the sizes, (sizes,).
 
-    `pull` is the weighted linear objective. Returns the new logarithms of the sizes.
+    The step is halved until the objective with the barrier falls enough and no row exceeds its room. `pull` are the
+    weights of the objective relative to the barrier, (sizes,).
     """
     before, falls = _value(x, pull, rows), float(gradient @ step)
     length = min(1.0, 2.0 / float(np.abs(step).max()))

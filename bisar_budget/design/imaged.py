@@ -14,7 +14,7 @@ from bisar_budget.workers import Progress, unseen
 
 
 class ToImage(NamedTuple):
-    """A case for which images can be formed: the mission at the solution, the binding row, the solution as text."""
+    """A case for images: the mission at the solution, the binding row, and the solution as text."""
 
     mission: Mission
     row: str
@@ -22,15 +22,15 @@ class ToImage(NamedTuple):
 
     @property
     def seconds(self) -> float:
-        """Estimated time to form the images; 0 if it is far below a minute. [s]"""
+        """Estimated time to form the images, or 0 if it is clearly less than a minute. [s]"""
         return seconds_to_verify(self.mission, escape(self.row))
 
 
 def to_image(mission: Mission, solution: Solution | Comparison, model: str | None) -> ToImage | None:
     """Make the case for images at a solution; None if no value complies, if all values comply, or if no row binds.
 
-    The case is at the largest value at which compliance ends or begins. For a comparison it is the complying part
-    with the smallest margin.
+    The case is the mission at the largest value at which compliance ends or begins. For a comparison it is the
+    mission with the complying part that has the smallest margin.
     """
     variation = Variation(mission, model)
     if isinstance(solution, Comparison):

@@ -56,7 +56,10 @@ class Offer(NamedTuple):
 
     @property
     def complies(self) -> bool:
-        """Whether the mission with the offer meets every requirement, even if a figure exceeds its specification."""
+        """Whether the mission of the offer meets every requirement.
+
+        Single figures may exceed their specifications.
+        """
         return exit_code({self.status}, strict=False) == 0
 
 
@@ -94,7 +97,10 @@ def _figure(
 
 
 def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
-    """Spectrum that a level shifts, without the shift; `parts` are the parts of the key of the level."""
+    """Find the noise or vibration spectrum that a level shifts, before the shift.
+
+    `parts` are the parts of the key of the level. Spectra are returned in a form that can be compared.
+    """
     platform = getattr(mission.platforms, parts[1])
     if parts[-1] == "level":
         return [getattr(platform.oscillator, name, None) for name in _OSCILLATOR_KEYS]
@@ -102,7 +108,10 @@ def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
 
 
 def _rules(mission: Mission) -> AllocationRules:
-    """Allocation rules of a mission as in a sheet: without `specify`, and with equal in place of balanced shares."""
+    """Bring the allocation rules of a mission into the form of a sheet.
+
+    The rules are returned without `specify`, and balanced shares are replaced by equal shares.
+    """
     split = mission.allocation.split
     if isinstance(split, MetricSplits) and split.quadratic_phase_error == "balanced":
         split = split._replace(quadratic_phase_error="equal")

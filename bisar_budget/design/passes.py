@@ -36,9 +36,9 @@ from bisar_budget.workers import Progress, unseen
 
 CENTER_TIME = "collection.center_time"
 MIN_ELEVATION = math.radians(20)
-_PASSES_PER_BLOCK = 64  # checked together
+_PASSES_PER_BLOCK = 64  # number of passes that are checked together
 _YEARS = (1957, 2200)  # first year with orbits, and the year after the last
-_TRACK_POINTS = 41  # of a pass in a drawing
+_TRACK_POINTS = 41  # number of points of a pass in a drawing
 
 
 class SatellitePass(NamedTuple):
@@ -126,7 +126,7 @@ def bearing(azimuth: float) -> float:
 
 
 class UnknownTime(NamedTuple):
-    """A part of the span in which the orbit of a platform is not known, and the reason."""
+    """A time interval within the span in which the orbit of a platform is unknown, with the reason."""
 
     platform: str
     start: Instant
@@ -203,7 +203,7 @@ def passes(
     """Find the passes of a satellite over the scene, and check the mission in each.
 
     Arguments are those of `bisar_budget.passes`. The least elevation and the squint are in radians; the squint is
-    positive if the satellite looks forward. The mission may be loaded with or without paths. Its
+    positive if the satellite looks forward. The mission may be loaded with or without the paths of its platforms. Its
     `collection.center_time` is ignored. `progress` is called with the number of checked passes and of all passes.
 
     Raises
@@ -261,10 +261,10 @@ def _listed(mission: Mission, platform: str | None) -> str:
 def _watched(
     mission: Mission, axes: SceneAxes, start: Instant, days: float, variation: Variation
 ) -> dict[str, Watched]:
-    """Find the satellites as seen from the scene, by the name of the platform.
+    """Compute the motion of each satellite as seen from the scene, by the name of the platform.
 
-    If an orbit cannot be used at any time of the span, the error is the error of a check at the beginning of the
-    span.
+    If the orbit of a platform is not usable at any time of the span, the function raises the error with which a check
+    at the beginning of the span would fail.
     """
     read = reader_of(folder_of(mission.file))
     seen = {}
@@ -283,9 +283,9 @@ def _watched(
 
 
 def _hold_to_an_orbit(mission: Mission, variation: Variation, start: Instant) -> None:
-    """Raise the error of reading the mission at an instant, if there is an error.
+    """Read the mission with the middle of the aperture at an instant, and raise the error if this fails.
 
-    The message does not mention the setting of the instant, because the user has not set it.
+    The message does not mention the changed instant, because the user has not set it.
     """
     try:
         variation.read(center_time(start))
@@ -298,9 +298,9 @@ def _hold_to_an_orbit(mission: Mission, variation: Variation, start: Instant) ->
 
 
 def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneAxes, squint: float) -> SatellitePass:
-    """Make a pass with its times, its track and its mid-time; the mission is not checked yet.
+    """Compute the times, the track and the mid-time of a pass, before the mission is checked.
 
-    `stretch` is the time of the pass. `squint` is the squint at the mid-time. [rad]
+    `stretch` is the time interval of the pass. `squint` is the squint angle at the mid-time. [rad]
     """
     culmination = satellite.culmination(stretch)
     times = np.linspace(stretch.start, stretch.stop, _TRACK_POINTS)
@@ -368,12 +368,12 @@ def _checked(
 
 
 def center_time(instant: Instant) -> list[SetValue]:
-    """Changed value of a mission file that puts the middle of the aperture at an instant."""
+    """Make the change of a mission file that puts the middle of the aperture at an instant."""
     return [SetValue(CENTER_TIME, instant.as_text())]
 
 
 def _judged(unjudged: SatellitePass, findings: MissionFindings, mission: Mission, platform: str) -> SatellitePass:
-    """Complete a pass with the findings of the check at the mid-time of the pass."""
+    """Add the findings of the check at the mid-time to a pass, and return the completed pass."""
     path = getattr(mission.platforms, platform).path
     row, requirement, utilization, reason = _deciding(findings)
     return unjudged._replace(
@@ -395,8 +395,9 @@ def _judged(unjudged: SatellitePass, findings: MissionFindings, mission: Mission
 def _deciding(findings: MissionFindings) -> tuple[str | None, str | None, float | None, str]:
     """Find the row, key and utilization of the requirement that decides, and the reason for the mission's status.
 
-    Among requirements with the status of the mission, the one with the highest utilization decides. If no requirement
-    has this status, a row or a warning about the whole mission decides. The utilization is None if nothing is judged.
+    Among the requirements that have the same status as the mission, the one with the highest utilization decides. If
+    no requirement has this status, a row or a warning about the whole mission decides. The utilization is None if
+    nothing is judged.
     """
     worst = min(findings.requirements, key=lambda each: (RANK[each.status], -(each.utilization or 0.0)))
     if worst.status == findings.status:

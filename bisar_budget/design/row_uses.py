@@ -1,7 +1,8 @@
 """Utilizations of the rows of a budget for given sizes of errors, and the contribution of each error to each row.
 
-Each row that can fail has an allowed utilization. An error adds a power of its size to the row: the square if errors
-combine by root-sum-square or powers add, the size itself if errors add linearly. Values are in SI and radians.
+The utilization of a row is its error divided by its limit. Each row that can fail has an allowed utilization. An
+error adds a power of its size to the row: the square if errors combine by root-sum-square or powers add, the size
+itself if errors add linearly. Values are in SI and radians.
 """
 
 import math
@@ -28,12 +29,12 @@ from bisar_budget.mission.changes import ACCEPTED_ERRORS
 from bisar_budget.mission.model import MetricSplits, Mission
 from bisar_budget.mission.quantities import QuestionError, tree_of, with_number
 
-PROBE_FACTORS = (0.8, 1.2)  # of a size, at which the effect of an error is measured
-_MAX_STEP_RATIO = 3.0  # of utilization to allowed utilization, after a step of the search
-_SURE_FRACTION = 1 - 1e-5  # of a limit, because a single case settles to other last digits
-_END_FRACTION = 0.995  # of the size without an image, which is found to 0.1 %
+PROBE_FACTORS = (0.8, 1.2)  # factors of a size at which the effect of an error is measured
+_MAX_STEP_RATIO = 3.0  # largest ratio of utilization to allowed utilization after a step of the search
+_SURE_FRACTION = 1 - 1e-5  # of a limit, because a check of a single case differs in the last digits
+_END_FRACTION = 0.995  # of the smallest size without an image, which is known to 0.1 %
 _ROW_ROUNDING_FRACTION = 1e-13  # of a row; a smaller part of an error is a rounding error
-# First words of the ids of rows without a requirement: effects that no row takes, and sizes beyond a file's bounds.
+# First words of the ids of rows without a requirement: effects that belong to no row, and largest sizes in a file.
 NEGLIGIBLE, LARGEST_ACCEPTED = "negligible", "accepted"
 _WARN_ONLY = ("autofocus_pull_in",)  # kinds of rows that warn and never fail
 _HAVE_THEIR_OWN_ROW = (Why.EFFECT_NOT_TAKEN, Why.AIR_STAYS)  # reasons of rows without a number; see `uses`
@@ -49,7 +50,8 @@ _AS_COMBINED = (
 class RowUses(NamedTuple):
     """Utilizations of all rows that can fail, with the ids and requirements of the rows.
 
-    `uses` are the utilizations, (rows, cases). `powers` are the powers of sizes that add up in each row, (rows,).
+    `uses` are the utilizations, (rows, cases). `powers` are the exponents of the rows, (rows,): 1 if the errors of a
+    row add linearly, 2 if their squares add.
     """
 
     ids: Sequence[str]
@@ -70,9 +72,9 @@ class Near(NamedTuple):
     sizes : (sizes,)
         The sizes of the specified errors.
     part : (rows, sizes)
-        Contribution of each error to the power of the utilization.
+        Contribution of each error to the utilization of each row, raised to the power of the row.
     room : (rows,)
-        Part of the power of the allowed utilization that is left for the specified errors.
+        Part of the allowed utilization, raised to the power of the row, that is left for the specified errors.
     is_limit : (rows,)
         Whether any specified error contributes to the row.
     is_free : (sizes,)
@@ -142,7 +144,10 @@ class SpecifiedMission:
         self.largest = np.array([error.largest for error in self.specified])
 
     def _equal(self, mission: Mission) -> Iterator[SetValue]:
-        """Changes that replace balanced shares by equal shares, because the balancing errors are still unknown."""
+        """Yield the changes that replace balanced shares by equal shares.
+
+        Balanced shares depend on the declared errors, which are still unknown.
+        """
         split = mission.allocation.split
         key = "allocation.split"
         if isinstance(split, MetricSplits):
@@ -152,19 +157,23 @@ class SpecifiedMission:
             yield SetValue(key, "equal")
 
     def with_values(self, texts: Sequence[str]) -> Mission:
-        """Read the mission with a text for the size of each specified error; an empty text changes nothing."""
+        """Read the mission with a new size for each specified error.
+
+        `texts` are the sizes as texts, in the order of the specified errors. An error with an empty text is not
+        changed.
+        """
         return self._read(
             [SetValue(error.key, text) for error, text in zip(self.specified, texts, strict=True) if text]
         )
 
     def _read(self, changes: Sequence[SetValue]) -> Mission:
-        """Read the mission with changes; waivers and specifications are removed."""
+        """Read the mission with changes, and remove its waivers and specifications."""
         return self.variation.read([*self.equal, *changes])._replace(waivers=(), specifications={})
 
     def judged(self, sizes: Floats, *, is_of_sums: bool = True) -> JudgedMission:
         """Judge the mission with the specified errors set to sizes, (sizes, cases).
 
-        Only the rows of combined errors are judged; without `is_of_sums` also the rows of single errors.
+        With `is_of_sums` only the rows of combined errors are judged, otherwise the rows of single errors too.
         """
         mission = self.stated
         for error, column in zip(self.specified, sizes, strict=True):
@@ -214,23 +223,25 @@ class SpecifiedMission:
         return RowUses(ids, requirements, np.array(powers), np.array(uses))
 
     def _power(self, kind: str) -> float:
-        """Power of the sizes that adds up in rows of a kind: 1 for linear sums, 2 for sums of squares."""
+        """Exponent of rows of a kind: 1 if the errors add linearly, 2 if their squares add."""
         is_summed = self.combine == "sum" and kind in _AS_COMBINED
         return 1.0 if is_summed or kind in _WARN_ONLY else 2.0
 
     def allowed(self, ids: Sequence[str]) -> Floats:
-        """Allowed utilizations of rows, (rows,): 1 minus the reserve, less a small margin.
+        """Compute the allowed utilizations of rows, (rows,): 1 minus the reserve, less a small margin.
 
-        Rows without a requirement have no reserve. Rows for the end of the image have a margin of at least 0.5 %.
+        Rows without a requirement have no reserve. Rows for the largest size with an image have a margin of at least
+        0.5 %.
         """
         usual = (1 - self.reserve) * _SURE_FRACTION
         most = {NEGLIGIBLE: _SURE_FRACTION, END_OF_IMAGE: min(usual, _END_FRACTION), LARGEST_ACCEPTED: _SURE_FRACTION}
         return np.array([most.get(row.partition(".")[0], usual) for row in ids])
 
     def near(self, sizes: Floats) -> Near | None:
-        """Compute the utilizations of all rows at sizes (sizes,), and with each size 20 % smaller and larger.
+        """Compute the utilizations of all rows at sizes (sizes,), and with each size alone 20 % smaller and larger.
 
-        None if a utilization exceeds three times the allowed one, or if a row has no room for the specified errors.
+        Returns None if a utilization exceeds three times the allowed one, or if a row has no room for the specified
+        errors.
         """
         count = sizes.size
         cases = np.repeat(sizes[:, None], 2 * count + 1, axis=1)

@@ -45,15 +45,16 @@ from bisar_budget.mission.tree import Content
 from bisar_budget.workers import Progress, unseen
 
 MIN_SHOWN_CHANGE_FRACTION = 1e-4  # of a utilization; a smaller change is not shown
-COMPARED_CHANGE_FRACTION = 0.01  # of every number, for which effects are compared
-_MAX_LOG_RATIO = math.log(1e6)  # a number that would have to change by a larger ratio decides nothing
+COMPARED_CHANGE_FRACTION = 0.01  # change of every number for which effects are compared
+_MAX_LOG_RATIO = math.log(1e6)  # a number that would have to change by a larger ratio has no practical effect
 _UTILIZATION_ROUNDING_FRACTION = 1e-9  # of a utilization; a smaller difference of checks is a rounding error
-_RELAXED_FACTOR = 2.0  # of an error that is relaxed
-_EQUAL_FRACTION = 1e-9  # of a declared value; a smaller difference is none
-# Half of a difference. A power law of exponent p is wrong by (p - 1)(p - 2)/6 of its square, 2e-4 for the inverse
-# square; allowables by exact ranges end their search within 1e-5 of a limit, which is 1e-3 of a hundredth.
+_RELAXED_FACTOR = 2.0  # factor by which an error is relaxed
+_EQUAL_FRACTION = 1e-9  # of a declared value; a smaller difference is a rounding error
+# Half the width of a central difference, as a fraction h of the number. For a power law with the exponent p the slope
+# is wrong by the fraction (p - 1)(p - 2)h²/6, which is 2e-4 for p = -2. Allowables from exact ranges are within 1e-5
+# of a limit, which is 1e-3 of a change by 1 %.
 DIFFERENCE_STEP_FRACTION = 0.01
-# Sines and decibels bend faster than powers: 3e-6 of a slope, and 1.4e-4.
+# With these steps the slopes are wrong by the fraction 3e-6 for sines, and 1.4e-4 for decibels.
 DIRECTION_STEP = math.radians(0.25)
 LEVEL_STEP = 0.25  # dB
 _EARTH_RADIUS_M = 6.371e6  # mean radius
@@ -76,24 +77,25 @@ class Slope(NamedTuple):
     key, text : str
         Key of the number, and its value as the file writes it.
     value, unit : float, str
-        The value in its unit; for a covariance 1, the factor by which its sigmas are multiplied.
+        The value in its unit. For a covariance the value is 1, the factor by which its sigmas are multiplied.
     per, per_text : float, str
-        Increase of the number for which `change` is given: in SI with the sign of the value, and in words.
+        Increase of the number that causes `change`: in SI with the sign of the value, and in words.
     step : float
         Step of the difference, in SI. A central difference spans two steps.
     difference : str
-        `central`, or `forward` or `backward` over two steps if the other side has no mission.
+        `central`; or `forward` or `backward` over two steps, if the mission is invalid on the other side.
     change, row_change : float
         Change of the worst utilization, and of the requested row's utilization; None without a requested row.
     row_below, row_above : str
-        Rows with the worst utilization at the end of smaller magnitude, and at the end of larger magnitude.
+        Rows with the worst utilization at the lower and at the upper end of the difference, by magnitude.
     is_mixed : bool
-        Whether another row is the worst at one end. The change then mixes the slopes of two rows.
+        Whether the row with the worst utilization is another one at an end. The change then mixes the slopes of two
+        rows.
     part : str
         Part of the catalogue from which the number is taken; empty if the file states it.
     measure : float
-        The increase `per` in a measure that is common to all numbers: a fraction of the number, of a radian, of a
-        power, or of a slant range.
+        The increase `per` as a ratio, so that numbers of all kinds can be compared: to the number itself, to a
+        radian, to a power, or to a slant range.
     """
 
     key: str
@@ -114,31 +116,31 @@ class Slope(NamedTuple):
 
     @property
     def given(self) -> str:
-        """The value as the file writes it, and the part that it is taken from."""
+        """Value as the file writes it, with the part of the catalogue from which it is taken."""
         return f"{self.text} ({self.part})" if self.part else self.text
 
     @property
     def effect(self) -> float:
-        """Change of the requested row, or else of the worst utilization."""
+        """Change of the utilization of the requested row, or of the worst utilization without a requested row."""
         return self.change if self.row_change is None else self.row_change
 
     @property
     def even_effect(self) -> float:
-        """Effect of a change that is the same for all numbers in their common measure; see `measure`."""
+        """Effect of an increase by 1 % in the measure that is common to all numbers; see `measure`."""
         return self.effect * COMPARED_CHANGE_FRACTION / self.measure
 
     @property
     def is_proportional(self) -> bool:
-        """Whether the change of the number is a fraction of its value."""
+        """Whether `per` is 1 % of the value of the number."""
         return self.per_text == "1 %"
 
 
 class Relaxed(NamedTuple):
-    """Effect on the other errors if one declared error is doubled and the shares are balanced again.
+    """Effect of one doubled error on the other errors of a mission, whose shares are then balanced again.
 
     `shares_before` and `shares_after` are the shares of transmitter and receiver. `transmitter` and `receiver` each
     have the worst row after the doubling, and the worst utilization before and after it. Only judged rows of other
-    errors count; None if there are no such rows.
+    errors are included; None if there are no such rows.
     """
 
     key: str
@@ -181,15 +183,15 @@ class Sensitivity(NamedTuple):
 
     @property
     def asked(self) -> float:
-        """Utilization of the requested row, or else the worst utilization."""
+        """Utilization of the requested row, or the worst utilization without a requested row."""
         return self.utilization if self.row_utilization is None else self.row_utilization
 
     def to_limit(self, slope: Slope) -> float | None:
         """Change of one number, with its sign and in its unit, at which the utilization would be 1.
 
-        The utilization is extrapolated as a power of the number, or as an exponential of a level or an angle. This is
-        exact for numbers that follow this law, such as the aperture time or an error. None if the change is more than
-        a factor of a million or half a turn.
+        The utilization is extrapolated as a power of the number, or as an exponential function of a level or an
+        angle. This is exact for numbers that follow such a law, such as the aperture time or an error. Returns None
+        if the change is more than a factor of a million, or more than half a turn.
         """
         if not slope.effect or self.asked <= 0:
             return None
@@ -214,12 +216,12 @@ class Sensitivity(NamedTuple):
 
 # ---------------------------------------------------------------- differences
 class Stated(NamedTuple):
-    """A number of the file that is varied; `text` is the number as the file states it.
+    """A number of the mission file that is varied; `text` is the number as the file states it.
 
-    `step` is half of the central difference. `per` is the change for which effects are given, in SI, and `per_text`
-    is this change in words. `part` is this change in the common measure: a fraction of the number, of a radian, of a
-    power, or of the smaller slant range. `others` are further numbers that change with this one, because shares sum
-    to 1. For a covariance the value is a factor by which all sigmas are multiplied.
+    `step` is half of the central difference. `per` is the increase for which effects are given, in SI, and `per_text`
+    is this increase in words. `part` is this increase as a ratio to the number itself, to a radian, to a power, or to
+    the smaller slant range. `others` are further numbers that change with this one: the other shares, because all
+    shares sum to 1. For a covariance the value is a factor by which all sigmas are multiplied.
     """
 
     number: Number
@@ -232,7 +234,7 @@ class Stated(NamedTuple):
     others: tuple[Number, ...] = ()
 
     def at(self, value: float) -> Mapping[Number, float]:
-        """New values of all numbers that change if this number is set to `value`."""
+        """Compute the new values of all numbers that change if this number is set to `value`."""
         remainder = 1 - self.value
         further = {share: (share.value or 0.0) * (1 - value) / remainder for share in self.others}
         return {self.number: value, **further}
@@ -312,10 +314,11 @@ def sensitivity(
 
 
 class _Uses(NamedTuple):
-    """The worst row in one case, with its requirement and utilization, and the utilizations of two further rows.
+    """Utilizations of a mission in one case.
 
-    `row` is the utilization of the requested row, or None. `of_worst` is the utilization of the row that is the worst
-    with the numbers of the file.
+    `worst_row` is the row with the worst utilization `worst`, and `requirement` sets its limit. `row` is the
+    utilization of the requested row, or None. `of_worst` is the utilization of the row that is the worst with the
+    numbers of the file.
     """
 
     worst_row: str
@@ -326,12 +329,12 @@ class _Uses(NamedTuple):
 
     @property
     def is_passed(self) -> bool:
-        """Whether the worst row here is another one than with the numbers of the file, by more than rounding."""
+        """Whether another row is worse, by more than rounding, than the worst row with the numbers of the file."""
         return self.worst - self.of_worst > _UTILIZATION_ROUNDING_FRACTION * self.worst
 
 
 class _Neighbours:
-    """Checks a mission with single numbers changed by one or two steps, up or down, and computes slopes."""
+    """Checks of a mission with one number changed by one or two steps up or down, from which slopes follow."""
 
     def __init__(
         self, variation: Variation, numbers: Sequence[Stated], worst: str | None, row: str | None, today: date
@@ -345,10 +348,11 @@ class _Neighbours:
         self.table = Table(asked, mission, tuple(varied.values()))
 
     def uses(self, cases: Sequence[tuple[Stated | None, int]], progress: Progress = unseen) -> list[_Uses | str]:
-        """Check cases, in each of which one number is a number of steps from its value.
+        """Check the mission in several cases, in each of which one number is changed.
 
-        A case (None, 0) is the mission of the file. Returns the utilizations of each case, or the reason why it has
-        no mission or no utilization.
+        A case is a pair of the changed number and the number of steps, negative for a decrease. The case (None, 0) is
+        the mission of the file. Returns the utilizations of each case, or the reason why the mission is invalid or
+        has no utilization.
         """
         values = {key: np.full(len(cases), value) for key, value in self.values.items()}
         for case, (number, steps) in enumerate(cases):
@@ -370,9 +374,10 @@ class _Neighbours:
         return uses
 
     def slopes(self, here: _Uses, progress: Progress) -> Iterator[Slope | Skipped]:
-        """Yield the slope of each number from a central difference, or from a one-sided one if a side has no mission.
+        """Yield the slope of each number, from a central difference if possible.
 
-        `here` are the utilizations with the numbers of the file.
+        If the mission is invalid on one side of the value, the difference is one-sided. `here` are the utilizations
+        with the numbers of the file.
         """
         sides = [(number, side) for number in self.numbers for side in (-1, 1)]
         checked = iter(self.uses(sides, progress) if sides else ())
@@ -400,7 +405,10 @@ class _Neighbours:
     def _slope(
         self, number: Stated, here: _Uses, kind: str, uses: Sequence[_Uses], weights: Sequence[float]
     ) -> Slope:
-        """Compute the slope of a number as the weighted sum of utilizations at rising values of the number."""
+        """Compute the slope of a number: a weighted sum of the utilizations `uses` at rising values of the number.
+
+        `kind` is the kind of difference: `central`, `forward` or `backward`.
+        """
 
         def change(values: Iterator[float]) -> float:
             return number.per / number.step * math.fsum(map(math.prod, zip(weights, values, strict=True)))
@@ -450,7 +458,10 @@ Leaf = tuple[str, Reader[object], Content, Mapping[str, object] | None]
 
 
 def _leaves(reader: Reader[object], value: object, path: tuple[str, ...], above: JsonObject | None) -> Iterator[Leaf]:
-    """Yield the key, reader and value of every leaf of a file; the fourth item is a share's section, else None."""
+    """Yield every leaf of the tree of a mission file: its key, its reader, its value, and the shares of its section.
+
+    The shares are None if the leaf is no share.
+    """
     reader = form_of(reader, value)
     children: Sequence[tuple[str, object]] = ()
     if isinstance(value, dict):
@@ -469,7 +480,10 @@ def _leaves(reader: Reader[object], value: object, path: tuple[str, ...], above:
 
 
 def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, object] | None) -> Stated | Skipped:
-    """Choose the step of a number, or return the reason why it has none; `shares` are all shares of its section."""
+    """Choose the step by which a number is varied, or return the reason why the number cannot be varied.
+
+    `shares` are all shares of the section of the number; None if the number is no share.
+    """
     value = number.value or 0.0
     if number.reader is LATITUDE or number.key.endswith("longitude"):
         step = DIFFERENCE_STEP_FRACTION * nearest_m / _EARTH_RADIUS_M
@@ -495,7 +509,7 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, ob
 
 
 def _no_number(key: str, reader: Reader[object]) -> str:
-    """Reason why a key has no number that can vary; empty for names and remarks, which have no effect."""
+    """Explain why the value of a key is not varied; the text is empty for names and remarks, which have no effect."""
     kinds = (
         ("is a whole number", isinstance(reader, Whole | Version)),
         ("is a choice", isinstance(reader, Choice)),
@@ -508,7 +522,7 @@ def _no_number(key: str, reader: Reader[object]) -> str:
 
 # ---------------------------------------------------------------- shares that follow the declared errors
 def relaxed_errors(mission: Mission, judged: JudgedMission, today: date) -> Iterator[Relaxed]:
-    """Yield, for each declared error, the effect of doubling it; `judged` is the mission before any doubling."""
+    """Yield the effect of doubling each declared error; `judged` is the judged mission without doubled errors."""
     for key in _declared_errors(mission):
         try:
             doubled = scaled(mission, key, _RELAXED_FACTOR)
@@ -525,7 +539,7 @@ def relaxed_errors(mission: Mission, judged: JudgedMission, today: date) -> Iter
 
 
 def _declared_errors(mission: Mission) -> Iterator[str]:
-    """Keys of the declared errors of all platforms and sections; figures of parts of the catalogue are included."""
+    """Yield the keys of the declared errors of all platforms and sections, including figures of catalogue parts."""
     sections: list[tuple[str, object, Sequence[str], int]] = []  # key, section, its keys, and the length of a list
     for name in PLATFORMS:
         error, key = getattr(mission.platforms, name).motion_error, f"platforms.{name}.motion_error"
@@ -555,9 +569,9 @@ def _shares(judged: JudgedMission) -> tuple[float, float]:
 
 
 def _of_others(owner: str, before: Sequence[Judged], after: Sequence[Judged]) -> tuple[str, float, float] | None:
-    """Worst row of a platform after a doubling, and the worst utilization before and after it.
+    """Find the worst row of a platform after an error is doubled, and the worst utilization before and after.
 
-    Only judged rows whose own error is unchanged count; None without such a row.
+    Only judged rows whose own error is unchanged are included. Returns None if there is no such row.
     """
     now, kept = {row.subject.id: row for row in after}, []
     for row in before:

@@ -1,4 +1,4 @@
-"""Solve a mission for one of its numbers: every value at which compliance begins or ends.
+"""Search for every value of one number of a mission at which compliance begins or ends.
 
 The search samples the range. Between two samples with different compliance it brackets the border. If the worst
 utilization has a maximum or minimum between samples, the search finds it first, because compliance may change and
@@ -54,7 +54,7 @@ class SolveSettings:
         Number of samples of a range, and of a circle. A circle has a sample every 2 degrees, because geometry changes
         fast near parallel gradients.
     border_fraction : float
-        Largest distance between the two sides of a border before they are rounded, as a fraction of the value.
+        Largest distance between the values on the two sides of a border before rounding, as a fraction of the value.
     max_turns_count : int
         Largest number of maxima and minima of the utilization that are searched.
     turn_steps : int
@@ -227,9 +227,9 @@ def solve(
     """Find every value of one number of a mission at which compliance begins or ends.
 
     Arguments are those of `bisar_budget.solve`; `between` is `A..B` with units, by default 0.1 to 10 for a factor.
-    With the target `fail` a value complies if `check` exits with 0, with the target `warn` if `check --strict` does.
-    `progress` is called with the number of finished values and the number of all values. Values of the solution are
-    in SI.
+    With the target `fail` a value complies if the command `check` would exit with 0, with the target `warn` if
+    `check --strict` would. `progress` is called with the number of finished values and the number of all values.
+    Values of the solution are in SI.
 
     Raises
     ------
@@ -273,10 +273,10 @@ def solve(
 
 
 def _nearest(states: Sequence[State]) -> State:
-    """First state with the smallest margin if all states comply, otherwise the first with the smallest excess.
+    """Find the first state with the smallest margin if all states comply, otherwise with the smallest excess.
 
-    Waived states come before other states that do not comply. A state that is not evaluated exceeds no limit, so it
-    counts as the smallest excess.
+    If some states are waived, only these are considered. A state that is not evaluated exceeds no limit, so its
+    excess is taken as the smallest.
     """
     if all(state.complies for state in states):
         uses = [state.utilization or 0.0 for state in states]
@@ -401,7 +401,7 @@ class _Search:
         return tuple(_crossing(low, high, next(rounded), next(rounded)) for low, high in narrow)
 
     def _searched(self, searches: Sequence[Search[SearchT]]) -> list[SearchT]:
-        """Run several searches, and check the values that they need together; return their results."""
+        """Run several searches to their ends, and return their results; needed values are checked all at once."""
         states_by_value: dict[float, State] = {}
         while True:
             results = [search(states_by_value) for search in searches]
@@ -414,7 +414,7 @@ class _Search:
             states_by_value.update(zip(values, self.states(values), strict=True))
 
     def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[float, str]:
-        """Texts of all values of the solution, by value, as they would be written in a mission file."""
+        """Write all values of the solution as texts for a mission file; returns the texts by value."""
         values = [self.range.low, self.range.high, nearest.value]
         values += [state.value for crossing in crossings for state in (crossing.inside, crossing.outside)]
         values += [] if self.number.value is None else [self.number.value]
@@ -426,8 +426,8 @@ def _bracketed(
 ) -> tuple[State, State] | set[float]:
     """Bisect the interval between two states with different compliance until it is narrow.
 
-    Returns the states at both ends, or, if a state is missing in `states_by_value`, the set of values that the next
-    `levels` steps may need. `least` limits the width for values near 0.
+    Returns the states at both ends of the interval. If a state is missing in `states_by_value`, the function returns
+    the set of values that the next `levels` steps may need. `least` limits the width for values near 0.
     """
     while high.value - low.value > SOLVE_SETTINGS.border_fraction * max(abs(low.value), abs(high.value), least):
         middle = (low.value + high.value) / 2
@@ -441,10 +441,10 @@ def _bracketed(
 
 
 def _ahead(points: Callable[[float, float], tuple[float, ...]], low: float, high: float, levels: int) -> set[float]:
-    """All values that the next `levels` steps of a search may need.
+    """Find all values that the next `levels` steps of a search may need.
 
-    `points` gives the values that a step checks in an interval. The next interval is below the last of these values,
-    or above the first.
+    `points` is a function that returns the values to check in an interval. The next interval of the search is either
+    the part below the last of these values or the part above the first.
     """
     values = points(low, high)
     if not levels or not low < values[0] < high:
@@ -480,10 +480,10 @@ def _turns(states: Sequence[State]) -> list[tuple[float, float, State]]:
 def _turn(
     low: float, high: float, here: State, levels: int, states_by_value: Mapping[float, State]
 ) -> State | set[float] | None:
-    """Search near a maximum or minimum of the utilization for a state with another compliance than `here`.
+    """Search near a maximum or minimum of the utilization for a state whose compliance differs from `here`.
 
-    Returns the state, None if there is none, or, if a state is missing in `states_by_value`, the set of values that
-    the next steps may need.
+    Returns the state, or None if the search finds none. If a state is missing in `states_by_value`, the function
+    returns the set of values that the next `levels` steps may need.
     """
     for _ in range(SOLVE_SETTINGS.turn_steps):
         values = _golden(low, high)
@@ -515,5 +515,5 @@ def _crossing(low: State, high: State, below: State, above: State) -> Crossing:
 
 
 def _sign(state: State) -> float:
-    """Sign of the utilization change that may end the compliance of a state: 1 if it complies, otherwise -1."""
+    """Sign of the change of utilization that can change compliance: 1 if the state complies, otherwise -1."""
     return 1.0 if state.complies else -1.0

@@ -22,7 +22,7 @@ from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.quantities import Number, QuestionError, as_number, number_of
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
-ORDERED_DIGITS = 2  # of an ordered number
+ORDERED_DIGITS = 2  # number of significant digits of an ordered number
 _SILENT_DB = -400.0  # level without an error
 # Units of ordered sizes, if the file states no number: the first in which the number is at least 1.
 _ORDERED_IN: Mapping[Dimension, tuple[str, ...]] = {
@@ -50,9 +50,9 @@ _TINY_BY_DIMENSION: Mapping[Dimension, float] = {
 }
 _TINY_SIZE = 1e-18
 _LEVELLED_FORMS = ("phase_noise", "power_law", "allan_deviation", "spurs")  # forms of noise that a level shifts
-_OFFSETS_HZ = (1.0, 10.0, 100.0, 1e3)  # of the remark with the phase noise of an ordered level
-_OFFSETS_PER_DECADE = 20  # at which spectra are compared
-_LEAST_CYCLES = 0.1  # per aperture, of phase noise that counts
+_OFFSETS_HZ = (1.0, 10.0, 100.0, 1e3)  # offsets in the remark about the phase noise of an ordered level
+_OFFSETS_PER_DECADE = 20  # number of offsets at which spectra are compared
+_LEAST_CYCLES = 0.1  # per aperture; slower phase noise has no effect
 _DENSITY_ROUNDING_FACTOR = 1 + 1e-9
 
 
@@ -69,7 +69,7 @@ class Specified(NamedTuple):
 
     @property
     def nothing(self) -> float:
-        """Size that stands for no error: 0, or the amplitude of a very low level."""
+        """Size that represents the absence of the error: 0, or the amplitude of a level of -400 dB."""
         return float(10 ** (_SILENT_DB / 20)) if self.number.is_level else 0.0
 
     @property
@@ -80,7 +80,7 @@ class Specified(NamedTuple):
 
     @property
     def tiny(self) -> float:
-        """A size so small that all effects of the error are proportional to it."""
+        """Size in SI that is so small that all effects of the error are proportional to it."""
         return _TINY_BY_DIMENSION.get(self.number.dimension, _TINY_SIZE)
 
     def numbers(self, sizes: Floats) -> Floats:
@@ -92,11 +92,11 @@ class Specified(NamedTuple):
         return levels
 
     def text(self, size: float) -> str:
-        """Text of a size as in a mission file, in SI."""
+        """Write a size as text for a mission file, in the SI unit, or in dB for a level."""
         return f"{float(self.numbers(np.array(size)))!r} {self.number.dimension.si}".rstrip()
 
     def unit_of(self, value: float) -> str:
-        """Unit in which a number is ordered: the unit of the file, or else a unit that suits its magnitude."""
+        """Choose the unit in which a number is ordered: the unit of the file, or else a unit that suits the size."""
         dimension = self.number.dimension
         if self.number.value is not None or dimension not in _ORDERED_IN:
             return self.number.unit
@@ -104,7 +104,7 @@ class Specified(NamedTuple):
         return next((unit for unit in candidates if abs(value) >= np.divide(*dimension.scales[unit])), candidates[-1])
 
     def said(self, value: float) -> str:
-        """Text of a number with four digits, in the unit in which it is ordered."""
+        """Write a number as text with four digits, in the unit in which it is ordered."""
         unit = self.unit_of(value)
         factor, divisor = self.number.dimension.scales[unit]
         return f"{value / factor * divisor:.4g} {unit}".rstrip()
@@ -195,9 +195,10 @@ def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Num
 
 
 def multiplied(keys: Sequence[str]) -> tuple[str, str] | None:
-    """Find two keys whose values are multiplied in the mission, so that only their product is limited.
+    """Find two keys whose values are multiplied in the mission, so that requirements limit only their product.
 
-    The first key is a level, and the second key is a figure that the level shifts. None if there are no such keys.
+    The first key is a level, and the second key is a figure that the level shifts. Returns None if there are no such
+    keys.
     """
     for key in keys:
         *section, name = parts_of(key)
@@ -212,9 +213,9 @@ def multiplied(keys: Sequence[str]) -> tuple[str, str] | None:
 
 # ---------------------------------------------------------------- parts that meet a specification
 def catalogue(mission: Mission) -> list[Entry]:
-    """Parts that a mission file may name: the parts of this package, and the parts of the mission's project.
+    """List the parts that a mission file may name: the parts of this package and of the mission's project.
 
-    Empty if a file of the project is no valid part.
+    The list is empty if a file of the project is no valid part.
     """
     try:
         return list(entries(folders(folder_of(mission.file))))
@@ -249,7 +250,11 @@ def _is_satellite(platform: Platform) -> bool:
 
 
 def _quiet_oscillators(mission: Mission, name: str, level: float, candidates: Sequence[Entry]) -> Iterator[str]:
-    """Yield the ids of oscillators with phase noise nowhere above a platform's spectrum, shifted by a level [dB]."""
+    """Yield the ids of the oscillators that meet an ordered level of phase noise [dB].
+
+    The phase noise of such an oscillator is nowhere above the spectrum of the platform's oscillator, shifted by
+    `level`.
+    """
     carrier, pieces = _spectrum(mission, name)
     aperture = mission.collection.aperture_time
     last = max(piece.high for piece in pieces)
@@ -267,7 +272,10 @@ def _quiet_oscillators(mission: Mission, name: str, level: float, candidates: Se
 
 
 def ordered_noise(mission: Mission, specified: Specified, level: float) -> str:
-    """Text with the phase noise of an oscillator at an ordered level [dB]; empty if the error is not such a level."""
+    """Write the phase noise of an oscillator at an ordered level [dB] as text.
+
+    The text is empty if the specified error is not the level of an oscillator.
+    """
     _, name, *below = parts_of(specified.key)
     if below != ["oscillator", "level"]:
         return ""
@@ -280,7 +288,10 @@ def ordered_noise(mission: Mission, specified: Specified, level: float) -> str:
 
 
 def _spectrum(mission: Mission, name: str) -> tuple[float, Sequence[PowerLawPiece]]:
-    """Frequency of a platform's oscillator, or else of the radar [Hz], and the phase spectrum there at level 0 dB."""
+    """Find the frequency of a platform's oscillator [Hz], and its phase noise spectrum at this frequency.
+
+    Without a frequency of the oscillator it is the centre frequency of the radar. The level of the spectrum is 0 dB.
+    """
     oscillator = getattr(mission.platforms, name).oscillator
     carrier = oscillator.frequency or mission.radar.center_frequency
     return carrier, noise_of(oscillator.noise_alone, carrier, mission.collection.aperture_time).pieces

@@ -1,6 +1,7 @@
-"""Check a mission in many cases: values are given as arrays, results are returned as columns.
+"""Checks of a mission in many cases: values are given as arrays, and results are returned as columns.
 
-The cases are checked in parts, each when it is needed, so memory does not grow with the number of cases.
+The cases are checked in parts. A part is checked only when its results are needed, so memory does not grow with the
+number of cases.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,10 +35,10 @@ from bisar_budget.mission.quantities import Choices, Number, QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.workers import MapBlocks, in_processes
 
-_SLOW_FRACTION = 1 / 8  # of cases that are read one by one, from which processes share the cases
-_MIN_SHARED_PART_COUNT = 8  # from which it is worth to start processes
-_PART_CASES = 8192  # of a part; their arrays stay in a processor's cache
-_READ_PART_CASES = 64  # of a part if each case is read
+_SLOW_FRACTION = 1 / 8  # if a larger fraction of cases is read one by one, processes share the cases
+_MIN_SHARED_PART_COUNT = 8  # for fewer parts it takes longer to start processes
+_PART_CASES = 8192  # number of cases in a part, so that their arrays stay in a processor's cache
+_READ_PART_CASES = 64  # number of cases in a part if each case is read
 
 Block = tuple[int, int, Mapping[str, Values]]  # first case, the one after the last, values of each key
 
@@ -62,14 +63,14 @@ _UNIT_BY_SUFFIX = {"rad": "rad", "db": "dB"}  # by the last word of a field's na
 
 
 class Asked:
-    """A mission, and the cases in which it is to be checked in chunks.
+    """A sweep that is requested: a mission, and the cases in which it is checked.
 
     Arguments are those of `bisar_budget.sweep`. Repeated columns are used once.
 
     Raises
     ------
     QuestionError
-        A column names an unknown row or field, or no value of a key makes a mission.
+        A column names an unknown row or field, or the mission is invalid with every value of a key.
     """
 
     def __init__(
@@ -97,12 +98,15 @@ class Asked:
                 self._hold_to_a_mission(number)
 
     def _chosen(self) -> Iterator[Mission]:
-        """Yield the missions with each single word of the varied keys; words that make no mission are left out.
+        """Yield one mission for each word of each varied key, in which only this key is changed.
+
+        Words with which the mission is invalid are left out.
 
         Raises
         ------
         QuestionError
-            A word is invalid by itself, such as a part that is not in the catalogue; or no word makes a mission.
+            A word is invalid by itself, such as a part that is not in the catalogue. Or the mission is invalid with
+            every word of a key, for the same reason.
         """
         for choices, words in words_of(self.cases):
             problems = set()
@@ -123,7 +127,10 @@ class Asked:
                 raise QuestionError(f"{choices.key}: no value of it makes a mission: {problem}")
 
     def _hold_to_a_mission(self, number: Number) -> None:
-        """Raise `QuestionError` if the first, middle and last value of a key make no mission, for the same reason."""
+        """Raise `QuestionError` if no tried value of a key gives a valid mission.
+
+        The first, the middle and the last value are tried. The error is raised if all three fail for the same reason.
+        """
         problems = set()
         for index in {0, self.cases.count // 2, self.cases.count - 1}:
             values = self.cases.values(index, index + 1)
@@ -152,7 +159,7 @@ class Asked:
             yield Column(name, unit, _FIELDS[field].format(row), is_text=is_status(name))
 
     def swept(self, parts: Iterator[Part]) -> Swept:
-        """Make the sweep from an iterator over its parts."""
+        """Make the description of the sweep; `parts` is the iterator over its checked parts."""
         varied = [
             Column(
                 each.key, each.dimension.si if isinstance(each, Number) else "", "Varies.", isinstance(each, Choices)
@@ -169,12 +176,15 @@ class Asked:
         )
 
     def checked(self, jobs: int = 1) -> Swept:
-        """Make the sweep; `jobs` processes check its parts when they are needed."""
+        """Make the sweep, whose parts are checked by `jobs` processes when they are needed."""
         return self.swept(self.shared_out(self.chunks.starts, jobs))
 
     @cached_property
     def chunks(self) -> "Chunks":
-        """Division of the cases into chunks, which are smaller if many cases of a sample are read one by one."""
+        """Division of the cases into chunks.
+
+        Chunks are smaller if many cases of a sample cannot be checked as arrays, but have to be read one by one.
+        """
         cases, is_slow = self.cases, False
         if cases.count > _READ_PART_CASES:
             indices = np.linspace(0, cases.count - 1, _READ_PART_CASES).astype(int)
@@ -185,7 +195,7 @@ class Asked:
 
     @cached_property
     def travelling(self) -> Question:
-        """The question, with the content of the files that the mission names, for use in other processes."""
+        """Question for other processes; it contains the content of all files that the mission names."""
         words = [SetValue(choices.key, word) for choices, chosen in words_of(self.cases) for word in chosen]
         return self.question._replace(named=named_by(self.mission, words))
 
@@ -236,7 +246,7 @@ def _table(question: Question) -> Table:
 
 
 def part_of(question: Question, block: Block) -> Part:
-    """Check a block of cases; other processes call this, and each of them keeps the table of the last question."""
+    """Check a block of cases in another process, which keeps the table of its last question."""
     return _table(question).part(*block)
 
 

@@ -1,9 +1,9 @@
 """The case table: checks of one mission in many cases, for sweeps, solutions, sensitivities and comparisons.
 
-If a number affects nothing in the mission but its own value, an array with the values of all cases replaces it. Other
-cases are read one by one, like a file with the numbers of the case, and missions of the same structure are then
-joined into one mission with arrays. In both ways all cases are judged together. Only this module decides which row is
-the worst.
+If no other content of the mission follows from a number, an array with the values of all cases replaces the number.
+Otherwise each case is read like a mission file with the numbers of the case, and missions of the same structure are
+then joined into one mission with arrays. In both ways all cases are judged together. Only this module decides which
+row is the worst.
 """
 
 import math
@@ -99,10 +99,10 @@ _IS_JUDGED = np.array([status.is_judged for status in STATUS.values()])
 
 # ---------------------------------------------------------------- the worst row
 def breaking(target: str) -> frozenset[str]:
-    """Names of the statuses that do not comply, for a target.
+    """Names of the statuses with which a mission does not comply, for a target.
 
-    For the target `fail` these are the statuses that break `check`, for `warn` the statuses that break
-    `check --strict`. `waived` is always included.
+    For the target `fail` these are the statuses with which `check` fails, for `warn` the statuses with which
+    `check --strict` fails. `waived` is always included.
     """
     fails = (name for name, status in STATUS.items() if (status.fails if target == "fail" else status.fails_strict))
     return frozenset([*fails, "waived"])
@@ -111,12 +111,13 @@ def breaking(target: str) -> frozenset[str]:
 def _verdict(
     judged: JudgedMission, by_id: Mapping[str, Judged], row_id: str | None, breaks: Container[str]
 ) -> dict[str, ArrayLike]:
-    """Columns of the verdict in each case: the status of the mission or of a row, and the binding row.
+    """Make the columns of the verdict: the status of the mission or of one row, and the binding row, in each case.
 
     The binding row is the judged row with the highest utilization; among rows that differ only by rounding it is the
     first one. A row that is not evaluated and has no number cannot be the binding row. If the mission does not
     comply, the binding row is one of the rows that break a limit, and a waived row only if no other row breaks one.
-    A case that is not evaluated has no utilization, because it would not belong to the requirement that decides.
+    A case that is not evaluated has no utilization, because the utilization of a row would not belong to the
+    requirement that decides.
     """
     rows = list(judged.rows) if row_id is None else [by_id[row_id]] if row_id in by_id else []
     if not rows:
@@ -163,7 +164,7 @@ def _verdict(
 
 
 def _waived_by(judged: JudgedMission, row_id: str | None, is_waived: Booleans) -> Values:
-    """Ids of the waivers in each case, (cases,), as the file writes them; empty for cases that are not waived."""
+    """Join the ids of the waivers of each case as the file writes them, (cases,); empty if a case is not waived."""
     ids = np.full(is_waived.shape, "", dtype=object)
     for waiver_id, covers in judged.covering(row_id) if is_waived.any() else ():
         extended = np.where(ids == "", "", BETWEEN_WAIVERS).astype(object) + waiver_id
@@ -199,7 +200,7 @@ def standing(judged: JudgedMission, row_id: str | None, breaks: Container[str]) 
 
 
 def hold_to_decisions(judged: Sequence[JudgedMission], row_id: str | None) -> None:
-    """Raise an error if the missions have no row that can decide about compliance.
+    """Raise an error if no row of the missions can decide whether they comply.
 
     Raises
     ------
@@ -221,10 +222,10 @@ def hold_to_decisions(judged: Sequence[JudgedMission], row_id: str | None) -> No
 
 # ---------------------------------------------------------------- the mission with changed values
 class Variation:
-    """Reads a mission again with changed values; changed values are checked like the values of a file.
+    """A mission that can be read again with changed values, which are checked like the values of a file.
 
-    Changes that options made to the mission stay. `model` replaces the gating model of the mission. `named` has the
-    content of the files that the mission names, for machines without these files.
+    Values that options of the command line have changed stay changed. `model` replaces the gating model of the
+    mission. `named` has the content of the files that the mission names, for machines without these files.
     """
 
     def __init__(self, mission: Mission, model: str | None, named: Named | None = None) -> None:
@@ -237,14 +238,14 @@ class Variation:
         return read_tree(self.mission.data, self.mission.file)
 
     def read(self, changes: Sequence[SetValue] = ()) -> Mission:
-        """Read the mission with changed values; raises `MissionError` if they make no mission."""
+        """Read the mission with changed values; raises `MissionError` if the mission is invalid with them."""
         changed_keys = {parts_of(change.key) for change in changes}
         kept = [change for change in self.mission.changes if parts_of(change.key) not in changed_keys]
         mission, tree = self.mission, self.tree.copied()
         return self.parse(tree, mission.data, mission.file, self.model, changes=(*kept, *changes))
 
     def at(self, values: Mapping[Number, float], changes: Sequence[SetValue] = ()) -> Mission:
-        """Read the mission with changes and with numbers in SI; raises `MissionError` if they make no mission."""
+        """Read the mission with changes and new numbers in SI; raises `MissionError` if the result is invalid."""
         numbers = [SetNumber.of(number.key, value, number.dimension.si) for number, value in values.items()]
         return self.read([*changes, *numbers])
 
@@ -277,7 +278,7 @@ class Question(NamedTuple):
 
 
 class Table:
-    """Checks cases of one mission; it can be built from a question in any process.
+    """Table of the cases of one mission, which checks them; any process can build it from a question.
 
     `numbers` are the numbers of the question's keys, by default the numbers of the file. A number with the reader
     `FACTOR` is a factor by which the errors below its key are multiplied.
@@ -305,9 +306,10 @@ class Table:
         }
 
     def watched(self, values: Mapping[str, Values], progress: Progress = unseen) -> dict[str, Values]:
-        """Check all cases with `values` (cases,) by key, and report progress; returns the columns by name.
+        """Check all cases and report progress; returns the columns by name.
 
-        The first reports come early, so that time can be estimated. Later reports are rare, because each costs time.
+        `values` has an array (cases,) for each key. The first reports come early, so that the total time can be
+        estimated. Later reports are rare, because each costs time.
         """
         cases = len(next(iter(values.values())))
         ends = (
@@ -350,7 +352,7 @@ class Table:
         return cases - int(self._arrays(columns, cases)[0].size)
 
     def _columns(self, values: Mapping[str, Values], cases: int) -> dict[str, Values]:
-        """Make the columns of `cases` cases: the given values, and empty columns for the results."""
+        """Make the columns for a number of cases: columns of the given values, and empty columns for the results."""
         columns: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
         columns |= {number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers}
         is_text = {column.name: column.is_text for column in (*GEOMETRY, *VERDICT, WAIVED_BY, REASON)}
@@ -362,7 +364,8 @@ class Table:
     def _by_words(self, columns: Mapping[str, Values]) -> Iterator[tuple["Table", Indices]]:
         """Yield a table for each combination of words, with the indices of its cases.
 
-        If no case with these words makes a mission, the status and the reason of each case go into `columns`.
+        If the mission is invalid in all cases with a combination, no table is yielded. The status and the reason of
+        these cases are written into `columns`.
         """
         indices_by_words: dict[tuple[str, ...], list[int]] = {}
         for index, words in enumerate(zip(*(columns[key].tolist() for key in self.question.choices), strict=True)):
@@ -382,7 +385,10 @@ class Table:
             yield self.chosen[words], np.array(indices)
 
     def _read(self, columns: Mapping[str, Values], index: int) -> Mission | None:
-        """Read the mission of a case; None if its values make no mission (the reason goes into `columns`)."""
+        """Read the mission of a case.
+
+        Returns None if the mission is invalid; its status and the reason are then written into `columns`.
+        """
         words = [SetValue(key, columns[key][index]) for key in self.question.choices]
         values = {number: float(columns[number.key][index]) for number in self.numbers}
         changed = {
@@ -422,9 +428,9 @@ class Table:
             self._check(columns, np.array(read_indices)[cases_of_shape], mission, mission.geometry)
 
     def _arrays(self, columns: Mapping[str, Values], cases: int) -> tuple[Indices, Mission, BistaticGeometry]:
-        """Find the cases that arrays of numbers can represent.
+        """Find the cases that need not be read one by one, because arrays of numbers can represent them.
 
-        Returns their indices, the mission with the arrays, and its geometry.
+        Returns the indices of these cases, the mission with the arrays, and its geometry.
         """
         is_direct = np.ones(cases, dtype=bool)
         for number in self.numbers:
@@ -447,9 +453,10 @@ class Table:
     def _check(
         self, all_columns: dict[str, Values], indices: Indices, mission: Mission, geometries: BistaticGeometry
     ) -> None:
-        """Judge all cases of a mission with arrays, in groups of cases that need the same number of nodes.
+        """Judge all cases of a mission with arrays, and write the results into `all_columns`.
 
-        `indices` are the places of the cases in `all_columns`, which receives the results.
+        Cases are judged in groups that need the same number of nodes in the aperture. `indices` are the indices of
+        the cases in `all_columns`.
         """
         for nodes, group, mission_of_group, geometry_of_group in by_nodes(mission, indices.size, geometries):
             analysis = Analysis(

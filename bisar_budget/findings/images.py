@@ -18,13 +18,14 @@ CHIP_FLOOR_DB = -40.0  # relative to the error-free peak: black in a chip
 class Verdict(NamedTuple):
     """Verdict of the image on the limit of one row; values that do not exist are None.
 
-    Phases are magnitudes at the aperture edge [rad]: `published_…` by Table II, `full_…` by the closed form of the
-    full model, `predicted_…` from exact ranges, and `measured_…` in the image. `…_inside` and `…_beyond` are measured
-    at 0.9 and 1.1 times the limit. Displacements are on the ground (east, north) [m]: `displacement_m` by exact
-    ranges, `…_published_m` by (25), and `…_full_m` by the full model. The smear azimuth is the direction of a line,
-    from 0 to π; `…_published_rad` is by (31). For vibration and noise `measured_db` is compared with
-    `requirement_db`; for noise it has a standard error and a 95 % interval. With autofocus a second image is formed
-    at the limit `boundary_autofocus`, and refocused. `reason` and `reason_autofocus` explain the verdicts.
+    Phases are magnitudes at the aperture edge [rad]: `published_…` follow from Table II of Rigling & Moses, `full_…`
+    from the closed form of the full model, and `predicted_…` from exact ranges; `measured_…` are measured in the
+    image. `…_inside` and `…_beyond` are measured at 0.9 and 1.1 times the limit. Displacements are on the ground
+    (east, north) [m]: `displacement_m` follows from exact ranges, `…_published_m` from (25) of Rigling & Moses, and
+    `…_full_m` from the full model. The smear azimuth is the direction of a line, from 0 to π; `…_published_rad`
+    follows from (31). For vibration and noise `measured_db` is compared with `requirement_db`; for noise it has a
+    standard error and a 95 % interval. With autofocus a second image is formed at the limit `boundary_autofocus`, and
+    refocused. `reason` and `reason_autofocus` explain the verdicts.
     """
 
     id: str
@@ -66,9 +67,10 @@ class Verdict(NamedTuple):
 
     @property
     def judged_phases_rad(self) -> tuple[float | None, float | None]:
-        """Phase that the budget limits, as predicted by exact ranges and as measured in the image. [rad]
+        """Phase that the budget limits: predicted from exact ranges, and measured in the image. [rad]
 
-        It is the cubic phase if the row limits it, otherwise the quadratic phase with the same loss of the peak.
+        It is the cubic phase if the row limits the cubic phase. Otherwise it is the quadratic phase that would cause
+        the same loss of the peak.
         """
         if self.measured_cubic_rad is not None:
             return self.predicted_cubic_rad, self.measured_cubic_rad
@@ -78,7 +80,11 @@ class Verdict(NamedTuple):
 
     @property
     def of_equal_loss(self) -> str:
-        """Addition to the name of the judged phase, ` of equal loss`, if less than 0.99 of it is quadratic phase."""
+        """Suffix ` of equal loss` for the name of the judged phase.
+
+        The suffix is empty if at least 99 % of the judged phase is quadratic phase in the image, or if the row limits
+        the cubic phase.
+        """
         phase, quadratic = self.measured_equal_loss_qpe_rad, self.measured_qpe_rad
         is_more = self.measured_cubic_rad is None and phase is not None and (quadratic or 0.0) < 0.99 * phase
         return " of equal loss" if is_more else ""
@@ -112,14 +118,14 @@ class VerifiedMission(NamedTuple):
 
     @property
     def doubt(self) -> Note:
-        """Note that no limit has a verdict; empty if any limit has one."""
+        """Note which states that no limit has a verdict; empty if any limit has one."""
         if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
             return NOTHING
         return phrases.note("nothing-verified", rows=len(self.rows))
 
 
 class PointImage(NamedTuple):
-    """Image of a point target with an error, its cut along y′, and the cut of the error-free image at the same place.
+    """Image of a point target with an error, with its cut along y′ and the same cut of the error-free image.
 
     `chip` has `columns` × `rows` bytes. Rows run from the largest y′ to the smallest, columns from the smallest x′
     to the largest. The value 0 is `CHIP_FLOOR_DB` or less, and 255 is the peak without error. `pixel_m` are the pixel
@@ -144,7 +150,10 @@ class PointImage(NamedTuple):
 
 
 class ImageEvidence(NamedTuple):
-    """Images behind one verdict: at the limit, and at the limit with autofocus before and after refocusing."""
+    """Images on which one verdict is based.
+
+    They are the image at the limit, and the images at the limit with autofocus, before and after refocusing.
+    """
 
     file: str
     verdict: Verdict

@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 class FileWarning(NamedTuple):
     """A warning about the mission file.
 
-    Most warnings do not change the verdict. A warning with `is_doubt` questions whether the checked mission is right,
-    so the status is at least `warn`. `is_of_options` marks the warning about options that changed the mission.
+    Most warnings do not change the verdict. `is_doubt` marks a warning that the checked mission may be wrong;
+    the status is then at least `warn`. `is_of_options` marks the warning about options that changed the
+    mission.
     """
 
     line: int | None

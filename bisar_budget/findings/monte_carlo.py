@@ -8,13 +8,13 @@ from bisar_budget.phrases import Note
 class Requirement(NamedTuple):
     """Result of the draws for one requirement: how often it is met.
 
-    `sum` and `rss` are the combined errors by these rules of `allocation.combine`, by the full model and with the
-    coverage factor; None if a declared error leaves no image. `sigma_rss` is the standard uncertainty by
-    root-sum-square. `sigma` is the standard uncertainty of the draws with an image, None without such a draw. For
-    displacements both are rms lengths. `probability` is the fraction of draws that meet the requirement;
-    `probability_low` and `probability_high` are the ends of its Wilson interval. `probability_normal` is the
-    probability for a normal distribution with the variances of the errors. `dominant` is the error with the largest
-    share of the variance.
+    `sum` and `rss` are the sizes of the combined errors, by the rules of `allocation.combine` with these names. They
+    follow from the full model and include the coverage factor; None if a declared error leaves no image. `sigma_rss`
+    is the standard uncertainty by root-sum-square. `sigma` is the standard uncertainty of the draws with an image,
+    None without such a draw. For displacements both are rms lengths. `probability` is the fraction of draws that meet
+    the requirement; `probability_low` and `probability_high` are the ends of its Wilson interval.
+    `probability_normal` is the probability for a normal distribution with the variances of the errors.
+    `dominant` is the error with the largest share of the variance.
     """
 
     id: str

@@ -22,9 +22,9 @@ class DecidingShare:
     """A share of a requirement that decides in place of the full requirement.
 
     `allowed` and `reached` are in the unit of the requirement, without the gain of autofocus. `owner` is the platform
-    or the clock that has the share. `owner` is `autofocus` if the pull-in range of autofocus limits the sum of all
-    phases, `scene` if the requirement limits the difference at the scene's edge, and `band` for the phase of
-    dispersion over the band.
+    or the clock to which the share belongs. Three other values stand for limits that are no shares: `autofocus` for
+    the pull-in range of autofocus, which limits the sum of all phases; `scene` for the difference between the phases
+    at the edge and at the centre of the scene; and `band` for the phase of dispersion over the radar band.
     """
 
     owner: str
@@ -88,7 +88,7 @@ class JudgedRequirement(NamedTuple):
 
 @dataclass(frozen=True)
 class ShiftedFigure:
-    """Figures of one kind of error that the file shifts by a level, relative to the values of their source."""
+    """A level by which the mission file shifts the figures of one kind of error, relative to their source."""
 
     kind: str
     key: str
@@ -97,12 +97,12 @@ class ShiftedFigure:
 
     @property
     def level(self) -> str:
-        """Text of the level, with its unit."""
+        """Level with its unit, as text."""
         return f"{self.level_db:g} dB"
 
     @property
     def off(self) -> str:
-        """Words for the source of the figures, from which the level shifts them."""
+        """Phrase that names the source of the unshifted figures, such as `off the data sheet`."""
         if self.source is not None:
             return f"off {printable(self.source)}"
         return "off the file's own spectrum" if self.key.endswith("spectrum_level") else "off the data sheet"

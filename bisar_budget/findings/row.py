@@ -49,16 +49,17 @@ def holding(status: str, waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaive
 class Row(NamedTuple):
     """One row of the budget.
 
-    Numbers are in SI and radians; None if a value does not exist. `is_independent` marks rows that are included in
-    sums: errors as the file states them. Other rows repeat an error of another frame along the scene's axes, and are
-    not included. `qpe_exact_rad` is equal to `qpe_full_rad`, which comes from exact ranges. `published_margin_db` is
-    the margin of the published rule for a vibration relative to first principles. `binding_requirement` is the
-    requirement that sets `allowable`. `cubic_rad` is the magnitude of the declared error's cubic phase at the
-    aperture edge. `islr_db` is the ISLR that a declared random error adds. `equal_loss_qpe_rad` is the quadratic
-    phase with the same loss of the peak as `qpe_full_rad` together with the phase that band and turn do not resolve.
-    `rest_rad` is the rms phase beyond the cubic. `model` is the model that gives these numbers. `waivers` are the
-    waivers, valid or expired, that name the row while it fails. `refuted` names the images that refute the limit of
-    the row.
+    Numbers are in SI and radians; None if a value does not exist. `is_independent` marks rows of errors as the file
+    states them; only these rows are included in sums. The other rows show an error, which is stated in another frame,
+    along the scene's axes. `qpe_exact_rad` is equal to `qpe_full_rad`, which comes from exact ranges.
+    `published_margin_db` is the margin of the published rule for a vibration relative to first principles.
+    `binding_requirement` is the requirement that sets `allowable`. `cubic_rad` is the magnitude of the declared
+    error's cubic phase at the aperture edge. `islr_db` is the ISLR that a declared random error adds.
+    `equal_loss_qpe_rad` is the quadratic phase with the same loss of the peak as `qpe_full_rad` and the hidden phase
+    together; the hidden phase is the part that the bandwidth and the turn of the line of sight do not resolve.
+    `rest_rad` is the rms value of the phase terms above the cubic one. `model` is the model that gives these numbers.
+    `waivers` are the waivers, valid or expired, that name the row while it fails. `refuted` names the images that
+    refute the limit of the row.
     """
 
     subject: Subject
@@ -115,7 +116,7 @@ class Row(NamedTuple):
 
     @property
     def is_of_declare(self) -> bool:
-        """Whether the status concerns only `requirements.declare`, and not the size of an error."""
+        """Whether the status depends only on `requirements.declare`, and not on the size of an error."""
         return self.metric == DECLARE or (
             isinstance(self.reason, Note) and self.reason.code == "not-declared-as-required"
         )
@@ -135,7 +136,7 @@ class Row(NamedTuple):
 
 
 def where_ids_are(file: str) -> str:
-    """Words with the command that lists the ids of a mission's rows."""
+    """Phrase that names the command which lists the ids of a mission's rows."""
     from shlex import quote
 
     return f"`bisar-budget check {quote(printable(file))} --all` lists them"

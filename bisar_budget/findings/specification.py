@@ -1,4 +1,4 @@
-"""The sheet of specifications: values to order that together meet every requirement, and the errors in each limit."""
+"""The sheet of specifications: values to order that together meet every requirement, and shares of the limits."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
@@ -35,7 +35,10 @@ class Specification(NamedTuple):
     remark: str = ""
 
     def holds(self, value: float | None) -> bool:
-        """Whether a size meets the specification; True if no value is ordered, else False for a size of None."""
+        """Whether a size meets the specification.
+
+        The result is True if no value is ordered. Otherwise it is False for a size of None.
+        """
         if self.ordered is None:
             return True
         if value is None:

@@ -39,12 +39,12 @@ class Status(NamedTuple):
 
     @property
     def is_held(self) -> bool:
-        """Whether a number was compared with a limit, and the result counts: it is evaluated and not waived."""
+        """Whether a number was compared with a limit and the comparison is binding: evaluated, and not waived."""
         return self.is_judged and not self.junit_words
 
     @property
     def complies(self) -> bool:
-        """Whether everything was judged and is met, with or without warnings; a waived status does not comply."""
+        """Whether all requirements were judged and are met, with or without warnings; `waived` does not comply."""
         return self.is_held and not self.fails
 
 

@@ -65,8 +65,8 @@ class Trade(NamedTuple):
 class TradeStudy(NamedTuple):
     """A sweep that the report of a mission shows.
 
-    `asked` are the texts of the options. `rows` are the utilizations of all rows that are the worst at any value, as
-    functions of the key if a single key varies. `cases` is the number of all cases. Of these, `complying` cases meet
+    `asked` are the texts of the options. If a single key varies, `rows` are the utilizations of all rows that are the
+    worst at any value, as functions of the key. `cases` is the number of all cases. Of these, `complying` cases meet
     every requirement, `waived` cases are waived by the waivers `waived_by`, `unevaluated` cases could not be
     evaluated completely or declare no error, and `missing` cases give no usable mission. `model` is the model that
     an option put in place of the mission's own model. `day` is the date on which waivers were judged.

@@ -1,4 +1,4 @@
-"""A collection as a file states it (scene, band, aperture, both paths, errors), and its mission file.
+"""Collections that are read from radar files (scene, band, aperture, both paths, errors), and their mission files.
 
 Slow time is the time at which a pulse is at the scene point. The pulse leaves the transmitter R_t/c earlier and
 reaches the receiver R_r/c later, where R_t and R_r are the slant ranges. The position of a path at a slow time is the
@@ -40,9 +40,9 @@ from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes
 from bisar_budget.paths.flight import Fitted, least_squares, path_of, powers_of
 from bisar_budget.paths.free_fall import fall_of
 
-MIN_FIT_PULSES = 5  # in an aperture to which a path is fitted
-MAX_APERTURE_S = 1e6  # of an aperture, and from the file's start to its middle
-MAX_PLATFORM_DISTANCE_M = 1e9  # of a platform; a mission takes no more
+MIN_FIT_PULSES = 5  # smallest number of pulses in the aperture to which a path is fitted
+MAX_APERTURE_S = 1e6  # largest aperture time, and largest time from the file's start to the middle
+MAX_PLATFORM_DISTANCE_M = 1e9  # a mission file accepts no larger distance
 _MAX_PATH_ORDER = 4  # of a path that a mission states: up to the snap
 _FIT_TOLERANCE_FRACTION = 1e-3  # of a wavelength: 0.4° of phase, a hundredth of the usual budget of 45°
 _ROUNDING_M = 1e-7  # a term that moves the path by less at the end of the aperture is rounding
@@ -79,7 +79,7 @@ class DeclaredMotionError:
 
 @dataclass(frozen=True)
 class ReferenceGeometry:
-    """Slant ranges [m] and bistatic angle [rad] at the reference vector of a file, and its slow time. [s]"""
+    """Geometry at the reference vector of a file: its slow time [s], both slant ranges [m], bistatic angle [rad]."""
 
     slow_time: float
     transmitter_range: float
@@ -89,8 +89,9 @@ class ReferenceGeometry:
 
 @dataclass(frozen=True)
 class FileErrors:
-    """Errors that a file declares: motion errors of the platforms, or of both in common, and clock terms.
+    """Errors that a radar file declares: motion errors of each platform, or common to both, and clock terms.
 
+    `timing_constant` is a standard deviation of delay [s], and `timing_linear` is one of relative clock frequency.
     `remarks` are facts for which a mission has no key. `at` is the XML path of the errors.
     """
 
@@ -105,7 +106,7 @@ class FileErrors:
 
 @dataclass(frozen=True)
 class Imported:
-    """A collection as a file states it.
+    """A collection that is read from a radar file.
 
     If `is_monostatic`, transmitter and receiver are one platform, so that its errors are the same for transmission
     and reception. `remarks` are for the reader of the mission file; each is one fact. `unused` is a remark on vectors
@@ -150,10 +151,10 @@ def reference_of(seen: Seen, slow_time: float) -> ReferenceGeometry:
 def fitted(times: Floats, positions: Floats, aperture_time_s: float, wavelength_m: float) -> Fitted:
     """Fit a polynomial path to the positions within the aperture, by least squares.
 
-    The order is the lowest for which all positions are within a thousandth of the wavelength of the path, so that the
-    phase error is negligible. The highest order is 4, because a mission states position, velocity, acceleration, jerk
-    and snap. If no order is sufficient, the result has the lowest order that no higher order improves clearly. The
-    residuals are then noise of the positions, or faster motion.
+    The order of the polynomial is the lowest at which no position is farther from the path than 1/1000 of the
+    wavelength, so that the phase error is negligible. The highest order is 4, because a mission states position,
+    velocity, acceleration, jerk and snap. If no order is sufficient, the lowest order is taken whose residuals no
+    higher order clearly reduces. The residuals are then noise of the positions, or faster motion.
 
     Slow times (n,) are in seconds, positions (n, 3) in metres along the scene's axes.
 
@@ -337,7 +338,7 @@ def _of_monostatic(mono: Element, seen: Seen) -> FileErrors:
 
 
 def _common(declared_error: DeclaredMotionError, remarks: list[str]) -> FileErrors:
-    """Errors of a single platform that transmits and receives.
+    """Make the errors of a single platform that transmits and receives.
 
     Errors that are the same along all axes become common errors. Other errors are stated for both platforms, with a
     remark on how to combine them.
@@ -397,9 +398,10 @@ def _of_bistatic(bistatic: Element, seen: Seen) -> FileErrors:
 def _with_added(
     bistatic: Element, declared_errors: dict[str, DeclaredMotionError | None]
 ) -> tuple[dict[str, DeclaredMotionError | None], list[str]]:
-    """Apply the parameters that this program added to an exported file.
+    """Apply the parameters that this program adds to the files it exports, and return the changed errors and remarks.
 
-    They state which errors are not declared, accelerations and distributions. Other parameters become remarks.
+    The parameters state accelerations, distributions, and which errors are not declared. Other parameters become
+    remarks.
     """
     remarks = []
     for parameter in bistatic.all("AddedParameters/Parameter"):

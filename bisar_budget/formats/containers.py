@@ -1,4 +1,4 @@
-"""Reading of radar files: the header, the XML and the parameters of every pulse. The signal is never read.
+"""Reading of radar files: the header, the XML and the parameters of every pulse, but never the signal.
 
 CPHD 1.1.0 (NGA.STND.0068-1) and CRSD 1.0 (NGA.STND.0080-2) begin with a header of text lines, which gives the byte at
 which each block begins. SICD (NGA.STND.0024) has its XML in a segment of a NITF file. XML is read without entities
@@ -182,7 +182,7 @@ def _any_namespace(path: str) -> str:
 
 
 def parse(file: str, data: bytes, start: int = 0) -> Element:
-    """Read an XML document; `start` is the byte of the file at which it begins.
+    """Parse an XML document from a file; `start` is the byte of the file at which the document begins.
 
     Raises
     ------

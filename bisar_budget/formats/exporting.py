@@ -44,11 +44,11 @@ if TYPE_CHECKING:
 
 
 NAMESPACE = "http://api.nsgreg.nga.mil/schema/cphd/1.1.0"
-DEFAULT_SCENE = Geodetic(0.0, 0.0, 0.0)  # of a scene without coordinates in its mission
+DEFAULT_SCENE = Geodetic(0.0, 0.0, 0.0)  # position of a scene without coordinates in its mission
 UNDATED = "2000-01-01T12:00:00Z"
 _AREA_MARGIN_CELLS = 24  # of the image area beyond the targets, on each side
 _EXTENT_SAMPLES = 2049  # slow times at which the extent of the signal is computed
-_SWATH_OVERSAMPLING_FACTOR = 1.5  # frequencies over the frequencies for the saved swath; cphdcheck requires 1.2
+_SWATH_OVERSAMPLING_FACTOR = 1.5  # ratio of frequencies to those that the swath needs; cphdcheck requires 1.2
 _MIN_EXPORT_SAMPLES = 64
 _BYTES_PER_EXPORTED_SAMPLE = 16 * 5 + 8 * 3  # of the phase history as it is formed, and as it is written
 _MAX_SCATTERERS_COUNT = 1 << 20
@@ -80,11 +80,11 @@ class Exported:
 
 @dataclass(frozen=True)
 class _Plan:
-    """Dimensions of the phase history.
+    """Dimensions of the phase history and of the image area.
 
-    `pulses` and `samples` are the numbers of pulses and of frequencies. `delay` is the largest delay to each side of
-    the reference point [s]. `half` is half the side length of the image area [m]. `cell` are the resolutions in range
-    and cross-range. [m]
+    `pulses` and `samples` are the numbers of pulses and of frequencies. `delay` is the largest magnitude of the delay
+    relative to the reference point [s]. `half` is half the side length of the image area [m]. `cell` are the
+    resolutions in range and cross-range [m].
     """
 
     pulses: int
@@ -203,7 +203,7 @@ def _scene(mission: Mission, targets: Targets, plan: _Plan) -> tuple[Floats, NDA
 def _vectors(
     mission: Mission, slow_time: Floats, flown: Flight, smooth: Flight, axes: SceneAxes, plan: _Plan
 ) -> tuple[Records, float]:
-    """Compute the parameters of each vector, and the time of the file at the middle of the aperture. [s]
+    """Compute the parameters of each vector, and the time from the file's start to the middle of the aperture [s].
 
     A pulse is at the scene centre at its slow time. According to the measured positions it leaves the transmitter
     R_t/c earlier and is received R_r/c later, so the reference time of section 6.5.1 (5) is the slow time. While slow
@@ -364,7 +364,10 @@ def _degrees(path: str, point: Geodetic) -> _Leaves:
 
 
 def _scene_coordinates(plan: _Plan, axes: SceneAxes) -> _Leaves:
-    """Elements for the plane of the scene, with x east and y north; corners are clockwise as seen from above."""
+    """Make the `SceneCoordinates` elements: the plane of the scene with x east and y north, and the image area.
+
+    Corners are clockwise as seen from above.
+    """
     half = plan.half
     corners = [(-half, -half), (-half, half), (half, half), (half, -half)]
     reference_point = geodetic(axes.origin)
@@ -446,9 +449,9 @@ def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
 
 
 def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, str]) -> tuple[Floats, str]:
-    """Covariance (6, 6) of one platform in a frame of the standard, and the name of the frame. [m², m²/s, m²/s²]
+    """Compute the covariance (6, 6) of position and velocity of one platform, and name its frame. [m², m²/s, m²/s²]
 
-    Errors that the covariance cannot contain are put into `added`.
+    The frame is a frame of the standard. Errors that a covariance cannot contain are added to `added`.
     """
     error = getattr(mission.platforms, owner).motion_error
     state: PlatformState = getattr(mission.geometry, owner)

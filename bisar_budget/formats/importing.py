@@ -1,4 +1,7 @@
-"""Import of collections: paths come from the parameters of pulses in CPHD and CRSD, from polynomials in SICD."""
+"""Import of collections from CPHD, CRSD and SICD files.
+
+The paths of the platforms follow from the parameters of the pulses in CPHD and CRSD, and from polynomials in SICD.
+"""
 
 import hashlib
 import math
@@ -58,7 +61,10 @@ class _Pulses:
 
 
 class _Aperture(NamedTuple):
-    """Time during which the scene point is seen: its middle, from the start of the file, and its length. [s]"""
+    """Time interval in which the radar illuminates the scene point.
+
+    `middle` is the middle of the interval, from the start of the collection [s], and `length` is its duration [s].
+    """
 
     middle: float
     length: float
@@ -173,7 +179,10 @@ def _pulses_of_cphd(container: Container, vectors: Records, parameters: Element)
 
 
 def _scene_time(pulses: _Pulses, axes: SceneAxes) -> Floats:
-    """Compute the times at which pulses are at the scene point: the reference time of CPHD 1.1.0, 6.5.1 (5). [s]"""
+    """Compute the times (pulses,) at which pulses are at the scene point. [s]
+
+    This is the reference time of CPHD 1.1.0, section 6.5.1 (5).
+    """
     transmit_range = np.linalg.norm(pulses.transmitter - axes.origin, axis=1)
     receive_range = np.linalg.norm(pulses.receiver - axes.origin, axis=1)
     scene_time: Floats = pulses.sent + transmit_range / (transmit_range + receive_range) * (
@@ -183,7 +192,7 @@ def _scene_time(pulses: _Pulses, axes: SceneAxes) -> Floats:
 
 
 def _dwell(xml: Element, dwell: Element | None, identifiers: Element, point: Vector) -> _Aperture:
-    """Compute the centre of dwell and the dwell time at the scene point, by section 6.5.1 (6) of CPHD 1.1.0."""
+    """Compute the centre of dwell and the dwell time at the scene point as in CPHD 1.1.0, section 6.5.1 (6)."""
     if dwell is None:
         raise xml.fault("is missing: nothing says how long the scene point is seen", "Dwell")
     times = []
@@ -200,7 +209,7 @@ def _dwell(xml: Element, dwell: Element | None, identifiers: Element, point: Vec
 
 
 def _image_coordinates(scene: Element, point: Vector) -> tuple[float, float]:
-    """Compute the image area coordinates IAX and IAY of a point, by the reference surface of CPHD. [m]
+    """Compute the image area coordinates IAX and IAY of a point on the reference surface of a CPHD file. [m]
 
     The surface is a plane, or a surface of constant height.
     """
@@ -395,12 +404,13 @@ def _polynomials_of_sicd(xml: Element, is_monostatic: bool) -> tuple[Floats, Flo
 def _aperture_of_sicd(
     xml: Element, point: Vector, middle: float, center: float, pulses_at: Callable[[Floats], _Pulses]
 ) -> tuple[_Aperture, list[str]]:
-    """Compute the aperture of a pixel at the scene point, with remarks on it.
+    """Compute the aperture of a pixel at the scene point, and make remarks on it.
 
-    The aperture is the processed time, or less if the image has a smaller band, since a stripmap is processed for
-    longer than a point is seen. The wave vector of the image moves by |d(u_t + u_r)/dt · col| f/c per second, where
-    u_t and u_r are unit vectors along the lines of sight. The band ImpRespBW of a column is this movement during the
-    aperture.
+    The aperture is the processed time, or a shorter time that follows from the bandwidth of the image. The processing
+    of a stripmap takes more time than the illumination of one point. The wave vector of the image changes along the
+    column direction `col` by |d(u_t + u_r)/dt · col| f/c per second, where u_t and u_r are unit vectors along the
+    lines of sight. The bandwidth ImpRespBW of a column is this change during the aperture. `middle` is the middle of
+    the aperture [s], and `center` is the centre frequency [Hz].
     """
     formation = xml.one("ImageFormation")
     begin, end = formation.number("TStartProc"), formation.number("TEndProc")
@@ -433,7 +443,7 @@ def _aperture_of_sicd(
 
 # ---------------------------------------------------------------------- all formats
 def _chosen(xml: Element, channel: str | None, path: str, key: str) -> tuple[str, Element]:
-    """Find the identifier and the parameters of a channel; without `channel` it is the reference channel."""
+    """Find the identifier and the parameters of a channel; if `channel` is None, of the reference channel."""
     name = xml.text("Channel/RefChId") if channel is None else channel
     parameters = xml.with_child(path, key, name)
     if parameters is None:

@@ -37,10 +37,10 @@ if TYPE_CHECKING:
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.sampling.draws import Drawing, DrawsPiece, Share, Tally
 
-MAX_STUDY_CASES = 40_000  # of a study; a page has no room for more
-MAX_STUDY_KEY_COUNT = 2  # of a study; a drawing has no more axes
-_MANY_DRAWS = 1_000_000  # from which the time is estimated
-_TRIAL_DRAWS = 1 << 12  # of the first trial for this estimate
+MAX_STUDY_CASES = 40_000  # a report page has no room for more cases of a study
+MAX_STUDY_KEY_COUNT = 2  # a drawing has no axes for more keys of a study
+_MANY_DRAWS = 1_000_000  # for more draws the time is estimated beforehand
+_TRIAL_DRAWS = 1 << 12  # number of draws in the first trial for this estimate
 DAY_OF_RUN = "the day of the run"
 _CALLER = "the caller"
 Arguments = ParamSpec("Arguments")
@@ -76,7 +76,7 @@ def day_of(date: str | dt.date | None) -> dt.date:
 
 
 def day_origin(day: str | dt.date | None, giver: str) -> str:
-    """Words for the origin of the day on which waivers are judged.
+    """Name the origin of the day on which waivers are judged.
 
     The origin is `giver` if `day` is given, or else the environment variable, or else the day of the run.
     """
@@ -116,7 +116,7 @@ def check(
     monte_carlo : int, optional
         Number of draws of the errors, to report how often each requirement is met; `seed` is as in `monte_carlo`.
     verify : bool
-        Whether to form images at the limits, and to judge by them too.
+        Whether to form images at the limits; their verdicts then also influence the status.
     sweep : mapping, optional
         Values of one key or two, as in `sweep`; the report shows the results.
     outside : Outside, optional
@@ -202,14 +202,14 @@ def pieces(
     changes: Sequence[SetValue] = (),
     outside: Outside = NOTHING_OUTSIDE,
 ) -> list[Piece]:
-    """Check files for a report that consists of one text for each mission; findings are not kept in memory."""
+    """Check files, and return the text of the report for each mission; findings are not kept in memory."""
     keep = partial(piece, format_name=format_name, style=style)
     return check_files(files, today, model, keep, changes=changes, outside=outside)
 
 
 # ---------------------------------------------------------------------- draws
 def drawn_here(draws: int, seed: int | None) -> Draws:
-    """Settings for draws that this process makes, with a progress bar."""
+    """Make the settings for a Monte Carlo whose draws this process makes, with a progress bar."""
     from bisar_budget.sampling.draws import in_turn
 
     return Draws(draws, seed, partial(_watched, in_turn, None))
@@ -219,9 +219,9 @@ def drawn_here(draws: int, seed: int | None) -> Draws:
 def drawn_by(
     scheduler: str | None, patience: int, draws: int | None, seed: int | None, files: int
 ) -> "Iterator[Draws | None]":
-    """Yield the settings for draws that this machine or the workers of a scheduler make; None without draws.
+    """Yield the settings for a Monte Carlo on this machine or on the workers of a scheduler; None without draws.
 
-    `files` is the number of mission files, and `patience` the longest time without a worker. [s]
+    `files` is the number of mission files. `patience` is the longest time to wait without a worker. [s]
     """
     if draws is None:
         yield None
@@ -236,7 +236,7 @@ def drawn_by(
 
 
 def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "Iterator[tuple[DrawsPiece, Tally]]":
-    """Yield the pieces of draws that `make` returns, and show progress; if they will take long, announce it first."""
+    """Yield the pieces of draws from `make`, and show progress; if they will take long, tell the user first."""
     from bisar_budget.sampling.draws import Drawer, DrawsPiece
 
     if drawing.draws > _MANY_DRAWS and drawing.judged:
@@ -339,7 +339,10 @@ def with_studies(
 def _of(
     mission: Mission, ask: Callable[Arguments, Answer], *arguments: Arguments.args, **options: Arguments.kwargs
 ) -> Answer:
-    """Call a function about a mission; if it raises `QuestionError`, put the mission's file before the message."""
+    """Call a function that answers a question about a mission, and return its result.
+
+    If the function raises `QuestionError`, the name of the mission file is put before the message.
+    """
     try:
         return ask(*arguments, **options)
     except QuestionError as error:

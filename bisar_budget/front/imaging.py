@@ -84,7 +84,10 @@ def verify_all(
 
 
 def faster(jobs: int | None = None) -> str:
-    """Advice on how to form images faster on this machine, to be added to a sentence; empty if there is none."""
+    """Phrase with advice on how to form images faster on this machine; empty if there is no advice.
+
+    The phrase begins with a comma, so that it can follow a sentence.
+    """
     if not is_compiled():
         return f", and {install_command('fast')} makes it tens of times faster"
     return f", --jobs {cores()} uses all cores" if jobs is not None and 1 < jobs < cores() else ""

@@ -70,7 +70,7 @@ class Spaced:
     is_log: bool = False
 
     def of(self, key: str) -> str:
-        """Text of the values of `key`, as for the option `sweep --vary`."""
+        """Write the values of `key` as the text of an option `sweep --vary`."""
         return f"{key}={self.start}:{self.stop}:{self.count}" + (":log" if self.is_log else "")
 
 
@@ -88,7 +88,7 @@ def linspace(start: object, stop: object, count: int) -> Spaced:
 
 
 def geomspace(start: object, stop: object, count: int) -> Spaced:
-    """Make `count` values from `start` to `stop` with equal ratios; arguments are as in `linspace`, but above 0."""
+    """Make `count` values from `start` to `stop` with equal ratios; arguments are as in `linspace`, but positive."""
     return Spaced(text_of("", start), text_of("", stop), count, is_log=True)
 
 
@@ -103,8 +103,8 @@ def cases_of(mission: Mission, values: Mapping[str, object] | str | os.PathLike[
         The loaded mission.
     values : mapping or path
         Values by key: a range of `linspace`, an array of numbers in SI, a quantity with an array, or a list of texts,
-        which are values with units or words. Or the path of a CSV file, whose header has `KEY [unit]` for each
-        column.
+        which are values with units or words. Alternatively `values` is the path of a CSV file, whose header has
+        `KEY [unit]` for each column.
     paired : bool
         Whether each case takes one value of every key, instead of every combination.
 

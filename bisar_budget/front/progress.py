@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 MIN_ANNOUNCED_S = 60.0  # work that takes longer is announced
 FORMING = "Forming images"  # label of a bar
-_MIN_SHOWN_S = 1.0  # work that is done earlier has no bar
+_MIN_SHOWN_S = 1.0  # work that takes less time has no bar
 _LEAST_TRIAL_S = 0.3  # a shorter trial is too short to measure
-_TRIAL_GROWTH_FACTOR = 3  # size of a trial over the size of the trial before
+_TRIAL_GROWTH_FACTOR = 3  # ratio of the sizes of two successive trials
 
 # Function that shows a message to the user who waits; a caller from Python sees only the bar.
 SAYING: ContextVar[Callable[[str], None]] = ContextVar("SAYING", default=lambda _: None)
@@ -33,9 +33,10 @@ SAYING: ContextVar[Callable[[str], None]] = ContextVar("SAYING", default=lambda 
 
 @contextmanager
 def watched(label: str) -> "Iterator[Progress]":
-    """Yield a function that is called with the progress of long work, and shows a bar with the remaining time.
+    """Yield a function that shows the progress of long work as a bar with the remaining time.
 
-    The bar appears only in a notebook or a terminal, and only if the work takes longer than a moment.
+    The function is called with the number of finished items and the number of all items. The bar appears only in a
+    notebook or a terminal, and only if the work takes longer than a second.
     """
     began, bars = monotonic(), list["tqdm[NoReturn]"]()
 
@@ -57,7 +58,7 @@ def watched(label: str) -> "Iterator[Progress]":
 
 
 def _is_notebook() -> bool:
-    """Whether a Jupyter kernel runs this process; imported Jupyter modules do not prove this."""
+    """Whether a Jupyter kernel runs this process; it is not sufficient that Jupyter modules are imported."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     return hasattr(shell, "kernel")
 
@@ -74,10 +75,10 @@ def _bar(label: str, total: int, is_notebook: bool) -> "tqdm[NoReturn]":
 
 @contextmanager
 def watched_checks(name: str) -> "Iterator[Progress]":
-    """Yield a function that is called with the number of finished checks of a mission, and the expected number.
+    """Yield a function that shows the progress of many checks of one mission.
 
-    At the second call the time of all checks is estimated, because the first check also imports modules. `name` is
-    the name of the mission.
+    The function is called with the number of finished checks and the expected number. Its second call estimates the
+    time of all checks, because the first check also imports modules. `name` is the name of the mission.
     """
     since, calls, before = monotonic(), 0, 0
     with watched("Checking values") as show_progress:
@@ -96,7 +97,7 @@ def watched_checks(name: str) -> "Iterator[Progress]":
 
 
 def lasting(seconds: float) -> str:
-    """Words for a duration, such as `3 minutes`."""
+    """Write a duration in seconds in words, such as `3 minutes`."""
     for unit, size in (("years", 365.25 * 86400), ("days", 86400), ("hours", 3600), ("minutes", 60)):
         if seconds >= 2 * size:
             return f"{seconds / size:.0f} {unit}"
@@ -104,7 +105,10 @@ def lasting(seconds: float) -> str:
 
 
 def foretell(seconds: float, doing: str, advice: str = "") -> None:
-    """Tell the user, if work will take long, how long it will take, and what would be faster."""
+    """Tell the user how long work will take, if this is more than a minute, and how it would be faster.
+
+    `seconds` is the estimated time, `doing` names the work, and `advice` is added to the message.
+    """
     if seconds > MIN_ANNOUNCED_S:
         SAYING.get()(f"{doing} will take about {lasting(seconds)}{'; ' if advice else ''}{advice}.")
 
@@ -139,7 +143,7 @@ def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[
 
 
 def hold_to_tables() -> None:
-    """Raise an error if the libraries that write the parts of a sweep to files are not installed."""
+    """Raise an error if the libraries are missing that write the parts of a sweep to files."""
     from bisar_budget.cluster.parts_folder import check_libraries
 
     check_libraries("--resume", TABLES_MEMORY_BYTES, "tables", "pyarrow")

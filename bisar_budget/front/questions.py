@@ -67,8 +67,8 @@ def sweep(
     values : mapping, path or cases
         Values by the path of a key, such as `collection.aperture_time`. Values are a range such as
         `linspace("1 s", "5 s", 101)`, an array of numbers in SI, a quantity with an array, a list of texts with
-        units, or a list of words such as parts of the catalogue. Or the path of a CSV file, whose header has
-        `KEY [unit]` for each column.
+        units, or a list of words such as parts of the catalogue. Alternatively `values` is the path of a CSV file,
+        whose header has `KEY [unit]` for each column.
     paired : bool
         Whether each case takes one value of every key, instead of every combination.
     columns : str or sequence of str
@@ -117,9 +117,9 @@ def solve(
     scale : bool
         Whether to solve for a factor that multiplies all errors of a section; the key names the section.
     row : str, optional
-        Row that has to comply, instead of the whole mission.
+        Row that has to meet its limit, instead of the whole mission.
     target : str
-        `fail` if only failures must not occur, `warn` if warnings must not occur either.
+        `fail` if the mission complies without failures, `warn` if it complies without failures and warnings.
     verify : bool
         Whether to form images of the binding row at the solution.
     model, date, outside

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 _COMPLIES = ("fail", "pass")
 _HEADINGS = {"none": "fail", "waived": "waived"}  # of a solution, by its status
-_MAX_SHOWN_ROWS = 12  # of a result in a notebook
+_MAX_SHOWN_ROWS = 12  # largest number of rows of a result that a notebook shows
 
 
 DataFrame = Any
@@ -78,7 +78,9 @@ def _frame_of_rows(rows: Sequence[Mapping[str, object]], library: str | None) ->
 
 
 class Picture:
-    """A drawing that notebooks show; `save` writes it to a file, and `of` returns the content of a file.
+    """A drawing that notebooks show.
+
+    `save` writes the drawing to a file. `of` takes a kind of file, and returns the content of such a file.
 
     Parameters
     ----------
@@ -275,7 +277,7 @@ _SPECIFIED = ("key", "value", "ordered", "unit", "declared")
 # ---------------------------------------------------------------------- answers to other questions
 @dataclass(frozen=True, repr=False, eq=False)
 class _Answer:
-    """Result of a question, as the matching command writes it in JSON; it also has the attributes of `found`."""
+    """Base class for the results of questions; a result also has all attributes of `found`."""
 
     found: Any
 
@@ -315,7 +317,7 @@ class SolveResult(_Answer):
     found: "Solution | Comparison"
 
     def __repr__(self) -> str:
-        """Summary on one line: the key, the value or how much of the range complies, and waived values."""
+        """Summary on one line: the key, the solution or the complying part of the range, and waived values."""
         return f"<solve of {self.found.key} for {self.found.name!r}: {self._summary}>"
 
     @property
@@ -373,8 +375,8 @@ class SensitivityResult(_Answer):
 class AllocateResult(_Answer):
     """Result of `allocate`: specifications that together meet every requirement.
 
-    The attributes `specifications`, `complies` and `requirements` are those of `found`. If the mission of an offer
-    was given, `offer` compares its figures with the specifications.
+    The attributes `specifications`, `complies` and `requirements` are taken from the sheet of specifications `found`.
+    If the mission of an offer was given, `offer` compares its figures with the specifications.
     """
 
     found: SpecificationSheet
@@ -404,7 +406,7 @@ class AllocateResult(_Answer):
 
 
 class VerifyResult(_Answer):
-    """Result of `verify`: `rows` are the verdicts of images on the limits, and `status` is the status of all."""
+    """Result of `verify`: `rows` are the verdicts of images on the limits, and `status` is their common status."""
 
     found: VerifiedMission
 
@@ -493,7 +495,10 @@ class PassesResult(_Answer):
 
 
 class MonteCarloResult(_Answer):
-    """Result of `monte_carlo`: `probability` for all requirements together, and `requirements`, with intervals."""
+    """Result of `monte_carlo`: the probability that all requirements are met, and the results of each requirement.
+
+    `probability` and the entries of `requirements` have confidence intervals.
+    """
 
     found: MonteCarlo
 
@@ -524,7 +529,7 @@ class MonteCarloResult(_Answer):
 
 
 class SimulateResult:
-    """Result of `simulate`: `image` with the declared errors, in scene axes, and `images` with all images."""
+    """Result of `simulate`: `image` is formed with the declared errors, and `images` contains all formed images."""
 
     def __init__(self, images: "PointImages", mission: Mission) -> None:
         self.images, self._mission = images, mission
@@ -540,7 +545,7 @@ class SimulateResult:
         return self.images.in_scene
 
     def plot(self) -> Picture:
-        """Draw the figures of the paper with the images of this mission."""
+        """Draw Figures 3 to 7 of Rigling & Moses with the images of this mission."""
         from bisar_budget.report.drawing.point_plot import drawn
 
         return Picture(self._mission.name, lambda kind: drawn(self.images, self._mission.name, kind))

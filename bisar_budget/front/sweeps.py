@@ -34,20 +34,20 @@ if TYPE_CHECKING:
 
     from bisar_budget.cluster.scheduler import Workers
 
-_MANY_CASES = 20_000  # from which the time is estimated
-_TRIAL_CASES = 100  # of the first trial for this estimate
-_MAX_SHOWN_CASES = 10  # of a sweep without a drawing, in a notebook
+_MANY_CASES = 20_000  # for more cases the time is estimated beforehand
+_TRIAL_CASES = 100  # number of cases in the first trial for this estimate
+_MAX_SHOWN_CASES = 10  # largest number of cases that a notebook shows, if there is no drawing
 
 
 @dataclass(repr=False, eq=False)
 class SweepResult:
     """Result of `sweep`: the table of a mission checked in many cases.
 
-    The table is available by `to_dataframe` and `to_xarray`, and as columns by their names. The cases are `mission`
-    with the values of `cases`, and are checked when they are first needed. `statuses` counts the statuses of the
-    checked cases, and `waived_by` has the ids of their waivers. If `workers` of a scheduler are given, they check the
-    cases. If `beside` is the path of a file, parts are kept in a folder next to it; with `is_resumed` the sweep
-    continues from kept parts.
+    `to_dataframe` and `to_xarray` return the table, and an index with a column's name returns this column. Each case
+    is `mission` with one set of the values of `cases`. Cases are checked when their results are first needed.
+    `statuses` counts the statuses of the checked cases, and `waived_by` has the ids of their waivers. If `workers` of
+    a scheduler are given, they check the cases. If `beside` is the path of a file, finished parts of the table are
+    kept in a folder next to this file; with `is_resumed` the sweep continues from them.
     """
 
     mission: Mission
@@ -96,9 +96,9 @@ class SweepResult:
 
     @contextmanager
     def checked(self) -> Iterator[tuple[Described, Iterator[Part]]]:
-        """Yield the table and an iterator that checks its parts on demand, with a progress bar.
+        """Yield the description of the table, and an iterator that checks the parts of the table on demand.
 
-        The bar appears only in a notebook or a terminal.
+        A progress bar is shown in a notebook or a terminal.
         """
         sweep: AbstractContextManager[Swept]
         if self.beside is None:
@@ -110,7 +110,7 @@ class SweepResult:
 
     @contextmanager
     def _kept(self, path: str) -> Iterator[Swept]:
-        """Check all parts, keep them in a folder, and then yield the sweep; afterwards the folder is removed.
+        """Check all parts of the table, store them in a folder, and yield the sweep; remove the folder at the end.
 
         Workers of a scheduler, or processes on this machine, check the parts. After an interruption the folder stays,
         and a message tells how to continue.
@@ -158,7 +158,7 @@ class SweepResult:
 
     @property
     def so_far(self) -> str:
-        """Words for the number of cases checked so far, and the number of complying cases among them."""
+        """Phrase with the number of cases checked so far, and the number of complying cases among them."""
         done, comply = self.statuses.total(), complying(self.statuses)
         if not done:
             return "no case was checked"
@@ -176,11 +176,15 @@ class SweepResult:
 
     @property
     def is_unjudged(self) -> bool:
-        """Whether none of the cases with a usable mission could be judged."""
+        """Whether no case could be judged, although some have a valid mission."""
         return self.statuses.keys() - {"error"} == {"not_evaluated"}
 
     def drawing(self, trade_data: Gathered, *, is_polar: bool = False) -> str:
-        """Draw gathered cases as SVG; if one key varies, also the rows that are the worst in any case."""
+        """Draw gathered cases as SVG.
+
+        If a single key varies, the drawing also shows the utilizations of all rows that are the worst in any case.
+        With `is_polar` the drawing is polar.
+        """
         from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
 
         trade = trade_data.trade(is_polar=is_polar)
@@ -208,7 +212,7 @@ class SweepResult:
 
     @property
     def summary(self) -> str:
-        """Words for the number of all cases, and the number of complying cases; checks the cases if necessary."""
+        """Phrase with the number of all cases and the number of complying cases; checks the cases if necessary."""
         return self.so_far if self._parts else ""  # cases are counted when they are checked
 
     @cached_property

@@ -18,11 +18,11 @@ from bisar_budget.paths.instant import Instant, utc
 
 Matrix = tuple[tuple[float, ...], ...]
 
-LOCAL_AXES = ("RTN", "TNW")  # of an orbit; other names of CCSDS for the same axes are in `local_axes`
-_EQUAL_VARIANCE_FRACTION = 1e-6  # difference of equal variances after a turn of axes
-_ROUNDED_EIGENVALUE_FRACTION = 1e-4  # of the largest; a matrix with few digits may have one this far below 0
+LOCAL_AXES = ("RTN", "TNW")  # axes of an orbit; `local_axes` also accepts the other CCSDS names for them
+_EQUAL_VARIANCE_FRACTION = 1e-6  # rounding difference of equal variances after a rotation of the axes
+_ROUNDED_EIGENVALUE_FRACTION = 1e-4  # of the largest eigenvalue; rounded digits may make one this far below 0
 _AXES_SYNONYMS = {"RSW": "RTN", "RIC": "RTN", "QSW": "RTN"}
-_ROUNDED_VARIANCE_FRACTION = 1e-12  # of a velocity's variance by the turn of axes
+_ROUNDED_VARIANCE_FRACTION = 1e-12  # rounding of a velocity variance by the change of the axes' rate
 _AXES_SUFFIXES = ("_INERTIAL", "_ROTATING")
 _VELOCITY_STEP_S = 0.5
 
@@ -33,7 +33,7 @@ class StatedAccuracy(NamedTuple):
     Attributes
     ----------
     words : str
-        The statement in reports.
+        Description of the statement for reports.
     covariance : (3, 3) or (6, 6), optional
         Covariance of position [m²], or of position and velocity [m², m²/s, m²/s²], along Earth-fixed axes or
         along the axes of a scene.
@@ -207,9 +207,9 @@ def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: t
 
 
 def with_rate(covariance: Floats, rate: Sequence[float] | Floats) -> Floats:
-    """Change a covariance (6, 6) to velocities in axes that turn more slowly by a rate: δv becomes δv + rate × δr.
+    """Convert a covariance (6, 6) to velocities relative to other axes: δv becomes δv + rate × δr.
 
-    `rate` is a vector. [rad/s]
+    `rate` (3,) is the angular rate of the old axes relative to the new axes. [rad/s]
     """
     x, y, z = rate
     matrix = np.eye(6)

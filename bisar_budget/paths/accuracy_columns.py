@@ -13,12 +13,12 @@ from itertools import pairwise
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError
 
-UNCLEAR = "unclear"  # looks like an accuracy, of which nothing says what it is
+UNCLEAR = "unclear"  # meaning of a column that looks like an accuracy of an unknown kind
 ACCEPTED_ACCURACIES = (
     "accepted: one sigma as sigma_east, sigma_north, sigma_up [m], or sigma_x, sigma_y, sigma_z [m], or cov_ee, "
     "cov_nn, cov_uu [m^2], or horizontal accuracy, vertical accuracy [m], or position accuracy [m]"
 )
-CROSS_COVARIANCE = "covariance"  # between two axes of a level frame, of which the sigmas are enough
+CROSS_COVARIANCE = "covariance"  # between two axes; it is not needed, because the sigmas of the axes are used
 
 _AXIS_WORDS = {
     "east": ("e", "east", "easting", "lon", "long", "lng", "longitude"),
@@ -33,10 +33,10 @@ _HORIZONTAL = frozenset(("horizontal", "horiz", "hor", "2d", "planimetric", "lev
 _VERTICAL = frozenset(("vertical", "vert", "ver", "v"))
 _SIGMA_WORDS = frozenset(("sigma", "sd", "std", "stdev", "accuracy", "uncertainty", "rms", "rmse"))
 _VARIANCES = frozenset(("cov", "covariance", "var", "variance"))
-_WEAK = frozenset(("rms", "rmse", "sd"))  # of other things as often: residuals, noise, a card
+_WEAK = frozenset(("rms", "rmse", "sd"))  # also common in names of other things: residuals, noise, an SD card
 _ERROR_WORDS = frozenset(
     ("error", "err", "precision", "confidence")
-)  # of a position: of which probability nobody says
+)  # may mean the error of a position, but of unknown probability
 _PLACE = frozenset(("position", "pos", "positional", "location"))
 _POSITION_WORDS = _PLACE | {"3d", "spherical", "p"}
 _FILLING = frozenset(
@@ -58,12 +58,12 @@ _FILLING = frozenset(
         "msl",
     )
 )
-# Circles and spheres that hold a share of the errors, or whatever the receiver's maker takes.
+# Radii that contain some fraction of the errors; the fraction may depend on the maker of the receiver.
 _UNCLEAR_MEASURES = re.compile(
     r"(?:[23]?drms|2?d?cep\d*|sep\d*|mrse|r\d\d|epe|ehpe|evpe|ehe|epx|epy|hpe|vpe|[ce]e\d\d|le\d\d)"
 )
 _LOOKS_LIKE = re.compile(r"sigma|accura|uncertain|covar|varianc|stdev|(?:^|_)(?:std|sd)(?:_|$)")
-_OTHERS = re.compile(  # what else has an accuracy
+_OTHERS = re.compile(  # other quantities that have an accuracy
     r"velocity|vel|speed|spd|airspeed|groundspeed|heading|head|hdg|yaw|roll|pitch|course|cog|"
     r"bearing|attitude|att|azimuth|orientation|quaternion|tilt|angle|angular|time|clock|gyro|"
     r"accel|acceleration|accelerometer|mag|magnetic|magnetometer|compass|baro|barometer|pressure|"
@@ -85,7 +85,7 @@ _TAILS = {
     ("rad",): "rad",
 }
 _OF_POSITIONS = (units.LENGTH, units.POSITION_VARIANCE)
-_OTHER = "other"  # an accuracy of something that is no position
+_OTHER = "other"  # meaning of a column that is the accuracy of another quantity than a position
 _CAMELS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 _COLUMN_SPELLINGS = (
     (re.compile(r"[^a-z0-9σ]+"), "_"),
@@ -109,7 +109,7 @@ def meaning_of(name: str, unit: str | None) -> tuple[str | None, str | None]:
 
     The meaning is `sigma_east` or the sigma of another axis, `variance_east` or the variance of another axis,
     `horizontal_accuracy`, `vertical_accuracy`, or `position_accuracy` for an accuracy without a direction. It is
-    `sigma_h` if other columns have to decide what h means, `CROSS_COVARIANCE`, or `UNCLEAR`. It is None for a column
+    `sigma_h` if other columns decide the meaning of h, or `CROSS_COVARIANCE`, or `UNCLEAR`. It is None for a column
     that is no accuracy of a position.
     """
     split, lower = _tokens(_CAMELS.sub("_", name)), _tokens(name)
@@ -119,7 +119,7 @@ def meaning_of(name: str, unit: str | None) -> tuple[str | None, str | None]:
             if tuple(split[-len(tail) :]) == tail and len(split) > len(tail):
                 stated_unit, split, lower = its_unit, split[: -len(tail)], _without(lower, tail)
                 break
-    # `SDn` is sdn, `SDHeight` is sd height: of both readings the one that is plain counts.
+    # A capital may begin a word, as in `SDHeight`, or not, as in `SDn`. Both are tried; the clear reading counts.
     meanings = [_of_tokens(tokens) for tokens in (split, lower)]
     meaning = next((candidate for candidate in meanings if candidate not in (None, UNCLEAR, _OTHER)), None)
     if meaning is None and _OTHER not in meanings and UNCLEAR in meanings:
@@ -141,7 +141,7 @@ def _without(tokens: list[str], tail: Sequence[str]) -> list[str]:
 
 
 def _of_tokens(tokens: Sequence[str]) -> str | None:
-    """Meaning of a column from the words of its name; None if the name looks like no accuracy of a position."""
+    """Meaning of a column from the words of its name; None if the name does not look like an accuracy."""
     words = [token for token in tokens if token in _SIGMA_WORDS | _VARIANCES]
     is_unclear = any(_UNCLEAR_MEASURES.fullmatch(token) for token in tokens) or _LOOKS_LIKE.search("_".join(tokens))
     is_error = not words and not _ERROR_WORDS.isdisjoint(tokens)

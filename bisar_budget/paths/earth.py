@@ -253,7 +253,7 @@ def flown(position: Geodetic, heading: float, speed: float, climb: float, times_
     step = np.asarray(times_s, dtype=float)[..., None] / _RUNGE_KUTTA_STEPS
 
     def rates(state: Floats) -> Floats:
-        """Rates of the displacement from the start and of the direction of flight, (2, ..., 3)."""
+        """Rates (2, ..., 3) of the displacement from the start [m/s] and of the direction of flight [1/s]."""
         displacement, direction = state
         latitude, longitude, height = geodetic_places(start + displacement)
         east, north, up = _directions(latitude, longitude)
@@ -262,7 +262,7 @@ def flown(position: Geodetic, heading: float, speed: float, climb: float, times_
         radius = 1 / (to_north**2 / meridian_radius + to_east**2 / transverse_radius) + height
         return np.stack([speed * direction + climb * up, -speed / radius[..., None] * up])
 
-    # The way counts from the start, so that it is rounded as what it is and not as the Earth's radius.
+    # The displacement is integrated, because it is rounded less than coordinates as large as the Earth's radius.
     displacement = np.zeros((*step.shape[:-1], 3))
     state = np.stack([displacement, displacement + axes.turned_back((math.sin(heading), math.cos(heading), 0.0))])
     for _ in range(_RUNGE_KUTTA_STEPS):

@@ -147,12 +147,13 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
 
 
 def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
-    """Remove the rounding steps from the positions of a function, which grow with the age of the elements.
+    """Return a function with the positions of `place` without their rounding steps. [m]
 
-    SGP4 counts minutes and angles from the epoch. So a position is rounded to 2e-6 m a week from the epoch, and to
-    4e-5 m 100 days from the epoch. A polynomial of slow time would follow these steps as bends of the path. Instead,
-    Lagrange's polynomial goes through eight positions 30 s apart. Its error in a low orbit is 1e-8 m, from its
-    remainder term. It also smooths the jumps of a few millimetres that SGP4 makes every half day in resonant orbits.
+    These steps grow with the time from the epoch of the elements. SGP4 counts minutes and angles from the epoch,
+    so a position is rounded to 2e-6 m a week from the epoch, and to 4e-5 m 100 days from the epoch. A polynomial of
+    slow time would follow these steps as bends of the path. Instead, Lagrange's polynomial goes through eight
+    positions 30 s apart. Its error in a low orbit is 1e-8 m, from its remainder term. It also smooths the jumps of a
+    few millimetres that SGP4 makes every half day in resonant orbits.
     """
 
     @lru_cache(maxsize=64)
@@ -166,7 +167,7 @@ def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
         try:
             first = count + 1 - _SMOOTHING_NODES // 2
             samples = [node(instant.day, number) for number in range(first, first + _SMOOTHING_NODES)]
-        except PathFileError:  # within minutes of the end of an orbit
+        except PathFileError:  # a node lies beyond the end of the orbit, which is minutes away
             return place(instant)
         return interpolate(samples, instant, _SMOOTHING_NODES, False)
 
@@ -176,12 +177,13 @@ def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
 def orbit_of(
     entries: Sequence[Entry], name: str, object_name: str | None, center: Instant, orientation: Orientation
 ) -> Orbit:
-    """Orbit of an object from the elements with the nearest epoch; of equally near elements, the last are used.
+    """Orbit of an object from the elements whose epoch is nearest to `center`.
 
-    `entries` are the entries of a file. The other arguments are those of the file's reader. `object_name` is a name
-    or a catalogue number. Broken entries of other objects are left out, and counted in the words of the orbit. Raises
-    `PathFileError` in these cases: there are no elements; there are elements of several objects and no name; an entry
-    of the object is broken; an entry is broken and no object is named; SGP4 is missing or refuses the elements.
+    If several epochs are equally near, the last elements are used. `entries` are the entries of a file. The other
+    arguments are those of `OrbitFormat.read`. `object_name` is a name or a catalogue number. Broken entries of
+    other objects are left out, and counted in the words of the orbit. Raises `PathFileError` in these cases: there
+    are no elements; there are elements of several objects and no name; an entry of the object is broken; an entry is
+    broken and no object is named; SGP4 is missing or refuses the elements.
     """
     sets = [entry for entry in entries if isinstance(entry, Elements)]
     broken = [entry for entry in entries if isinstance(entry, BrokenEntry)]
@@ -269,8 +271,9 @@ _DECIMAL = r"\d+\.\d*"
 def read_tle(
     data: bytes, name: str, object_name: str | None, center: Instant, orientation: Orientation = UNKNOWN
 ) -> Orbit:
-    """Orbit from two-line element sets, as every reader of `ORBIT_FORMATS` gives it.
+    """Read two-line element sets, and return the orbit of an object.
 
+    Arguments and errors are the same for all readers, see `OrbitFormat.read`.
     A line with the name may come before each set. Blank lines, and lines that begin with `#`, are ignored.
     """
     hold_to_size(len(data), name)
@@ -278,7 +281,7 @@ def read_tle(
 
 
 def element_sets(text: str, name: str) -> Iterator[Elements]:
-    """The element sets of a file; raises `PathFileError` for the first broken set."""
+    """Yield the element sets of a file; raises `PathFileError` at the first broken set."""
     for entry in _entries(text, name):
         if isinstance(entry, BrokenEntry):
             raise PathFileError(entry.problem)
@@ -286,7 +289,10 @@ def element_sets(text: str, name: str) -> Iterator[Elements]:
 
 
 def _entries(text: str, name: str) -> Iterator[Entry]:
-    """The element sets of a file, in order. After a broken set, reading continues with the next line 1 or name."""
+    """Yield the element sets of a file in order, and a `BrokenEntry` for each broken set.
+
+    After a broken set, reading continues with the next line 1 or name.
+    """
     name_line: tuple[int, str] | None = None
     line_1: tuple[int, str] | None = None
 
@@ -361,7 +367,7 @@ def _from_lines(first: tuple[int, str], second: tuple[int, str], object_name: st
     _hold_to_type(line_1[62].strip(), where_1)
 
     def angle(start: int, end: int, max_degrees: float, quantity: str) -> float:
-        """Angle in columns of line 2, counted from 1."""
+        """Angle [rad] in the columns `start` to `end` of line 2, counted from 1."""
         return _angle(_column(line_2, where_2, start, end, quantity, _DECIMAL), max_degrees, quantity, where_2)
 
     return Elements(
@@ -434,7 +440,7 @@ class _Message:
     where: str
     leaves: Mapping[str, object]
     problem: str = ""
-    is_complete: bool = False  # by the standard; JSON and CSV of CelesTrak leave out keywords with one possible value
+    is_complete: bool = False  # by the standard; CelesTrak's JSON and CSV leave out constant keywords
 
 
 _ACCEPTED_VALUES = {
@@ -448,7 +454,10 @@ _ACCEPTED_VALUES = {
 def read_omm(
     data: bytes, name: str, object_name: str | None, center: Instant, orientation: Orientation = UNKNOWN
 ) -> Orbit:
-    """Orbit from orbit mean-elements messages, as every reader of `ORBIT_FORMATS` gives it."""
+    """Read orbit mean-elements messages, and return the orbit of an object.
+
+    Arguments and errors are the same for all readers, see `OrbitFormat.read`.
+    """
     hold_to_size(len(data), name)
     if is_markup(data):
         records = _from_markup(data, name)

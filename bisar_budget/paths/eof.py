@@ -2,7 +2,7 @@
 
 Source: Sentinels POD service file format specification (GMES-GSEG-EOPG-FS-10-0075), and ESA's Earth Observation
 mission file format standard (PE-TN-ESA-GS-0001). State vectors are in the axes of ITRF, and their velocities are
-relative to the turning ground.
+relative to the rotating Earth.
 """
 
 from collections.abc import Iterator
@@ -45,10 +45,11 @@ _ACCURACIES_M = {"AUX_POEORB": 0.05, "AUX_RESORB": 0.10}  # m
 def read_eof(
     data: bytes, name: str, object_name: str | None, center: Instant, orientation: Orientation = UNKNOWN
 ) -> Orbit:
-    """Orbit from an orbit file of a Sentinel, as every reader of `ORBIT_FORMATS` gives it.
+    """Read an orbit file of a Sentinel, and return the orbit.
 
-    State vectors are interpolated by Hermite's polynomial of degree 7. The satellite has names like `Sentinel-1A` or
-    `S1A`. The orientation is not needed, since the axes are fixed to the Earth.
+    Arguments and errors are the same for all readers, see `OrbitFormat.read`. State vectors are interpolated
+    with Hermite's polynomial of degree 7. `object_name` is a name such as `Sentinel-1A` or `S1A`. `orientation` is
+    ignored, because the axes are fixed to the Earth.
     """
     hold_to_size(len(data), name, "time")
     if not is_markup(data):

@@ -18,16 +18,16 @@ from bisar_budget.paths.instant import Instant, tai, utc
 from bisar_budget.paths.messages import cut, one_object
 from bisar_budget.paths.orientation import Orientation, Turn
 
-MIN_SAMPLE_STEP_S = 0.9e-3  # closer samples are one sample; differences of times in two centuries round to 1e-6 s
+MIN_SAMPLE_STEP_S = 0.9e-3  # closer samples count as one; times in two centuries are rounded to 1e-6 s
 DEFAULT_DEGREE = 7  # for a file that states no degree
-_TRIED_DEGREES = (7, 9, 11, 13, 15)  # for samples with useless velocities
-# Errors of an interpolation from which a warning states them, and from which they are refused at any slant range: the
-# lowest satellites are 500 km away, and a tenth of that is too much.
+_TRIED_DEGREES = (7, 9, 11, 13, 15)  # for samples whose velocities cannot be used
+# An interpolation error above the first value gives a warning. One above the second is refused at any slant range: it
+# is a tenth of 500 km, the smallest distance of a satellite.
 _MIN_STATED_ERROR_M, _MAX_ERROR_M = 1.0, 50_000.0
 _REMEDY = "Write the ephemeris more often"
 _EDGE_S = 1e-9  # a time at the end of a span is inside
-MAX_VELOCITY_ERROR_RATIO = 0.001  # to the speed; a velocity against the stars is up to 7 % off in a low orbit
-_MIN_SPEED_MPS = 100.0  # slower velocities over the ground may be 0.1 m/s off
+MAX_VELOCITY_ERROR_RATIO = 0.001  # to the speed; velocities relative to the stars differ by up to 7 %
+_MIN_SPEED_MPS = 100.0  # at lower speeds over the ground, differences up to 0.1 m/s are accepted
 _NEIGHBOUR_SAMPLES = 4  # samples on each side for the comparison of velocities with positions
 MAX_DENSE_STEP_S = 300.0  # between states of a low orbit; states with a larger step cannot confirm velocities
 # Nodes and weights of Gauss-Legendre quadrature on (0, 1) with three points: Abramowitz & Stegun, table 25.4.
@@ -48,7 +48,7 @@ class Interpolation:
 
     @property
     def words(self) -> str:
-        """Name and degree, for reports."""
+        """Name and degree of the polynomial, for reports."""
         return f"{'Hermite' if self.is_hermite else 'Lagrange'} degree {self.degree}"
 
 
@@ -59,25 +59,25 @@ class Segment:
     Attributes
     ----------
     object : str
-        The object in messages.
+        Name of the object for messages.
     names : tuple of str
         Names by which a mission may choose the object.
     samples : sequence of Sample
-        Times of TAI, positions and velocities.
+        Times in TAI, positions and velocities.
     first, last : Instant
-        First and last useable time, of TAI.
+        First and last useable time, in TAI.
     where : str
-        File and line.
+        File and line, for messages.
     words : str
-        The segment in reports.
+        Description of the segment for reports.
     interpolation : Interpolation, optional
-        The interpolation that the file states. Without it the best is chosen.
+        Interpolation that the file states. If None, the one with the smallest estimated error is chosen.
     axes : str
         Axes of the positions.
     turn : callable, optional
-        Turns positions to the Earth, from axes that are not fixed to the Earth.
+        Function that converts positions to Earth-fixed axes; None if `axes` are fixed to the Earth.
     accuracy : callable
-        Accuracy that the file states at a time of TAI.
+        Function from a time in TAI to the accuracy that the file states, or None.
     covariances : sequence of EpochCovariance
         Covariances that the file states at epochs.
     remarks : tuple of str
@@ -99,7 +99,7 @@ class Segment:
     remarks: tuple[str, ...] = ()
 
     def is_useable(self, time: Instant) -> bool:
-        """Whether a time of TAI is from the first to the last useable time."""
+        """Whether a time in TAI lies between the first and the last useable time."""
         return time.since(self.first) >= -_EDGE_S and time.since(self.last) <= _EDGE_S
 
 
@@ -110,9 +110,9 @@ def orbit_through(
 
     If there are several such segments, the segment that reaches farthest around the middle is used for all instants.
     The error of the interpolation is estimated from the difference to an interpolation with two more degrees. An
-    error of 1 m or more is a doubt.
+    error of 1 m or more gives a warning in `Orbit.doubts`.
 
-    `segments` are the segments of a file. The other arguments are those of the file's reader. Raises `PathFileError`
+    `segments` are the segments of a file. The other arguments are those of `OrbitFormat.read`. Raises `PathFileError`
     if several objects are possible, if the file has no position at `center`, or if it is too sparse there.
     `Orbit.place` raises it outside the span.
     """
@@ -182,7 +182,7 @@ class _Between:
 
     def doubt(self, instant: Instant) -> PathDoubt:
         doubts = (PathDoubt(self._error(instant), "interpolation of the ephemeris"), self.turning_doubt(instant))
-        # Both have different causes; in the worst case they add.
+        # The causes are independent; their sum is the worst case.
         words = ", ".join(doubt.words for doubt in doubts if doubt.words)
         return PathDoubt(doubts[0].size + doubts[1].size, words)
 
@@ -223,7 +223,7 @@ def every(samples: Sequence[Sample]) -> str:
 
 
 def minutes(duration_s: float) -> str:
-    """Words for a time between two states, in s below one minute and in min above."""
+    """Text of a duration [s], in seconds below one minute and otherwise in minutes."""
     return f"{duration_s / 60:.3g} min" if duration_s >= 60 else f"{duration_s:.3g} s"
 
 

@@ -23,59 +23,63 @@ from bisar_budget.paths.instant import DAY_S, Instant, gps_week
 from bisar_budget.paths.splines import SPLINE_ORDER, SplineFit
 from bisar_budget.paths.splines import basis as spline_basis
 
-_CHEBYSHEV_NODES = 15  # of an interpolation
-_MIN_WINDOW_S = 10.0  # in a shorter window the rounding of an Earth-fixed position, 1e-9 m, is an acceleration
+_CHEBYSHEV_NODES = 15  # through which the polynomial of an orbit goes
+_MIN_WINDOW_S = 10.0  # in a shorter window, the rounding of positions, 1e-9 m, would become an acceleration
 _MAX_INTERPOLATION_ERROR_M = (
-    5e-3  # farther from its polynomial, a path is not smooth; messages have positions to 1 mm
+    5e-3  # a larger distance from the polynomial means that the path is not smooth; files round positions to 1 mm
 )
-_ROUNDING_M = 1e-7  # a coefficient that moves the path by less is rounding
-_INTERVAL_ROUNDING_FACTOR = 1 + 1e-6  # on an interval whose ends are rounded
+_ROUNDING_M = 1e-7  # a coefficient that moves the path by less counts as rounding
+_INTERVAL_ROUNDING_FACTOR = 1 + 1e-6  # margin on intervals between rounded times
 _MAX_FIX_GAP_RATIO = 5  # of a gap between fixes to the median interval
 _LISTED_TRACK_COUNT = 3  # in an error
 
 
 @dataclass(frozen=True)
 class SmoothingSettings:
-    """Tunings of the path through the fixes of a log.
+    """Parameters of the path that is fitted to the fixes of a log.
 
     Attributes
     ----------
     min_fixes : int
-        Smallest number of fixes that give a path.
+        Smallest number of fixes to which a path can be fitted.
     noise_fixes : int
-        Number of fixes that tell noise from motion. A stretch is widened beyond the aperture until it has them.
+        Number of fixes that is enough to separate noise from motion. The shortest stretch of fixes contains the
+        aperture and at least this number.
     max_order : int
-        Largest order of a path of one piece.
+        Largest order of a polynomial that is the whole path.
     max_pieces : int
-        Largest number of pieces of a path.
+        Largest number of pieces of a spline.
     tried_coefficients, tried_ratio : int
-        Number of coefficients up to which more pieces are tried although none is better yet: at least this number,
-        which is enough for 40 full circles, and this ratio to the coefficients of the best path.
+        Further pieces are tried, even without improvement, up to the larger of two numbers of coefficients:
+        `tried_coefficients`, enough for 40 full circles, and `tried_ratio` times the number of the best path so far.
     clean_rms_m : float
         Root mean square of residuals below which a path gets no further pieces. [m]
     white_sigmas : float
-        Standard deviations up to which the mean product of neighbouring residuals is chance.
+        If the mean product of neighbouring residuals is at most this number of its standard deviations, the
+        residuals count as white noise.
     min_samples : int
         Smallest number of times over the aperture at which the error of a path is sampled.
     samples_per_piece : int
         Smallest number of such times in a piece.
     mode_fraction : float
-        Modes of the noise below this fraction of the largest mode are rounding.
+        Noise modes smaller than this fraction of the largest mode are left out as rounding.
     stretch_ratio, widest_ratio : float
         Ratio of a stretch to the next narrower stretch, and of the widest to the narrowest stretch.
     max_fitted_fixes : int
         Largest number of fixes in a stretch.
     negligible_noise_m : float
-        Error of the path by the noise of its fit below which no wider stretch is tried: no carrier sees it. [m]
+        If the error of the path due to noise is smaller, no wider stretch is tried. This error is negligible at any
+        carrier frequency. [m]
     chance_factor : float
-        Ratio of the difference of two fits that counts as chance to its variance.
+        The squared difference of two fits counts as noise up to this factor times its variance.
     hopeless_ratio : float
-        Ratio of the squared predicted error to the smallest one from which no wider stretch is tried.
+        If the squared predicted error exceeds the smallest one by this ratio, no wider stretch is tried.
     residual_ratio : float
-        Growth of the residual in the aperture from which a wider fit does not follow the path.
+        If the residual in the aperture grows by more than this ratio, a wider fit is rejected, because it does not
+        follow the path.
     stray_ratio, min_stray_m : float
-        A fix strays from the path by more than this ratio to the median residual, plus this distance [m]. Noise of
-        thousands of fixes reaches a ratio of 4.
+        A warning names a fix whose residual is larger than `stray_ratio` times the median residual plus
+        `min_stray_m` [m]. Noise of thousands of fixes reaches a ratio of 4.
     """
 
     min_fixes: int = 5
@@ -151,23 +155,23 @@ class Orbit:
     place : callable
         Earth-fixed coordinates at an instant. [m]
     words : str
-        The orbit in reports.
+        Description of the orbit for reports.
     span : tuple of Instant, optional
         First and last instant.
     epoch : Instant, optional
         Epoch of the elements.
     doubts : callable
-        Warnings at an instant where the doubt is larger than usual.
+        Function from an instant to warnings about an unusually large uncertainty.
     doubt : callable
-        Largest distance of the true path from the known path at an instant. [m]
+        Function from an instant to the uncertainty of the orbit as a `PathDoubt`, with its size in m.
     remedy : str
-        Words for a way to reduce the doubt.
+        Advice how to reduce the uncertainty.
     is_turned : bool
-        Whether the file states the orbit along axes that are fixed to the stars.
+        Whether the file states the orbit in axes that are not fixed to the Earth.
     turning_doubt, turning_doubts : callable
-        The part of `doubt` and of `doubts` that is due to the Earth's orientation.
+        The parts of `doubt` and `doubts` that are due to the Earth's orientation.
     stated : callable
-        Accuracy that the file states at an instant, along Earth-fixed axes.
+        Function from an instant to the accuracy that the file states, along Earth-fixed axes, or None.
     """
 
     place: Callable[[Instant], Vector]
@@ -183,12 +187,18 @@ class Orbit:
     stated: Callable[[Instant], StatedAccuracy | None] = lambda _: None
 
     def as_planned(self) -> "Orbit":
-        """The orbit as a plan that is flown exactly, without doubts about its age and its interpolation."""
+        """The orbit as a plan that the satellite follows exactly.
+
+        Its uncertainty is then only that of the Earth's orientation, without the age and the interpolation.
+        """
         words = f"{self.words}, flown as planned: its age and its interpolation do not count"
         return replace(self, words=words, doubt=self.turning_doubt, doubts=self.turning_doubts)
 
     def largest_doubt_m(self, instant: Instant) -> float:
-        """Largest distance of the true path at an instant, from its doubt and its stated accuracy. [m]"""
+        """Largest distance of the true path from the orbit at an instant. [m]
+
+        It is the uncertainty `doubt`, or the stated accuracy if that is larger.
+        """
         stated = self.stated(instant)
         return max(self.doubt(instant).size, 0.0 if stated is None else stated.position_m)
 
@@ -214,7 +224,7 @@ class Log:
     is_earth_fixed : bool
         Whether the positions are Earth-fixed.
     words : str
-        The log in reports.
+        Description of the log for reports.
     start : Instant, optional
         Instant of UTC from which times count.
     sigmas : (n, 3), optional
@@ -222,9 +232,9 @@ class Log:
     typical_sigmas : (n,), optional
         Usual one-sigma error of a fix of the stated quality, on each axis; NaN at a fix without a quality. [m]
     quality_words : callable
-        Quality of the fix of an index, such as "GGA quality 1, autonomous".
+        Function from the index of a fix to its quality in words, such as "GGA quality 1, autonomous".
     clock : str
-        "day" if times count from a midnight of UTC, "week" if they count from the begin of a GPS week.
+        "day" if times count from a midnight of UTC, "week" if they count from the beginning of a GPS week.
     left_out : LeftOut, optional
         Records that cannot be used and are not among the fixes.
     tracks : tuple of Log
@@ -258,7 +268,7 @@ class Fitted:
     order : int
         Order of the polynomials.
     farthest, rms : float
-        Distance of the path from positions of the file: the largest, and the root mean square. [m]
+        Largest and root-mean-square distance of the path from the positions of the file. [m]
     samples : int
         Number of fixes of a log that the path smooths; 0 for an orbit, which is interpolated.
     doubts : tuple of str
@@ -272,10 +282,11 @@ class Fitted:
     correlation_time : float
         Correlation time of a Gauss-Markov process that is correlated like the residuals. [s]
     acceleration_noise : (3, 3)
-        Covariance of the error of the acceleration by the noise of the fit and by the smear of a wider stretch: at
-        mid-aperture for one polynomial, and of the parabola through the error for pieces. [m²/s⁴]
+        Covariance of the acceleration error due to the noise of the fit and the smear of a wider stretch. For one
+        polynomial, it is the error at mid-aperture. For several pieces, it is the acceleration of the parabola that
+        fits the error over the aperture. [m²/s⁴]
     path_noise : PathNoise, optional
-        The same error over the aperture.
+        Error of the path over the aperture due to the same causes.
     pieces : int
         Number of polynomials. Neighbouring polynomials meet with equal position and velocity.
     """
@@ -307,13 +318,13 @@ def interpolated(
     aperture_time_s : float
         Length of the aperture. [s]
     widest_s : float
-        Length of the longest time span around the middle in which positions are known. [s]
+        Length of the time span around mid-aperture in which positions are known. [s]
     """
     half = min(max(aperture_time_s, _MIN_WINDOW_S), widest_s) / 2
     nodes = chebyshev.chebpts1(_CHEBYSHEV_NODES)
     basis = chebyshev.chebvander(nodes, _CHEBYSHEV_NODES - 1)
     series: Floats = np.asarray(np.linalg.solve(basis, positions_at(half * nodes)), dtype=float)
-    series[np.abs(series) <= _ROUNDING_M] = 0.0  # high powers of the window would magnify rounding
+    series[np.abs(series) <= _ROUNDING_M] = 0.0  # in high powers of time, the rounding would be magnified
     state = path_of(powers_of(series, half, chebyshev.cheb2poly))
     times = aperture_time_s / 2 * np.cos(math.pi * np.arange(_CHEBYSHEV_NODES + 1) / _CHEBYSHEV_NODES)
     distances = np.linalg.norm(np.stack(state.place(times), axis=1) - positions_at(times), axis=1)
@@ -547,11 +558,11 @@ def _widened(
     sample_times, has_pieces = narrowest.sample_times(aperture_time_s), narrowest.spline is not None
     straight = np.linalg.qr(np.vander(sample_times, 2))[0]
     line_projection, no_projection = straight @ straight.T, np.zeros((sample_times.size, sample_times.size))
-    projections = (line_projection, no_projection)  # for the error beyond a straight line, and for the whole error
+    projections = (line_projection, no_projection)  # that leave the error beyond a straight line, and the whole error
     max_half_s = min(
         widest_s / 2, max(abs(float(times[0])), abs(float(times[-1]))), _SMOOTHING.widest_ratio * narrowest.half_s
     )
-    if has_pieces:  # noise of distant fixes does not reach the aperture: only its ends gain
+    if has_pieces:  # a wider stretch reduces the noise only at the ends of the aperture
         max_half_s = min(max_half_s, _SMOOTHING.stretch_ratio * narrowest.half_s)
     half_s = narrowest.half_s
     candidates = [(narrowest, [narrowest.noise(sample_times, projection) for projection in projections])]
@@ -713,9 +724,9 @@ def slow_times(
     Raises
     ------
     PathFileError
-        The log does not cover the aperture, give or take one fix. Or it has a gap in the aperture of more than five
-        times the median interval, in the aperture or in the log. Or the middle is on a clock that the log does not
-        have.
+        The log begins or ends more than one median interval inside the aperture, has a gap in the aperture, or does
+        not have the clock on which the middle is given. A gap is longer than five median intervals. The median is the
+        smaller one of the medians in the aperture and in the whole log.
     """
     times, start = log.times, log.start
     _hold_to_clock(log, center, center_seconds, name)
@@ -739,10 +750,10 @@ def slow_times(
             return ""
         return f"; {log.left_out.faults[int((log.left_out.before == index).argmax())]}"
 
-    # The interval before the aperture and the interval after it lead into it.
+    # The intervals across both ends of the aperture are checked too.
     near_times = slow[around_aperture(slow, aperture_time_s)]
     steps = np.diff(near_times)
-    # A gap that is as long as the aperture is the only step in it, so the median step of the log counts too.
+    # If a gap spans the whole aperture, it is the only interval there, so the median of the whole log is needed too.
     usual_step = min(float(np.median(steps)), float(np.median(np.diff(slow)))) if steps.size else 0.0
     longest_step = usual_step * _INTERVAL_ROUNDING_FACTOR
     if slow[0] > -half + longest_step or slow[-1] < half - longest_step:
@@ -866,8 +877,8 @@ def hold_to_usable_records(log: Log, times: Floats, stretch_s: float) -> None:
 def widest_stretch(log: Log, times: Floats, aperture_time_s: float) -> float:
     """Longest time around the middle of an aperture within which a log is complete. [s]
 
-    It ends before an unusable record, and before a gap of more than five median intervals. Outside the stretch that
-    the path needs, neither makes the log unusable, but the path within them is unknown.
+    It ends before an unusable record, and before a gap of more than five median intervals. These do not make the log
+    unusable if they lie outside the stretch that the path needs, but fixes beyond them are not used.
 
     Parameters
     ----------
@@ -1001,6 +1012,6 @@ def _through(samples: Sequence[Sample], times: Sequence[float], is_hermite: bool
                 terms[axis].append(velocity_weight * sample.velocity[axis])
     try:
         x, y, z = (math.fsum(axis) for axis in terms)
-    except (OverflowError, ValueError):  # two samples are much closer to each other than all further samples
+    except (OverflowError, ValueError):  # some samples are so close to each other that a quotient overflows
         return (math.nan, math.nan, math.nan)
     return (x, y, z)

@@ -55,36 +55,36 @@ from bisar_budget.paths.log_places import (
     usable_log,
 )
 
-MAX_CSV_BYTES = 200_000_000  # bytes; four hours at 200 Hz
-_CHUNK_LINES = 1 << 16  # lines that are text and numbers at once
-_FARTHEST_M = 1e9  # of a place; beyond the Moon
-_LATEST_S = 1e11  # of a time; 3000 years, so that Unix time is one
-_DEEPEST_M = 6.2e6  # m from the Earth's centre; the poles are at 6.357e6
+MAX_CSV_BYTES = 200_000_000  # four hours at 200 Hz
+_CHUNK_LINES = 1 << 16  # lines that are in memory both as text and as numbers
+_FARTHEST_M = 1e9  # of a coordinate; beyond the Moon
+_LATEST_S = 1e11  # of a time; 3000 years, so that Unix time is accepted
+_DEEPEST_M = 6.2e6  # smallest distance from the Earth's centre; the poles are at 6.357e6 m
 _MAX_LATITUDE_RAD = math.pi / 2 * (1 + 1e-12)  # 90 deg, rounded
 _GEODETIC = ("latitude", "longitude", "height")
 _POSITION_COLUMNS = (_GEODETIC, ("x", "y", "z"), ("east", "north", "up"))
-_STAMPS = {"utc": "utc", "gpst": "gps", "gps": "gps", "tai": "tai"}  # names of columns, or units of a time
+_STAMPS = {"utc": "utc", "gpst": "gps", "gps": "gps", "tai": "tai"}  # time scales by column name or by unit of `time`
 _SPARE = ("altitude", "geoid_separation")
 _LEVEL_ACCURACIES = ("horizontal_accuracy", "vertical_accuracy")
-_TOTAL = "position_accuracy"  # without a direction: along any axis
+_TOTAL = "position_accuracy"  # has no direction, and may lie along any axis
 _SIGMA_COLUMNS = tuple(
     tuple(f"sigma_{axis}" for axis in kind) for kind in (_POSITION_COLUMNS[2], _POSITION_COLUMNS[1])
 )
 _VARIANCE = "variance_"
 _EMPTY_CELLS = frozenset(("", "nan", "n/a", "na", "null", "none", "-", "--"))
-_NO_NUMBER = -math.inf  # of a cell of an accuracy that cannot be read
+_NO_NUMBER = -math.inf  # value of an accuracy cell that cannot be read
 _COLUMN_DIMENSIONS = {"latitude": units.ANGLE, "longitude": units.ANGLE, "time": units.TIME}
 _COLUMN_HEADER_PATTERN = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?")
 _QUOTED = re.compile('"').search
 _IN_NUMBERS = b"0123456789+-.eE \t"
-_SECOND = r"(?:[0-5]\d(?:[.,]\d{1,12})?|60(?:[.,]0{1,12})?)"  # 60.00 is what 59.996 is rounded to
+_SECOND = r"(?:[0-5]\d(?:[.,]\d{1,12})?|60(?:[.,]0{1,12})?)"  # receivers round 59.996 to 60.00
 _ZONED = re.compile(_SECOND + r"(?:Z|\+00:?00)", re.ASCII).fullmatch
 _BARE = re.compile(_SECOND, re.ASCII).fullmatch
 _EITHER = re.compile(_SECOND + r"(?:Z|\+00:?00)?", re.ASCII).fullmatch
 _DATUM = re.compile(r"#\W*(?:geodetic )?(?:datum|crs|reference (?:frame|system))\s*[:=]\s*(\S.*)", re.IGNORECASE)
-_MAX_SCANNED_ROWS = 64  # looked at one by one
+_MAX_SCANNED_ROWS = 64  # that are checked one by one, to find the unusable rows
 _EXAMPLE = "2026-06-01T05:20:31.250Z"
-_CLOCKS_APART_S = 1.0  # of an exporter's two clocks, beyond the second to which one is written
+_CLOCKS_APART_S = 1.0  # accepted drift of an exporter's two clocks, beyond the rounding of one to seconds
 
 
 class _Column(NamedTuple):
@@ -173,9 +173,10 @@ def is_csv(data: bytes) -> bool:
 
 
 def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
-    """Read a flight log in UTF-8, of at most `MAX_CSV_BYTES` bytes, as every reader of `LOG_FORMATS` does.
+    """Read a flight log in UTF-8 of at most `MAX_CSV_BYTES` bytes.
 
-    Geodetic positions become Earth-fixed positions. Time stamps become seconds after the first time stamp.
+    Arguments and errors are the same for all readers, see `LogFormat.read`. Geodetic positions are
+    converted to Earth-fixed positions, and time stamps to seconds after the first time stamp.
     """
     lines = _dataflash_as_csv(_text(data, name).split("\n"))
     header = _header(lines, name, keys)
@@ -317,7 +318,7 @@ def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> 
 
 
 def _positions(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) -> Floats:
-    """Coordinates (3, n) along the axes of the header. [rad] for latitude and longitude, otherwise [m]
+    """Coordinates (3, n) along the axes of the header, with latitude and longitude in rad and all others in m.
 
     An altitude is converted to a height above the ellipsoid. Rows with impossible coordinates are left out of
     `records`.
@@ -440,7 +441,7 @@ def _text(data: bytes, name: str) -> str:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         at = error.start
-        # The codec that skips the mark counts from behind it.
+        # The codec skips the byte order mark, and counts offsets from the byte after it.
         at += 3 if data.startswith(b"\xef\xbb\xbf") and error.object != data else 0
         fault = f"has the byte 0x{data[at]:02x}, which is not UTF-8; save it in UTF-8"
         raise PathFileError(f"{name}:{_line_of(data, at)}: {fault}") from None
@@ -639,7 +640,7 @@ def _vendor_header(
     def refuse(says: str) -> NoReturn:
         raise PathFileError(f"{where}: {says}")
 
-    # What somebody has added to an exporter's columns counts like that of a plain log.
+    # Columns that a user has added to those of an exporter are read as in a plain log.
     added_cells = ["" if cell.strip().lower() in vendor.columns else cell for cell in cells]
     level = {name: columns.pop(name) for name in _LEVEL_ACCURACIES if name in columns}
     accuracy = _accuracy_columns(added_cells, _GEODETIC, refuse, level)
@@ -695,7 +696,7 @@ def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
     is_any = False
     for first in range(header.line, len(lines), _CHUNK_LINES):
         chunk = lines[first : first + _CHUNK_LINES]
-        kept = [n for n, line in enumerate(chunk) if line[:1] > "#" or _has_content(line)]  # numbers begin behind #
+        kept = [n for n, line in enumerate(chunk) if line[:1] > "#" or _has_content(line)]  # numbers sort after #
         if kept:
             is_any = True
             _read_rows([chunk[n] for n in kept], np.array(kept) + first + 1, header, name, rows)
@@ -724,7 +725,7 @@ def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name
         return
     is_sound = []
     for text, line in zip(texts, lines.tolist(), strict=True):
-        is_empty = header.vendor is not None and not _is_complete(text, header)  # before the first fix
+        is_empty = header.vendor is not None and not _is_complete(text, header)  # the exporter has no fix yet
         fault = None if is_empty else _row_fault(text, header)
         rows.empty += is_empty
         if fault is not None:

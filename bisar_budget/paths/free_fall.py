@@ -1,8 +1,8 @@
-"""Errors of platforms in free fall, which follow the linearised dynamics of the orbit.
+"""Motion errors of platforms in free fall, from the linearised dynamics of the orbit.
 
-A satellite whose measured state is wrong at mid-aperture is assumed on a slightly different orbit. The difference
-between both orbits is not a straight line: a height error changes the orbital period, and gravity is evaluated at a
-wrong position.
+If the measured state of a satellite is wrong at mid-aperture, the satellite is assumed to be on a slightly different
+orbit. The difference between the two orbits is not a straight line: a height error changes the orbital period, and
+gravity is evaluated at a wrong position.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2, EART
 from bisar_budget.geometry import PlatformState, Vectors, cross, norm
 from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S, SceneAxes, free_fall
 
-FREE_FALL_FRACTION = 0.05  # of gravity, by which the acceleration of a path in free fall may differ from free fall
+FREE_FALL_FRACTION = 0.05  # of gravity; a path in free fall has an acceleration that differs by less
 _NODE_COUNT = 12  # of the collocation; over half a radian of an orbit its error is 1e-12 of the motion
 
 

@@ -33,7 +33,7 @@ from bisar_budget.paths.messages import MessageElement, hold_to_size, number_in,
 _ROOT_ELEMENT = re.compile(rb"<(?:[\w.-]+:)?gpx[\s>]")
 _STAMP_WITH_OFFSET = re.compile(
     r"([\d-]{10}T[\d:.]{8,21})([+-])(\d\d)(?::?([0-5]\d))?", re.ASCII
-)  # extended, or basic form of ISO 8601
+)  # extended or basic form of ISO 8601
 _FIXES_WITHOUT_HEIGHT = ("none", "2d")
 _SHOWN_TRACK_COUNT = 10  # in an error
 
@@ -45,11 +45,11 @@ def is_gpx(data: bytes) -> bool:
 
 
 def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read the track of a file, as every reader of `LOG_FORMATS` does.
+    """Read the track of a GPX file.
 
-    If the mission file states the time scale utc, times need no zone. If there are several tracks, the mission file
-    may choose one by its name or number. Otherwise, `tracks` of the log has all tracks that can be read. A track that
-    cannot be read is no flight.
+    Arguments and errors are the same for all readers, see `LogFormat.read`. If the mission file states the time scale
+    utc, times need no zone. If there are several tracks, the mission file may choose one by its name or number. If it
+    does not, `tracks` of the log contains all tracks that can be read, and other tracks are ignored.
     """
     hold_to_scale("utc", keys, name)
     hold_to_size(len(data), name, "track")

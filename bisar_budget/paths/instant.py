@@ -10,12 +10,12 @@ DAY_S = 86400.0
 WEEK_S = 604800.0  # s
 GPS_EPOCH_DAY = 44244  # MJD of 1980-01-06
 UNIX_EPOCH_DAY = 40587  # MJD of 1970-01-01
-_MJD_EPOCH_DAY = 678576  # the ordinal of the date of day 0, which `date.toordinal` counts
+_MJD_EPOCH_DAY = 678576  # `date.toordinal` of 1858-11-17, the day 0 of MJD
 _ROUNDED_MINUTE = re.compile(r"(.*:)60((?:[.,]0{1,12})?(?:Z|[+-]\d\d:?\d\d)?)", re.ASCII)
 _ISO_8601 = re.compile(
     r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,12}))?(Z|[+-]\d\d:?\d\d)?", re.ASCII
 )
-_MAX_OFFSET_HOURS = 18  # of a local time from UTC, as in users of ISO 8601
+_MAX_OFFSET_HOURS = 18  # of a local time from UTC, the limit in common readers of ISO 8601
 
 
 class Instant(NamedTuple):
@@ -97,7 +97,7 @@ def parse_stamp(text: str, *, needs_zone: bool = True) -> Instant | None:
 # ---------------------------------------------------------------------- other time systems
 # TAI - UTC: table of the Earth orientation centre of the IERS, Bulletin C 52 (2016-07-06) and before. No leap second
 # came after that of 2016-12-31; one that is announced later needs a line here.
-# The month from which a difference holds; it grew by one second each time, from 10 s on.
+# Months from which on a new difference is valid. It was 10 s at first, and grew by 1 s each time.
 _LEAP_MONTHS = (
     "1972-01 1972-07 1973-01 1974-01 1975-01 1976-01 1977-01 1978-01 1979-01 1980-01 1981-07 1982-07 1983-07 1985-07 "
     "1988-01 1990-01 1991-01 1992-07 1993-07 1994-07 1996-01 1997-07 1999-01 2006-01 2009-01 2012-07 2015-07 2017-01"
@@ -105,7 +105,7 @@ _LEAP_MONTHS = (
 _LEAP_DAYS = tuple(date.fromisoformat(f"{month}-01").toordinal() - _MJD_EPOCH_DAY for month in _LEAP_MONTHS.split())
 FIRST_UTC_DAY = _LEAP_DAYS[0]  # before it UTC ran at another rate than TAI
 
-SCALES = {"utc": "UTC", "gps": "GPST", "tai": "TAI"}  # names in logs by names in the mission file
+SCALES = {"utc": "UTC", "gps": "GPST", "tai": "TAI"}  # from names in the mission file to names in logs
 # TAI less a system [s]. GPS: IS-GPS-200, 20.3.3.5.2.4, 19 leap seconds at its epoch. TT: IAU 1991, Recommendation IV.
 TAI_LESS = {"TAI": 0.0, "GPS": 19.0, "TT": -32.184}
 
@@ -121,7 +121,7 @@ def has_leap_second(day: int) -> bool:
 
 
 def gps_week(instant: Instant) -> int:
-    """GPS week, not rolled over, at an instant of UTC."""
+    """Number of the GPS week at an instant of UTC, counted from 1980 without rollover."""
     return (tai(instant).after(-TAI_LESS["GPS"]).day - GPS_EPOCH_DAY) // 7
 
 
@@ -134,7 +134,7 @@ def later(instant: Instant, seconds: float) -> Instant:
     """The instant of UTC after a number of elapsed seconds, leap seconds included."""
     without_leaps = instant.after(seconds)
     if tai_less_utc(without_leaps.day) == tai_less_utc(instant.day):
-        return without_leaps  # a way through TAI would round twice
+        return without_leaps  # a conversion to TAI and back would round twice
     return utc(tai(instant).after(seconds))
 
 

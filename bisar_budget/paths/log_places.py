@@ -16,12 +16,12 @@ from bisar_budget.paths.instant import SCALES, TAI_LESS, UNIX_EPOCH_DAY, Instant
 from bisar_budget.paths.position_grid import cartesian_grid, geodetic_grid
 from bisar_budget.units import format_quantity
 
-# Realisations of both agree to some centimetres, those of WGS-84 from G730 on. EPSG: 4326 and 4979 are WGS-84.
+# WGS-84 from G730 on agrees with the ITRF to some centimetres. EPSG: 4326 and 4979 are WGS-84.
 _WGS84 = re.compile(
     r"WGS[-_ /]?(?:19)?84(?:[ (]+G\d+\)?)?|W84|(?:ITRF|IGS|IGb)[- ]?\d*|EPSG:+(?:4326|4979)", re.ASCII | re.IGNORECASE
 )
 _FIRST_UNKNOWN_LEAP_DAY = 61587  # MJD, 2027-07-01: Bulletin C 72 has no leap second before
-_MIN_FIXES_PER_STAMP = 1.5  # with fewer, the recorder has not cut the fractions of seconds
+_MIN_FIXES_PER_STAMP = 1.5  # with fewer, the recorder has not truncated times to whole seconds
 _WHOLE_SECOND_ERROR_S = 1e-6
 _MAX_LOG_SIGMA_M = 1e6  # a receiver without a fix writes more
 _MIN_HEIGHT_M, _MAX_HEIGHT_M = -12e3, 100e3  # from the deepest trench to the border of space
@@ -30,9 +30,9 @@ _MIN_HEIGHT_M, _MAX_HEIGHT_M = -12e3, 100e3  # from the deepest trench to the bo
 class LogKeys(NamedTuple):
     """Keys of a mission file that describe a log.
 
-    They are the GPS week in which the log begins, the time scale, and the height of the geoid above the ellipsoid
-    [m]. Three more keys choose one log in a file with several: the talker of NMEA, the track of GPX by name or
-    number, and the instance of a receiver.
+    `week` is the GPS week in which the log begins, and `geoid_separation` the height of the geoid above the ellipsoid
+    [m]. If a file contains several logs, one is chosen by the `talker` of NMEA, by the `track` of GPX (name or
+    number), or by the `instance` of a receiver. None means that the mission file does not state the key.
     """
 
     week: int | None = None
@@ -313,7 +313,7 @@ def from_sea_level(heights: Floats, separations: Floats | None, keys: LogKeys, n
     """
     if separations is not None:
         hold_to_ellipsoid(keys, name, "gives the geoid separation itself")
-        with np.errstate(over="ignore", invalid="ignore"):  # a height that cannot be is refused later
+        with np.errstate(over="ignore", invalid="ignore"):  # impossible heights are refused later
             return heights + separations
     if keys.geoid_separation is None:
         raise needs_separation(f"{name}: has heights above mean sea level, and no geoid separation")
@@ -461,8 +461,8 @@ def counted(number: int, noun: str = "fix") -> str:
 # filter that is reset, or a wrong cell, makes a step that no platform takes. A polynomial through such fixes is
 # smooth all the same, and wrong. Deviations below the limits here are noise, and count as the residual.
 _MAX_STILL_EXTENT_M = 1e-3  # over a whole aperture; the noise of any receiver is more
-_SAME_FIX_M = 1e-6  # equal numbers that are turned to the scene's axes differ by 1e-9 m
-_MIN_FAULT_M = 0.1  # shortest way that repeats miss, or smallest jump: six decimals of a degree round by this
+_SAME_FIX_M = 1e-6  # equal positions differ by 1e-9 m after conversion to the scene's axes
+_MIN_FAULT_M = 0.1  # smallest motion during repeated fixes, and smallest jump; six decimals of a degree are 0.1 m
 _MAX_ACCELERATION_MPS2 = 30.0  # 3 g; no platform reverses it within three samples
 _MEDIAN_FACTOR = 20  # the largest of thousands of normal numbers is 4 medians, the largest of rough noise 10
 _NEIGHBOUR_STEPS = 3  # steps on each side with which a step is compared
@@ -486,15 +486,15 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
     Raises
     ------
     PathFileError
-        The log fails one of three checks. All fixes in the stretch agree to 1 mm. Or fixes repeat the fix before them
-        for so long that the platform, at its mean speed, moves by more than 0.1 m. Or a step differs from the median
-        of the seven steps around it by more than 0.1 m, by more than 3 g can cause, and by more than 20 times the
-        median of such differences.
+        The log has one of three faults. First, all fixes in the stretch are equal to 1 mm. Second, a fix is repeated
+        for a time in which the platform, at its mean speed, moves by more than 0.1 m. Third, a step differs from the
+        median of the seven steps around it by more than 0.1 m, by more than 3 g can cause, and by more than 20 times
+        the median of such differences.
     """
     half = stretch_s / 2 * (1 + 1e-9)
     first, last = int(np.searchsorted(times, -half, "left")), int(np.searchsorted(times, half, "right"))
     flown_times, flown_positions = times[first:last], positions[first:last]
-    if flown_times.size < 2 * _NEIGHBOUR_STEPS - 1:  # too few for a path, too
+    if flown_times.size < 2 * _NEIGHBOUR_STEPS - 1:  # too few fixes, which are also too few for a path
         return
     extent = float(np.linalg.norm(flown_positions - flown_positions[0], axis=1).max())
     if extent <= _MAX_STILL_EXTENT_M:

@@ -54,14 +54,14 @@ _ANYWHERE = re.compile(rb"\$[A-Z]{2}(?:GGA|GNS|RMC|ZDA),[^\r\n$]{0,250}\*[0-9A-F
 _UTC_TIME_PATTERN = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d{1,9})?|60(?:\.0{1,9})?)", re.ASCII)
 _ANGLE_PATTERN = re.compile(r"(\d{1,3})([0-5]\d(?:\.\d{1,12})?)", re.ASCII)
 _HEIGHT_PATTERN = re.compile(r"[+-]?\d{1,9}(?:\.\d{0,12})?", re.ASCII)
-_TIME_STEP_S = 1e-4  # less than between two fixes, more than a rounding of days
-_SAME_PLACE_M = 0.5  # of two sentences; four decimals of a minute are 0.2 m on each axis
+_TIME_STEP_S = 1e-4  # smaller than the interval of fixes, and larger than the rounding of days
+_SAME_PLACE_M = 0.5  # largest distance of equal positions in two sentences; 1e-4 minute of arc is 0.2 m
 _FIX_SENTENCES = ("GGA", "GNS")  # kinds with a position
 _DATES = ("RMC", "ZDA")
 _COMPANION_SENTENCES = ("GST", "DTM")  # kinds that come with a fix, at most one each
 _CHECKED = re.compile(r"\$([^*]+)\*([0-9A-Fa-f]{2})", re.ASCII)
-_REFERENCES = ("W84", "")  # of DTM; an offset from another datum is none from WGS-84
-_GST_REACH_S = 5.0  # from a fix to a GST that speaks for it; receivers write one a second, or fewer than fixes
+_REFERENCES = ("W84", "")  # of DTM; other reference datums are refused, because their offsets are not from WGS-84
+_GST_REACH_S = 5.0  # largest time from a fix to a GST that applies to it; receivers write GST less often than fixes
 
 
 class _Quality(NamedTuple):
@@ -74,8 +74,8 @@ class _Quality(NamedTuple):
     typical_sigma_m: float
 
 
-# GGA: 0 is none, 7 is put in by hand, 8 is a simulator's. Dead reckoning is no better than an autonomous fix, a
-# precise fix no better than a differential one.
+# Qualities of GGA. Not listed: 0 is no fix, 7 is manual input, 8 is a simulator. Dead reckoning counts as an
+# autonomous fix, and a precise fix as a differential fix.
 _QUALITIES = {
     "1": _Quality("GGA quality 1, autonomous", 3.0),
     "2": _Quality("GGA quality 2, differential", 1.0),
@@ -84,7 +84,7 @@ _QUALITIES = {
     "5": _Quality("GGA quality 5, RTK float", 0.3),
     "6": _Quality("GGA quality 6, dead reckoning", 3.0),
 }
-# GNS, one of each system: N is none, M is put in by hand, S is a simulator's.
+# Modes of GNS, a letter for each system. Not listed: N is no fix, M is manual input, S is a simulator.
 _MODES = {
     "A": _Quality("GNS mode A, autonomous", 3.0),
     "D": _Quality("GNS mode D, differential", 1.0),
@@ -161,10 +161,11 @@ def is_nmea(data: bytes) -> bool:
 
 
 def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read an NMEA 0183 log of at most `MAX_NMEA_BYTES` bytes, as every reader of `LOG_FORMATS` does.
+    """Read an NMEA 0183 log of at most `MAX_NMEA_BYTES` bytes.
 
-    The fixes come from GGA or GNS sentences, whichever are more numerous. If both exist, their positions must agree,
-    and the worse quality counts. The package pynmea2 is required.
+    Arguments and errors are the same for all readers, see `LogFormat.read`. The fixes come from GGA or GNS sentences,
+    whichever are more numerous. If both exist, their positions must agree, and the worse quality is used. The package
+    pynmea2 is required.
     """
     hold_to_scale("utc", keys, name)
     hold_to_bytes(data, MAX_NMEA_BYTES, name)
@@ -237,7 +238,7 @@ class _Sentences:
 
         Only the datums that the talker states count, and those of talkers without fixes.
         """
-        # A datum that no sound sentence states counts as it reads: left out, its places would pass for WGS-84.
+        # DTM sentences with a wrong checksum count if a talker has no others: without them, WGS-84 would be assumed.
         datums = {**self.doubtful_datums, **self.datums}
         for speaker in datums.keys() - self.other_receivers(talker):
             is_sound = speaker in self.datums
@@ -272,7 +273,7 @@ class _Sentences:
                 continue
             index = min(
                 candidates, key=lambda candidate: abs(fixes[candidate].line - counterpart.line)
-            )  # a log may have several days
+            )  # if the log covers several days, the time occurs on each of them
             fix = fixes[index]
             alike += 1
             if fix.distance(counterpart) > _SAME_PLACE_M:
@@ -410,7 +411,7 @@ def _log(talker: str, kind: str, sentences: _Sentences, name: str, keys: LogKeys
     words += sentences.unusable_words(talker)
     log = geodetic_log(records, words, times, start, "utc", (latitude, longitude, heights))
     qualities = [fix.quality for fix, is_usable in zip(fixes, records.is_usable.tolist(), strict=True) if is_usable]
-    # Without dates, times of day are those of day 0 or of its neighbours.
+    # Without dates, times are counted from day 0, and may lie on the days next to it.
     at = (days * DAY_S + seconds)[records.is_usable]
     return replace(
         log,
@@ -485,7 +486,7 @@ def _clock(text: str, where: str) -> float:
     match = _UTC_TIME_PATTERN.fullmatch(text)
     if match is None:
         _refused(where, "must have a time like 052001.25", text)
-    return int(match[1]) * 3600.0 + int(match[2]) * 60.0 + float(match[3])  # 60.00 is what 59.996 is rounded to
+    return int(match[1]) * 3600.0 + int(match[2]) * 60.0 + float(match[3])  # receivers round 59.996 to 60.00
 
 
 def _angle(text: str, side: str, sides: str, where: str) -> float:
@@ -545,7 +546,7 @@ def _gst(fields: Sequence[str], where: str, line: int) -> _Accuracy | None:
     if all(map(math.isnan, (semi_major, north, east, up))) and not unusable:
         return None
     if semi_major > math.hypot(north, east) or math.isnan(north + east):
-        # No axis has a larger error than the ellipse, which none of them can belong to otherwise.
+        # The semi-major axis is the upper bound for each axis. It is used if axes are missing or contradict it.
         north, east = (float(np.fmax(sigma, semi_major)) for sigma in (north, east))
     return _Accuracy(line, _clock(fields[0], where), east, north, up, unusable)
 
@@ -568,7 +569,7 @@ def _rmc(fields: Sequence[str], where: str, line: int) -> Instant | None:
     date = fields[8]
     if not re.fullmatch(r"\d{6}", date, re.ASCII):
         _refused(where, "must have a date like 010626", date)
-    century = "19" if int(date[4:]) >= 80 else "20"  # as RTKLIB has it; GPS began in 1980
+    century = "19" if int(date[4:]) >= 80 else "20"  # as in RTKLIB; GPS began in 1980
     return _dated_at(f"{century}{date[4:]}-{date[2:4]}-{date[:2]}", fields[0], date, where)
 
 

@@ -92,7 +92,9 @@ class _EphemerisBlock:
 def read_oem(
     data: bytes, name: str, object_name: str | None, center: Instant, orientation: Orientation = UNKNOWN
 ) -> Orbit:
-    """Orbit from an orbit ephemeris message, as every reader of `ORBIT_FORMATS` gives it.
+    """Read an orbit ephemeris message, and return the orbit of an object.
+
+    Arguments and errors are the same for all readers, see `OrbitFormat.read`.
 
     If the message states no interpolation, it is interpolated by Hermite's polynomial of degree 7 if its velocities
     agree with its positions, and otherwise by Lagrange's polynomial of degree 7. A polynomial of degree n goes
@@ -168,7 +170,7 @@ def _segment(block: _EphemerisBlock, name: str, orientation: Orientation) -> Seg
     first = max(samples[0].time, limits.get("USEABLE_START_TIME", limits["START_TIME"]))
     last = min(samples[-1].time, limits.get("USEABLE_STOP_TIME", limits["STOP_TIME"]))
     for key, end, neighbour in (("START_TIME", samples[0], samples[1]), ("STOP_TIME", samples[-1], samples[-2])):
-        # A file that was cut off between two lines is readable, but ends before the time that it promises.
+        # A file that was truncated after a complete line can be read, but ends before the stated time.
         step = end.time.since(neighbour.time)
         if limits[key].since(end.time) * math.copysign(1, step) > abs(step):
             raise PathFileError(
@@ -234,7 +236,7 @@ def read_covariance(
 
 
 def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
-    """Words that say that the message does not state the interpolation, or its degree; empty if it states both."""
+    """Note that the message states no interpolation, or no degree; empty if it states both."""
     kind, degree = (metadata.get(key, (0, ""))[1].upper() for key in ("INTERPOLATION", "INTERPOLATION_DEGREE"))
     if not kind:
         return " (the file states no interpolation)"
@@ -269,7 +271,7 @@ def _interpolation(
         )
     is_hermite = kind.upper() == "HERMITE" or (not kind and error_ratio <= MAX_VELOCITY_ERROR_RATIO)
     if is_hermite:
-        degree = max(degree | 1, 3)  # n samples give 2n coefficients; a single sample would give jumps
+        degree = max(degree | 1, 3)  # n samples give 2n coefficients; with a single sample the path would jump
     interpolation = Interpolation(is_hermite, degree)
     if len(samples) < interpolation.nodes:
         raise PathFileError(

@@ -40,10 +40,10 @@ class Orientation(NamedTuple):
     pole : tuple of float
         Position of the pole, x towards Greenwich and y towards 90° west. [rad]
     ut1_doubt, pole_doubt : float
-        Largest errors of UT1 - UTC and of the pole. [s], [rad] Without values they are 0.1 s, which a report warns
-        of, and the largest distance that the pole reaches.
+        Largest errors of UT1 - UTC [s] and of the pole [rad]. The defaults apply if no values are known: an example
+        of 0.1 s, which reports mention in a warning, and the largest distance that the pole reaches.
     day : int, optional
-        Day of UTC to which UT1 - UTC belongs, so that a leap second does not turn the Earth. None is any day.
+        Day of UTC to which UT1 - UTC belongs, so that UT1 has no jump at a leap second. None means any day.
     is_predicted : bool
         Whether the values are predictions, for reports.
     """
@@ -68,7 +68,7 @@ class Orientation(NamedTuple):
         return instant.after(self.ut1_minus_utc + leaps)
 
     def misplaced(self, position: Vector) -> tuple[float, float]:
-        """Largest errors of a position due to the doubts of UT1 and of the pole. [m]"""
+        """Largest errors of a position due to `ut1_doubt` and to `pole_doubt`. [m]"""
         turned = ROTATION_RATE_RAD_PER_S * self.ut1_doubt * math.hypot(position[0], position[1])
         return turned, self.pole_doubt * math.hypot(*position)
 
@@ -144,7 +144,7 @@ def celestial_turn(is_j2000: bool, orientation: Orientation = UNKNOWN) -> Turn:
 
 # ---------------------------------------------------------------------- tables of the IERS
 _QUANTITIES = ("MJD", "x of the pole", "its error", "y of the pole", "its error", "UT1 - UTC", "its error")
-# Columns of a row of finals2000A, from 0, by the IERS' readme.finals2000A: of Bulletin A, then of Bulletin B.
+# Character columns of finals2000A, from 0, for Bulletin A and then for Bulletin B (readme.finals2000A of the IERS).
 _FINALS_COLUMNS = ((7, 15), (18, 27), (27, 36), (37, 46), (46, 55), (58, 68), (68, 78))
 _BULLETIN_B_COLUMNS = {1: (134, 144), 3: (144, 154), 5: (154, 165)}
 _PREDICTION_FLAGS = (16, 57)  # columns of finals2000A, I or P, of the pole and of UT1 - UTC
@@ -154,7 +154,7 @@ _BULLETIN_B_KEYS = {1: ("bulB/x_pole",), 3: ("bulB/y_pole",), 5: ("bulB/UT-UTC",
 _CELESTRAK_KEYS = ("MJD", "X", "", "Y", "", "UT1-UTC", "")
 # Indices in a row of C04: series 20 and later have 21 values with an hour, series 14 and 08 have 16 values.
 _C04_COLUMNS = {21: (4, 5, 13, 6, 14, 7, 15), 16: (3, 4, 10, 5, 11, 6, 12)}
-# Errors for a table that states none: measured rows of finals2000A, plus the errors of predictions D days ahead by
+# Errors if a table states none: those of measured rows in finals2000A, and for predictions D days ahead also those of
 # IERS Bulletin A, 0.00068 D^0.80 arcsec and 0.00025 D^0.75 s.
 _MEASURED_POLE_ARCSEC, _MEASURED_UT1_S = 1e-4, 2e-5
 _ACCEPTED_TABLES = "accepted: finals2000A.all or .csv of the IERS, its C04, or EOP-All.csv of CelesTrak"
@@ -193,12 +193,12 @@ def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation
 
     Notes
     -----
-    The values of Bulletin B count if a row has them, else the values of Bulletin A. UT1 - UTC jumps with a leap
-    second, UT1 - TAI does not.
+    The values of Bulletin B are used if a row has them, and otherwise those of Bulletin A. UT1 - TAI is interpolated,
+    because UT1 - UTC jumps at a leap second.
     """
     first: list[float] | None = None
     first_day = last_day = None
-    last_measured: float | None = None  # the last day without a prediction
+    last_measured: float | None = None  # last day with measured values
     is_first_predicted = False
     form = ""
     for row in _rows(data.decode("utf-8-sig", "replace"), name):
@@ -225,7 +225,7 @@ def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation
 
 
 def _rows(text: str, name: str) -> Iterator[_TableRow]:
-    """Rows of a table that have values, by the form of its first lines."""
+    """Yield the rows of a table that have values; its first lines decide the format."""
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     header = lines[0][1].strip() if lines else ""
     if header.lower().startswith(("<!doctype", "<html", "<?xml")):
@@ -317,7 +317,7 @@ def _of_c04(lines: Sequence[tuple[int, str]], name: str) -> Iterator[_TableRow]:
         if len(values) not in _C04_COLUMNS:
             raise PathFileError(f"{name}:{number}: has {len(values)} values; a row of the IERS' C04 has 16 or 21")
         if len(values) == 21 and float(values[3] if values[3].isdigit() else 1) != 0:
-            continue  # a series of 12 hours has rows at noon
+            continue  # rows at noon, in a series with steps of 12 hours
         yield _TableRow(number, [values[column] for column in _C04_COLUMNS[len(values)]], False, "the IERS' C04")
 
 
@@ -377,7 +377,7 @@ def _numbers(row: _TableRow, last_measured: float | None, location: str) -> list
 
 
 def _between(first: list[float], second: list[float], fraction: float) -> Orientation:
-    """Orientation interpolated linearly between the numbers of two days; `fraction` is the part of the first day."""
+    """Orientation interpolated linearly between two days; `fraction` is the elapsed part of the first day."""
     leaps = tai_less_utc(int(second[0])) - tai_less_utc(int(first[0]))
     change = [end - start for start, end in zip(first, second, strict=True)]
     change[5] -= leaps

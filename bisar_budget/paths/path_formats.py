@@ -27,11 +27,11 @@ class OrbitFormat(NamedTuple):
     Attributes
     ----------
     words : str
-        The format in messages.
+        Name of the format for messages.
     sign : re.Pattern
-        Pattern in the first lines that identifies the format, for text.
+        Pattern at the beginning of a text file that identifies the format.
     element : bytes
-        Name of an element that identifies the format, for XML; empty for a format that is not XML.
+        Name of the XML element that identifies the format; empty for a format that is not XML.
     read : callable
         Reader. Its arguments are the bytes of a file, the name of the file in messages, the name of the object
         (needed if there are several), the middle of the aperture, and the orientation that converts from celestial to
@@ -45,7 +45,7 @@ class OrbitFormat(NamedTuple):
     read: Callable[[bytes, str, str | None, Instant, Orientation], Orbit]
 
 
-# By the key of the mission file, in the order of the schema. An OMM in JSON or CSV shows its keywords.
+# The keys are keys of the mission file, in the order of the schema. An OMM in JSON or CSV is identified by keywords.
 ORBIT_FORMATS: Mapping[str, OrbitFormat] = {
     "tle": OrbitFormat(
         "two-line elements", re.compile(rb"(?m)^1 [ \w]{5}[UCS ].{61}\r?\n2 [ \w]{5} .{61}\r?$"), b"", read_tle
@@ -87,11 +87,11 @@ _UNREADABLE_FORMATS = (
 )
 _UBX = "messages of u-blox (UBX)"
 _CONVERT_UBX = "Write it as a solution of RTKLIB, or as sentences of NMEA 0183"
-_EXAMINED_BYTES = 4096  # that identify a format
+_EXAMINED_BYTES = 4096  # at the beginning of a file, which identify its format
 
 
 def orbit_format(data: bytes) -> str | None:
-    """Key in `ORBIT_FORMATS` of the format that the content has; None for any other content."""
+    """Key in `ORBIT_FORMATS` of the format of a file's content; None if the content is no orbit."""
     beginning = data[:_EXAMINED_BYTES].removeprefix(b"\xef\xbb\xbf")
     if is_markup(beginning):
         names = re.findall(rb"<(?:\w+:)?(\w+)[\s>]", beginning)
@@ -122,7 +122,7 @@ def _words_of_logs() -> str:
 
 
 def _refuse(data: bytes, name: str, actual: str | None, accepted: str) -> None:
-    """Refuse an orbit of another format, or a file of a format that cannot be read."""
+    """Refuse a file that is an orbit of the format `actual`, or has a known format that cannot be read."""
     if actual is not None:
         key = f"orbit: {{{actual}: …}} reads it"
         raise PathFileError(f"{name}: is {ORBIT_FORMATS[actual].words}", accepted, key)
@@ -160,11 +160,11 @@ class LogFormat(NamedTuple):
     Attributes
     ----------
     words : str
-        The format in messages.
+        Name of the format for messages.
     endings : tuple of str
-        Endings of the names of its files.
+        Usual endings of file names in this format.
     is_format : callable
-        Whether bytes have the format.
+        Function that tests whether bytes are a file in this format.
     read : callable
         Reader: takes the bytes of a file, the name of the file in messages, and the keys of the mission file about
         the log. Raises `PathFileError` with the line, byte or record of a fault.
@@ -176,7 +176,7 @@ class LogFormat(NamedTuple):
     read: Callable[[bytes, str, LogKeys], Log]
 
 
-# By the word of the mission file, in the order of the schema. Formats with more specific content come last.
+# The keys are words of the mission file, in the order of the schema. Formats with more specific content come last.
 LOG_FORMATS: dict[str, LogFormat] = {
     "csv": LogFormat("CSV with a header", (".csv",), is_csv, read_csv),
     "sbet": LogFormat("an SBET of records of 136 bytes", (".out", ".sbet"), is_sbet, read_sbet),
@@ -185,7 +185,7 @@ LOG_FORMATS: dict[str, LogFormat] = {
     "gpx": LogFormat("a GPX track", (".gpx",), is_gpx, read_gpx),
     "ulog": LogFormat("a PX4 ULog", (".ulg",), is_ulog, read_ulog),
 }
-# Keys of a mission file for certain formats only: the formats, and words for a log of these formats.
+# Keys of a mission file that apply to certain formats only: these formats, and words for a log in one of them.
 _KEYS_OF_FORMATS = {
     "week": (("sbet",), "an SBET"),
     "talker": (("nmea",), "an NMEA log"),
@@ -195,7 +195,7 @@ _KEYS_OF_FORMATS = {
 
 
 def log_format(data: bytes) -> str | None:
-    """Key in `LOG_FORMATS` of the format that the content has; None for any other content."""
+    """Key in `LOG_FORMATS` of the format of a file's content; None if the content is no log."""
     return next((name for name in reversed(LOG_FORMATS) if LOG_FORMATS[name].is_format(data)), None)
 
 

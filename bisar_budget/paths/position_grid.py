@@ -2,8 +2,8 @@
 
 A log writes degrees, minutes and metres with a fixed number of decimals. The grid is the coarsest decimal step on
 which all fixes lie. It is found from the numbers alone: zeros at the end of a cell are not evidence. A step counts as
-a grid only if the fixes deviate from a smooth path by about the rounding to the step. Fixes of an invented platform,
-at rest or at a round speed, lie on any grid.
+a grid only if the fixes deviate from a smooth path by about the rounding to the step. Fixes of a simulated platform
+that is at rest, or has a round speed, lie on any grid.
 """
 
 import math
@@ -18,12 +18,12 @@ from bisar_budget.paths.earth import Floats, earth_fixed_places
 _ARC_UNITS_RAD = (math.pi / 180, math.pi / 10_800, math.pi / 648_000)  # degree, minute, second
 _LENGTH_UNITS_M = (1.0,)
 _DECIMAL_DIGITS = range(-3, 13)
-_MIN_FIXES = 12  # that tell a grid
-_MAX_FIXES = 4096  # that are examined
-_PATH_ORDER = 8  # of the smooth path that exact numbers may follow
-_MIN_ROUGHNESS_RATIO = 0.1  # of the root mean square deviation to a step; rounding to the step gives 0.29
-_BINARY_ROUNDING_FACTOR = 16  # times the machine epsilon: rounding of a number and of the first number
-_MAX_ROUNDING_RATIO = 0.05  # of binary rounding to a step; with more, no grid can be told
+_MIN_FIXES = 12  # with fewer fixes, a grid cannot be recognised
+_MAX_FIXES = 4096  # only this number of fixes is examined
+_PATH_ORDER = 8  # of the smooth path from which the roughness is measured
+_MIN_ROUGHNESS_RATIO = 0.1  # of the rms deviation from a smooth path to a step; rounding to the step gives 0.29
+_BINARY_ROUNDING_FACTOR = 16  # times the machine epsilon: rounding of a difference of two numbers
+_MAX_ROUNDING_RATIO = 0.05  # of binary rounding to a step; if it is larger, a grid cannot be recognised
 
 
 def decimal_step(times: Floats, values: Floats, units: Sequence[float]) -> float:

@@ -84,9 +84,10 @@ def is_solution(data: bytes) -> bool:
 
 
 def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read a solution of at most `MAX_SOLUTION_BYTES` bytes, as every reader of `LOG_FORMATS` does.
+    """Read a solution of at most `MAX_SOLUTION_BYTES` bytes.
 
-    The log has standard deviations of each fix east, north and up, unless the file has none or only zeros.
+    Arguments and errors are the same for all readers, see `LogFormat.read`. The log has standard deviations of
+    each fix east, north and up, unless the file has none or only zeros.
     """
     hold_to_bytes(data, MAX_SOLUTION_BYTES, name)
     header: _Columns | None = None
@@ -195,7 +196,7 @@ def _row(text: str, header: _Columns, location: str) -> tuple[int, list[float]]:
             value = None
         if value is None:
             raise PathFileError(f"{location}: must have numbers behind the time (got {shown(cell)!r})")
-        row.append(value if math.isfinite(value) else math.nan)  # such as the ratio of no ambiguities
+        row.append(value if math.isfinite(value) else math.nan)  # for example, a ratio test without ambiguities
     return day, [*row, seconds]
 
 
@@ -212,7 +213,7 @@ def _radians(table: Floats, header: _Columns, axis: str, records: LogRecords) ->
     if not header.is_in_minutes:
         return np.radians(table[:, index])
     degrees, minutes, seconds = table[:, index : index + 3].T
-    # RTKLIB's deg2dms and dms2deg: the sign is that of the degrees, -0 too.
+    # As in RTKLIB's deg2dms and dms2deg, the sign is that of the degrees, which may be -0.
     sexagesimal = [(minutes, "minutes"), (seconds, "seconds")]
     for values, unit_name in sexagesimal:
         records.leave_out(

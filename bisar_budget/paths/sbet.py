@@ -38,12 +38,12 @@ from bisar_budget.paths.log_places import (
     usable_log,
 )
 
-MAX_SBET_BYTES = 1_000_000_000  # bytes; ten hours at 200 Hz
-_MAX_TIME_S = 2 * WEEK_S  # a flight over the end of a week may count beyond one week
+MAX_SBET_BYTES = 1_000_000_000  # ten hours at 200 Hz
+_MAX_TIME_S = 2 * WEEK_S  # in a flight over the end of a week, times may exceed one week
 _MIN_WEEK_STEP_S = WEEK_S - 3600  # a longer step back in time is a new week
 _RIGHT_ANGLE_RAD = math.pi / 2 * (1 + 1e-12)
-_WINDOW_S = 1.0  # for comparing positions and velocities; noise of positions is then less than 0.1 m/s
-_MAX_SPEED_ERROR_MPS = 1.0  # plus a hundredth of the speed; velocities of another frame have a larger error
+_WINDOW_S = 1.0  # over which velocities are compared with positions, whose noise is then less than 0.1 m/s
+_MAX_SPEED_ERROR_MPS = 1.0  # plus a hundredth of the speed; velocities in a wrong frame differ by more
 _MIN_MAGNITUDE_SI = 1e-100  # doubles of the other byte order are often smaller
 _Fields = tuple[tuple[str, int, float, float, str], ...]  # name, index in a record, smallest, largest, unit
 _SBET_FIELDS = (
@@ -70,7 +70,7 @@ class _Kind(NamedTuple):
     Attributes
     ----------
     words : str
-        The kind in messages.
+        Name of the kind for messages.
     width : int
         Number of doubles in a record.
     fields : tuple
@@ -104,7 +104,7 @@ class Accuracy:
 
 
 def of_gps(week: int, seconds: float) -> Instant:
-    """Instant of GPS time from a GPS week, not rolled over, and seconds of the week."""
+    """Instant in GPS time from a GPS week, counted from 1980 without rollover, and the seconds of the week."""
     return Instant(GPS_EPOCH_DAY + 7 * week, 0.0).after(seconds)
 
 
@@ -125,14 +125,16 @@ def _looks_like(data: bytes, kind: _Kind) -> bool:
         return False
     records = np.frombuffer(data[: count * kind.size], "<f8").reshape(-1, kind.width)
     ends = records[sorted({*range(min(3, count)), *range(max(count - 3, 0), count)})]
-    # Digits of a text are doubles next to zero.
+    # Digits of a text, read as doubles, are almost zero.
     is_sound = ~_wrong(ends, kind.fields).any(axis=0) & (np.abs(ends[:, : kind.nonzero_fields]).max(axis=1) > 1e-9)
     sound = ends[is_sound]
     return bool(2 * len(sound) > len(ends) and (len(sound) < 2 or sound[0, 0] != sound[-1, 0]))
 
 
 def read_sbet(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read a trajectory of at most `MAX_SBET_BYTES` bytes, as every reader of `LOG_FORMATS` does.
+    """Read a trajectory of at most `MAX_SBET_BYTES` bytes.
+
+    Arguments and errors are the same for all readers, see `LogFormat.read`.
 
     Positions come from latitude, longitude and height. Velocities are converted from the wander frame, and have to
     agree with the positions. Without the key `week` the log has seconds of the week, and no start. Times continue to
@@ -253,7 +255,7 @@ def _over_weeks(times: Floats, records: LogRecords) -> Floats:
     usable = np.flatnonzero(records.is_usable)
     usable_times = times[usable]
     steps = np.diff(usable_times)
-    # A step forward by a week ends a wrong time.
+    # A forward step of a week compensates a backward step due to a wrong time.
     weeks = np.cumsum((steps <= -_MIN_WEEK_STEP_S).astype(np.int64) - (steps >= _MIN_WEEK_STEP_S))
     rolled = np.concatenate([[0.0], weeks * WEEK_S])
     continuous = times.copy()
@@ -271,7 +273,7 @@ def _hold_to_velocities(times: Floats, records: Floats, name: str) -> None:
     velocities = np.stack([-west, north, z], axis=1)
     steps = np.diff(times)[:, None]
     travelled_by_velocity = _cumulative((velocities[1:] + velocities[:-1]) / 2 * steps)
-    # Radii of curvature between two records, and the shorter way around.
+    # Radii of curvature are taken midway between two records. Steps of longitude are less than half a turn.
     mean_latitude, mean_height = (latitude[1:] + latitude[:-1]) / 2, (height[1:] + height[:-1]) / 2
     meridian_radius, transverse_radius = curvature_radii(np.sin(mean_latitude))
     longitude_steps = np.diff(longitude)

@@ -32,11 +32,11 @@ from bisar_budget.paths.orientation import UNKNOWN, Orientation
 
 _FIRST_LINE = re.compile(r"#[abcd][PV]", re.ASCII)
 _SATELLITE = re.compile(r"[A-Z ][ \d]\d", re.ASCII)
-# TAI less the time of a file; GLO is UTC (SP3-c), BeiDou's time began with 2006 (BDS-SIS-ICD, 3.3).
+# TAI minus the time of a file. GLO is UTC (SP3-c); BeiDou's time began in 2006 (BDS-SIS-ICD, 3.3).
 _TAI_LESS_SYSTEM_S = {"GPS": TAI_LESS["GPS"], "GAL": 19.0, "QZS": 19.0, "IRN": 19.0, "BDT": 33.0, "TAI": 0.0}
 _UTC_SYSTEMS = ("UTC", "GLO")
 _MIN_COORDINATE_KM = 1e-6  # all three coordinates are 0 for a bad or absent position
-_NAMED_LINES = 3  # lines that the words of an orbit name
+_NAMED_LINES = 3  # most lines that the description of an orbit lists
 _MAX_SAMPLE_GAP_RATIO = 1.5  # of a gap to the usual step; no polynomial crosses a longer gap
 
 
@@ -51,7 +51,7 @@ class _Satellite:
     accuracy : float
         Accuracy in the header; 0 if it is unknown. [m]
     samples : list of Sample
-        Times of TAI, positions and velocities.
+        Times in TAI, positions and velocities.
     lines : list of int
         Lines of the samples.
     deviations : list of Vector or None
@@ -59,7 +59,7 @@ class _Satellite:
     breaks : set of int
         Indices of samples after a manoeuvre or a missing position.
     predicted : Instant, optional
-        Time of the first predicted position, of TAI.
+        Time of the first predicted position, in TAI.
     """
 
     id: str
@@ -74,7 +74,9 @@ class _Satellite:
 def read_sp3(
     data: bytes, name: str, object_name: str | None, center: Instant, orientation: Orientation = UNKNOWN
 ) -> Orbit:
-    """Orbit of a satellite of a file, such as `G05`, as every reader of `ORBIT_FORMATS` gives it.
+    """Read an SP3 file, and return the orbit of a satellite, such as `G05`.
+
+    Arguments and errors are the same for all readers, see `OrbitFormat.read`.
 
     No interpolation crosses missing positions of the satellite, or a manoeuvre that the file flags. Positions with
     sound velocities are interpolated by Hermite's polynomial of degree 7. Positions alone are interpolated by
@@ -337,7 +339,7 @@ def _epoch(line: str, system: str, location: str) -> Instant:
 
 
 def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instant) -> Iterator[Segment]:
-    """Segments of a satellite between gaps and manoeuvres. `center` is the middle of the aperture in TAI."""
+    """Segments of a satellite between gaps and manoeuvres. `center` is mid-aperture in TAI."""
     samples = satellite.samples
     steps = sorted(after.time.since(before.time) for before, after in pairwise(samples))
     usual_step = steps[len(steps) // 2] if steps else 0.0
@@ -383,7 +385,7 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
 
 
 def _stated(satellite: _Satellite, stretch: range, time: Instant) -> StatedAccuracy | None:
-    """Accuracy at a time of TAI; None if the file states none.
+    """Accuracy that a file states for a satellite at a time in TAI; None if it states none.
 
     It is the accuracy in the header, or the standard deviations of the samples around the time if these are larger.
     """

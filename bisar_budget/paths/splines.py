@@ -24,12 +24,12 @@ Floats = NDArray[np.float64]
 
 SPLINE_ORDER = 5
 MIN_PIECE_S = 1.0  # faster motion is vibration, which has rows of its own
-_MIN_HALF_FIXES = 3  # in each half of a piece that is halved
+_MIN_HALF_FIXES = 3  # smallest number of fixes in each half of a piece that is halved
 _HALVED_MOTION_FRACTION = 0.5  # pieces with more than this fraction of the largest motion are halved together
 
 
 def basis(times: Floats, edges: Floats) -> Floats:
-    """Values of the B-splines at times (n,), (n, m + `SPLINE_ORDER`), for m pieces between rising edges (m + 1,).
+    """Values (n, m + `SPLINE_ORDER`) of the B-splines at times (n,), for m pieces between rising edges (m + 1,).
 
     The first and the last piece continue beyond the edges. Source: the recursion of de Boor (1972) and Cox (1972).
     """
@@ -82,7 +82,7 @@ class SplineFit:
         center = positions.mean(axis=0)
         series = root @ (root.T @ (design.T @ (positions - center)))
         residuals = positions - center - design @ series
-        # Normal equations square the condition of the basis; the second step gives the digits back.
+        # Normal equations square the condition number, and so lose digits; the second step restores these digits.
         series += root @ (root.T @ (design.T @ residuals))
         return cls(edges, center, series, positions - center - design @ series, root)
 
@@ -95,7 +95,7 @@ class SplineFit:
         return np.asarray((self.residuals[1:] * self.residuals[:-1]).sum(axis=1))
 
     def halved(self, times: Floats) -> Floats | None:
-        """Edges with the pieces of most residual motion halved; None if no piece with motion can be halved."""
+        """Edges after the pieces with the largest residual motion are halved; None if no such piece can be halved."""
         lengths, middles = np.diff(self.edges), (self.edges[1:] + self.edges[:-1]) / 2
         piece = np.clip(np.searchsorted(self.edges, times, "right") - 1, 0, len(middles) - 1)
         early = np.bincount(piece, times < middles[piece], len(middles))
@@ -108,7 +108,7 @@ class SplineFit:
 
     def state(self) -> PlatformState:
         """The spline as a path with a polynomial for each piece."""
-        # Powers of the time from the middle of a piece, from SPLINE_ORDER + 1 nodes: exact but for rounding.
+        # Coefficients about the middle of a piece, from values at SPLINE_ORDER + 1 nodes; exact except for rounding.
         middles, halves = (self.edges[1:] + self.edges[:-1]) / 2, np.diff(self.edges) / 2
         nodes = np.cos(np.pi * (np.arange(SPLINE_ORDER + 1) + 0.5) / (SPLINE_ORDER + 1))
         values = (basis((middles[:, None] + halves[:, None] * nodes).ravel(), self.edges) @ self.series).reshape(

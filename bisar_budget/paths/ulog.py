@@ -35,7 +35,7 @@ from bisar_budget.paths.log_places import (
 )
 
 _MAGIC = b"ULog\x01\x12\x35"
-_HEADER_BYTES = 16  # the magic, the version, the time at which the log begins
+_HEADER_BYTES = 16  # signature, version, and the time at which the log begins
 _APPENDED_DATA_FLAG_BITS = 1  # the only supported flag of newer kinds of files
 _TYPES = {
     "int8_t": "i1",
@@ -58,7 +58,7 @@ _MAX_TIME_US = 1 << 60  # the year 38 000
 _MIN_FIX_LEVEL = 3  # a fix in three dimensions
 _ACCURACY_FIELDS = ("eph", "epv")  # m
 _VALIDITY_FIELDS = ("lat_lon_valid", "alt_valid")  # of the global position, since release 1.16
-_MAX_CLOCK_DRIFT_S = 1.0  # by jitter of messages of the receiver; with more, the record has another time
+_MAX_CLOCK_DRIFT_S = 1.0  # due to jitter of messages; a larger drift means that the clocks do not match
 
 
 class _Units(NamedTuple):
@@ -108,7 +108,9 @@ def is_ulog(data: bytes) -> bool:
 
 
 def read_ulog(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read the fixes of a flight, as every reader of `LOG_FORMATS` does.
+    """Read the fixes of a flight from a ULog.
+
+    Arguments and errors are the same for all readers, see `LogFormat.read`.
 
     The fixes come from the GPS topic or from the global position, whichever has more records. If there are several
     receivers, the mission file chooses one, and the fixes of its GPS topic are used.
@@ -165,7 +167,7 @@ def _of_gps(gps: _Topic, keys: LogKeys, name: str) -> Log:
 def _of_global(position: _Topic, gps: _Topic | None, keys: LogKeys, name: str) -> Log:
     """Log of the position that the autopilot estimates.
 
-    Without a GPS topic, the log has no UTC, and its times count from the start of the autopilot. [s]
+    Without a GPS topic, the log has no UTC, and its times are seconds since the start of the autopilot.
     """
     time_us = position.records["timestamp"].astype(np.int64)
     if gps is None:
@@ -175,7 +177,7 @@ def _of_global(position: _Topic, gps: _Topic | None, keys: LogKeys, name: str) -
     utc_us, gps_time_us = gps.records["time_utc_usec"].astype(np.int64), gps.records["timestamp"].astype(np.int64)
     utc_less_time_us = utc_us - gps_time_us
     offset_us = int(np.sort(utc_less_time_us)[len(utc_less_time_us) // 2])
-    # A receiver may correct its leap seconds once, so 5 % of its times are ignored.
+    # The largest 5 % are ignored, because a receiver may have a wrong number of leap seconds at first.
     spread = float(np.percentile(np.abs(utc_less_time_us - offset_us), 95)) * 1e-6
     if spread > _MAX_CLOCK_DRIFT_S:
         raise PathFileError(
@@ -277,7 +279,7 @@ def _hold_to_flags(payload: bytes, location: str) -> None:
 
 
 def _layout(topic: str, fields: str, location: str) -> tuple[np.dtype[np.void], _Units]:
-    """NumPy type of those fields of a topic that are read, and the coordinates of the topic."""
+    """NumPy data type for the fields of a topic that are read, and the names and units of its coordinates."""
     types: dict[str, tuple[str, int]] = {}
     offset = 0
     for field in filter(None, fields.split(";")):

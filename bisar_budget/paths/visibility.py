@@ -25,19 +25,19 @@ from bisar_budget.paths.instant import Instant
 
 SAMPLE_STEP_S = 120.0
 _INTERPOLATION_NODES = 8
-_FINE_RATIO = 4  # of evaluated times to samples
-_HALVING_ROUNDS = 40  # of a bracket, to 1e-10 s
-_CHANGE_ERROR_S = 1e-3  # of the time at which an orbit ends and the next begins
+_FINE_RATIO = 4  # number of evaluated times per sample
+_HALVING_ROUNDS = 40  # of an interval around a root, which is then shorter than 1e-10 s
+_CHANGE_ERROR_S = 1e-3  # of the time at which one orbit replaces another
 _MAX_TOUCHING_GAP_S = 5 * _CHANGE_ERROR_S
 _SEARCH_STEPS = 16  # of a span, in the search for orbits in a file that does not state its times
 _MIN_SEARCH_STEP_S = 3600.0
-# From powers of the position between two nodes to weights of the samples: the inverse of Vandermonde's matrix.
+# Inverse of Vandermonde's matrix, which gives the weights of the samples from powers of the time between two nodes.
 _INTERPOLATION_WEIGHTS = np.linalg.inv(np.vander(np.arange(_INTERPOLATION_NODES, dtype=float), increasing=True))
 _INTERPOLATION_POWERS = np.arange(_INTERPOLATION_NODES)
 
 
 class OrbitGap(NamedTuple):
-    """Part of a time span in which the position of a satellite is unknown, and the reason. [s]"""
+    """Part of a time span, from `start` [s] to `stop` [s], in which the position of a satellite is unknown."""
 
     start: float
     stop: float
@@ -45,7 +45,7 @@ class OrbitGap(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """Part of a time span in which a satellite is above an elevation, from `start` to `stop`. [s]
+    """Part of a time span, from `start` [s] to `stop` [s], in which a satellite is above an elevation.
 
     `rises` is false if the satellite is already above the elevation when the known orbits begin. `sets` is false if
     it is still above the elevation when they end.
@@ -68,7 +68,7 @@ class _Sampled:
         for n in range(count + 1):
             try:
                 positions.append(orbit.place(origin.after(start + n * self.step)))
-            except PathFileError as error:  # it has decayed
+            except PathFileError as error:  # for example, the satellite has decayed
                 self.reason = str(error)
                 break
         self.stop = start + (len(positions) - 1) * self.step
@@ -186,7 +186,7 @@ class Watched:
                     continue
                 stretch = Stretch(start, stop, start > piece.start, stop < piece.stop)
                 previous = stretches[-1] if stretches else None
-                # Stretches touch at a change of elements, or at a grazed edge.
+                # Stretches that touch at a change of elements, or where the elevation is just reached, are joined.
                 if previous is not None and start - previous.stop < _MAX_TOUCHING_GAP_S:
                     stretches[-1] = previous._replace(stop=stop, sets=stretch.sets)
                 else:
@@ -200,7 +200,7 @@ class Watched:
         return float(times[self.sine_of_elevation(times).argmax()])
 
     def with_squint(self, stretch: Stretch, squint: float) -> float | None:
-        """Time within a stretch at which the squint has a given value [rad]; None if there is no such time. [s]
+        """Time [s] within a stretch at which the squint has a given value [rad]; None if there is no such time.
 
         If there are several such times, the time with the highest elevation is returned.
         """

@@ -42,7 +42,11 @@ def _add_correlation_time(keys: Sequence[str]) -> str:
 def air_stays(
     aperture_time: float, correlation_time: float, key: str, size: float, use: float, keys: Sequence[str]
 ) -> str:
-    """Sentence for a requirement that depends on constant delays in a long aperture. [s, s, rad or m or dB]"""
+    """Sentence for a verdict that depends on constant delays in the air although the aperture is long.
+
+    `aperture_time` and `correlation_time` are in s. `size` is the effect that changing delays would have, in rad, m
+    or dB, and `use` its fraction of the allowed value. `keys` are the keys to add to the file.
+    """
     does, unit = _AIR_MAKES[key]
     shown = level_words(size) if unit == "dB" else size_words(size, unit)
     return (
@@ -55,7 +59,11 @@ def air_stays(
 def air_stays_untaken(
     aperture_time: float, correlation_time: float, kind: str, size: float, keys: Sequence[str], lines: Sequence[str]
 ) -> str:
-    """Sentence for a constant delay in a long aperture, whose change no requirement would limit. [s, s, rad]"""
+    """Sentence for constant delays in the air over a long aperture, whose possible change no requirement would limit.
+
+    `aperture_time` and `correlation_time` are in s. `size` is the effect that changing delays would have, in the unit
+    of `kind`. `keys` are the keys, or `lines` the requirements, to add to the file.
+    """
     added = " or ".join(f"`{line}`" for line in lines)
     return (
         f"{_air_that_stays(aperture_time, correlation_time)} have {effect_words(kind, size)}, which no requirement "

@@ -60,14 +60,17 @@ def _placed(displacement: Sequence[float]) -> str:
 
 @composed
 def in_its_worst_phase(axes: int) -> str:
-    """Sentence for a vibration below one cycle per aperture: its worst phase, and the number of its axes."""
+    """Sentence for a vibration below one cycle per aperture, which is taken at its worst phase along each axis."""
     each = f", each of {axes} axes alone: their phases add up" if axes > 1 else ""
     return f"in the worst phase of the vibration{each}"
 
 
 @composed
 def rule_misplaces(who: str, rule: str, by_rule: Sequence[float], is_at: Sequence[float]) -> str:
-    """Sentence for errors whose displacement a rule predicts worst: the predicted and the actual displacement. [m]"""
+    """Sentence for errors whose displacement a rule of combination mispredicts.
+
+    `by_rule` is the displacement by the rule, and `is_at` the one by exact ranges and image, each east and north [m].
+    """
     return (
         f"{who}: {_placed(by_rule)} by {rule}, {_placed(is_at)} by exact ranges and image: "
         f"{rule} does not predict the displacement"
@@ -76,14 +79,20 @@ def rule_misplaces(who: str, rule: str, by_rule: Sequence[float], is_at: Sequenc
 
 @composed
 def phase_does_not_grow(phases: Sequence[tuple[float, str]]) -> str:
-    """Sentence for a limit where the phase of the image does not grow with the error: phases and places. [rad]"""
+    """Sentence for a limit at which the phase in the image does not grow with the size of the error.
+
+    `phases` are measured phases [rad], each with a text on the size of the error.
+    """
     shown = ", ".join(f"{phase:.4g} rad{where}" for phase, where in phases)
     return f"the phase of the image does not grow with the error: {shown}"
 
 
 @composed
 def echoes_measured(who: str, cycles: float, smear_cells: float | None, is_assumed: bool) -> str:
-    """Sentence for the echoes of a vibration: who vibrates, where the echoes lie, and how far they are smeared."""
+    """Sentence for measured paired echoes of a vibration: its owner, and the distance and the smear of the echoes.
+
+    `cycles` is the distance from the peak in cross-range cells, and `smear_cells` the smear in range cells.
+    """
     smeared = "" if smear_cells is None else f", smeared over {smear_cells:.2g} range cells"
     assumed = ", a frequency assumed: the file declares no vibration" if is_assumed else ""
     return f"echoes of {who}, at {cycles:.3g} cells from the peak{smeared}{assumed}"
@@ -91,7 +100,7 @@ def echoes_measured(who: str, cycles: float, smear_cells: float | None, is_assum
 
 @composed
 def sigma_of_time_series(draws: int, factor: float, images: int, bound_by: str) -> str:
-    """Sentence for the limit of a random error: its time series, images, and the uncertainty of its sigma."""
+    """Sentence for an image verdict on a random error: its simulated time series, and how exact their sigma is."""
     times = "" if factor == 1 else f" times the coverage factor {factor:g}"
     bound = f", bound by the {bound_by}" if bound_by else ""
     known = 196 / math.sqrt(2 * draws)  # of a standard deviation of normal draws

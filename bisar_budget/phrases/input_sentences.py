@@ -23,8 +23,8 @@ _SCENE_AXES = {"x": "east", "y": "north", "z": "up"}
 class StatedError:
     """An error that the source of a path states, together with the error that the file declares.
 
-    Both are given as sizes along `axes`, in `unit`. Without `axes` both are root-sum-squares. `words` name the
-    source, and `key` is the key under which the file would declare the error.
+    Both have a size for each of `axes`, in `unit`. Without `axes` each is one root-sum-square. `words` name the
+    source, and `key` is the key under which the file declares, or would declare, the error.
     """
 
     words: str
@@ -38,14 +38,14 @@ class StatedError:
 
     @property
     def declared_words(self) -> str:
-        """Text for the declared error."""
+        """Text with the sizes of the declared error, or with the remark that none is declared."""
         if not self.is_declared:
             return f"no {self.kind} error is declared"
         return f"{_sizes(self.declared, self.unit)} is declared"
 
 
 def _sizes(sizes: Sequence[float], unit: str) -> str:
-    """Text for several sizes: a single size if all are alike, otherwise each size."""
+    """Text with each of several sizes and the unit; equal sizes are written once."""
     words = [size_words(size, unit) for size in sizes]
     return words[0] if len(set(words)) == 1 else ", ".join(words)
 
@@ -56,14 +56,17 @@ def _axes(names: Sequence[str]) -> str:
 
 @composed
 def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -> str:
-    """Sentence for a declared position error that is smaller than the possible error of the platform's path. [m]"""
+    """Sentence for a declared position error that is smaller than the possible error of the platform's path.
+
+    `doubt` is the possible error [m], and `declared` the declared one [m], None if there is none.
+    """
     stated = "no position error is declared" if declared is None else f"{size_words(declared, 'm')} is declared"
     return f"the path may be {size_words(doubt, 'm')} off ({words}), but {stated}: declare the error in {key}"
 
 
 @composed
 def input_states_more(error: StatedError) -> str:
-    """Sentence for a declared error that is smaller than the error that the path's source states. [m], [m/s]"""
+    """Sentence for a declared error that is smaller than the error that the source of the path states."""
     within = f" ({_axes(error.axes)})" if error.axes else ""
     stated = f"a {error.kind} error of {_sizes(error.stated, error.unit)}{within} is stated"
     return f"{error.words}: {stated}, but {error.declared_words}: declare at least that in {error.key}"
@@ -71,7 +74,10 @@ def input_states_more(error: StatedError) -> str:
 
 @composed
 def log_is_flown_as_it_is(figure: str) -> str:
-    """Sentence for the rows of a log whose fixes the processor uses without smoothing."""
+    """Sentence for a row about a flight log whose fixes the processor uses without smoothing.
+
+    `figure` is `grid` for the rounding of the fixes; otherwise the row is about their residual from a smooth path.
+    """
     if figure == "grid":
         return "the log quantises its fixes: a uniform error, constant over the aperture at worst"
     return "the processor uses the fixes of the log: their residual from the smoothed path adds to the ISLR"
@@ -79,7 +85,10 @@ def log_is_flown_as_it_is(figure: str) -> str:
 
 @composed
 def log_is_coarse(step: float, declared: float | None, axis: str, key: str) -> str:
-    """Sentence for a log whose rounding step is large compared with the declared position error. [m]"""
+    """Sentence for a flight log whose rounding step is large compared with the declared position error.
+
+    `step` is the rounding step along `axis` [m], and `declared` the declared error [m], None if there is none.
+    """
     beside = "no position error is declared"
     if declared is not None:
         beside = f"more than a tenth of the declared {size_words(declared, 'm')}"
@@ -91,7 +100,7 @@ def log_is_coarse(step: float, declared: float | None, axis: str, key: str) -> s
 
 @composed
 def input_usually_has_more(error: StatedError) -> str:
-    """Sentence for a declared error that is less than a third of the usual error of logs of this quality. [m]"""
+    """Sentence for a declared error below a third of the usual error of flight logs with this quality of fixes."""
     return (
         f"{error.words} usually have an error of {size_words(max(error.stated), error.unit)} on each axis,"
         f" but {error.declared_words}: declare at least a third of the usual error in {error.key}"
@@ -100,7 +109,10 @@ def input_usually_has_more(error: StatedError) -> str:
 
 @composed
 def orbit_errors_are_independent(platform: str, position_m: float, rate: float, velocity: float) -> str:
-    """Sentence for independent position and velocity errors of a platform in free fall. [m, rad/s, m/s]"""
+    """Sentence for position and velocity errors that are declared independent although the platform is in free fall.
+
+    `position_m` [m] and `velocity` [m/s] are the declared errors. `rate` is the angular rate of the orbit [rad/s].
+    """
     sigma, rest = format_quantity(position_m, "m"), format_quantity(velocity, "m/s")
     return (
         f"the {platform} is in free fall: a position error of {sigma} goes with a velocity error of about "

@@ -45,7 +45,11 @@ _SHOWN_PART_FRACTION = 0.99  # of a phase of equal loss, below which its quadrat
 
 @composed
 def quadratic_phase_over(phase: float, limit: float, equation: str = "", quadratic: float | None = None) -> str:
-    """Sentence for one error over its limit; the equal-loss phase may exceed its quadratic part. [rad]"""
+    """Sentence for one error whose quadratic phase exceeds its limit.
+
+    `phase` [rad] is the quadratic phase, or the quadratic phase of equal peak loss. In the second case `quadratic`
+    [rad] is the quadratic part alone.
+    """
     text = in_brackets(f"QPE {over_words(phase, limit, 'rad')}", equation)
     if quadratic is None or quadratic >= _SHOWN_PART_FRACTION * phase:  # both are infinite where there is no image
         return text
@@ -54,14 +58,14 @@ def quadratic_phase_over(phase: float, limit: float, equation: str = "", quadrat
 
 @composed
 def cubic_phase_over(phase: float, limit: float, equation: str = "") -> str:
-    """Sentence for one error whose cubic phase exceeds its limit. [rad]"""
+    """Sentence for one error whose cubic phase `phase` exceeds `limit`, both in rad."""
     text = in_brackets(f"cubic phase {over_words(phase, limit, 'rad')}", equation)
     return f"{text}; autofocus gain does not apply"
 
 
 @composed
 def location_over(moved: float | None, limit: float, equation: str) -> str:
-    """Sentence for one error that moves the image too far; `moved` is None if the error has no image. [m]"""
+    """Sentence for one error that displaces the image too far, `moved` in m; `moved` is None if there is no image."""
     where = "beyond every ground point" if moved is None else f"by {format_quantity(moved, 'm')}"
     return f"moves the image {where}, {format_limit(limit, 'm')} allowed ({equation})"
 
@@ -70,7 +74,7 @@ def location_over(moved: float | None, limit: float, equation: str) -> str:
 def aggregate_over(
     what: str, size: float, limit: float, unit: str, row_id: str, largest: float, extrapolated: str = ""
 ) -> str:
-    """Sentence for a sum of errors: size, limit, largest error, and a note on the data behind that error."""
+    """Sentence for a sum of errors over its limit, with the largest error and a note on the data behind it."""
     text = f"{what} {over_words(size, limit, unit)}; largest: {row_id}, {size_words(abs(largest), unit)}"
     return in_brackets(text, extrapolated)
 
@@ -86,7 +90,10 @@ def other_model_fails(model: str, size: float, limit: float, unit: str, what: st
 def published_model_does_not_hold(
     row_id: str, published: float | None, full: float | None, unit: str, others: int
 ) -> str:
-    """Sentence for a mission where the published model does not hold: a row's allowables, None without limit."""
+    """Sentence for a mission to which the published model does not apply, with the allowables of a row as an example.
+
+    `published` and `full` are the allowables by the two models in `unit`; None means that there is no limit.
+    """
     by_published, by_full = (
         "without limit" if size is None else format_limit(size, unit) for size in (published, full)
     )

@@ -35,13 +35,13 @@ _NEEDED_DECLARATIONS = {
 
 
 def effect_words(kind: str, size: float) -> str:
-    """Text for the size of an effect that no requirement judges."""
+    """Text with the size of an effect that no requirement judges."""
     return _SHOWN_EFFECTS[kind].format(f"{size:.3g}")
 
 
 @composed
 def confidence(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> str:
-    """Text after `met` for a mission whose requirements are met: sigma, stated bounds, coverage factor."""
+    """Text after `met` for the confidence of a verdict: one sigma or a coverage factor, and stated bounds."""
     covered = f"with coverage factor {coverage_factor:g}"
     if not has_sigma:
         if not has_bounds:
@@ -70,13 +70,13 @@ def effect_is_negligible(kind: str, total: float, keys: Sequence[str]) -> str:
 
 @composed
 def nothing_judges(key: str) -> str:
-    """Sentence for a requirement that no row judges, because the file does not declare the errors for it."""
+    """Sentence for a requirement that no row judges, because the file declares no error with such an effect."""
     return f"no declared error {_NEEDED_DECLARATIONS[key]}"
 
 
 @composed
 def not_declared_as_required(key: str, lacks: str = "") -> str:
-    """Sentence for a required error that is not declared; `lacks` names the missing key if half is declared."""
+    """Sentence for a required error that is not declared, or only in part; `lacks` then names the missing key."""
     if lacks:
         return f"requirements.declare asks for {key}, which is declared in part: the file has no {lacks}"
     return f"the file has no {key}, which requirements.declare asks for"
@@ -92,6 +92,6 @@ def declarations_are_missing(keys: Sequence[str]) -> str:
 
 @composed
 def waived(line: int | None, until: date, reason: str, is_expired: bool, waiver_id: str) -> str:
-    """Sentence for a failed row or requirement that a waiver names: its line, last day and reason."""
+    """Sentence for a failed row or requirement that a waiver covers: line, id, last day and reason of the waiver."""
     place = "--set" if line is None else f"line {line}"
     return f"{'expired ' if is_expired else ''}waiver of {place} ({waiver_id}), until {until}: {reason}"

@@ -38,29 +38,29 @@ def _items(value: object) -> list[str]:
 
 
 def size_words(size: float, unit: str) -> str:
-    """Text for a magnitude: metres with a prefix, phases in radians without a prefix, to be compared with π/4."""
+    """Text of a magnitude: lengths with an SI prefix, other quantities without one, such as phases in rad."""
     if not math.isfinite(size):
         return "without a value (no ground point has this range history)"
     return format_quantity(size, unit) if unit == "m" else f"{abs(size):.3g} {unit}"
 
 
 def over_words(size: float, limit: float, unit: str) -> str:
-    """Text for a magnitude and its limit, for example `1.2 rad, 0.785 rad allowed`."""
+    """Text of a magnitude and its limit, for example `1.2 rad, 0.785 rad allowed`."""
     return f"{size_words(size, unit)}, {format_limit(limit, unit)} allowed"
 
 
 def level_words(level_db: float, rounding: str = "nearest") -> str:
-    """Text for a level with three digits. [dB]"""
+    """Text of a level `level_db` in dB, with three digits."""
     return format_quantity(level_db, "dB", 3, rounding)
 
 
 def cycles_words(cycles: float) -> str:
-    """Text for a number of cycles below a limit: three digits, rounded down so that it stays below the limit."""
+    """Text of a number of cycles with three digits, rounded down so that a number below a limit stays below it."""
     return format_quantity(cycles, "", 3, "down")
 
 
 def in_brackets(text: str, remark: str) -> str:
-    """Append a remark in brackets to a text; without brackets if the remark is empty."""
+    """Append a remark in brackets to a text. If the remark is empty, the text is returned unchanged."""
     return f"{text} ({remark})" if remark else text
 
 
@@ -107,7 +107,7 @@ class _Filler(string.Formatter):
     """Fills the fields of a template. A field without a value raises `KeyError`."""
 
     def format_field(self, value: object, format_spec: str) -> str:
-        """Text for one quantity in its format."""
+        """Text of one quantity in the format that its field of the template gives."""
         kind, _, options = format_spec.partition(" ")
         if kind in _QUANTITY_FORMATS:
             return _QUANTITY_FORMATS[kind](value, options)

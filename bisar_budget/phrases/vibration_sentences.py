@@ -55,7 +55,7 @@ def share_of_power_over(metric: str, rule: str) -> str:
 def slower_than_three_cycles(
     cycles: float, quadratic: float, limit: float, cubic: float, cubic_limit: float | None
 ) -> str:
-    """Sentence for a vibration below three cycles per aperture: its worst-case phases and their limits. [rad]"""
+    """Sentence for a vibration below three cycles per aperture: its worst-case phases and their limits, in rad."""
     return (
         f"{cycles_words(cycles)} cycles per aperture: below three there is also "
         f"{_in_the_worst_phase(quadratic, limit, cubic, cubic_limit)}; the same motion, not counted again in a sum"
@@ -64,7 +64,7 @@ def slower_than_three_cycles(
 
 @composed
 def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: bool, required_db: float) -> str:
-    """Sentence for lines of both platforms with close frequencies, whose echoes add."""
+    """Sentence for vibrations of both platforms at nearly the same frequency, whose paired echoes add."""
     return (
         f"the {other} vibrates at most {apart:g} cycles per aperture from this frequency too: in the worst phases "
         f"echoes of both together are {'above ' if is_more else ''}{level_db:.1f} dB, {required_db:g} dB required"
@@ -73,34 +73,43 @@ def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: b
 
 @composed
 def published_rule_is_off(margin_db: float) -> str:
-    """Sentence for the difference between the published limit of a vibration and first principles. [dB]"""
+    """Sentence for the margin in dB between the published limit of a vibration and that from first principles."""
     comparison = "stricter" if margin_db >= 0 else "more lenient"
     return f"the published rule is {abs(margin_db):.2f} dB {comparison} than first principles"
 
 
 @composed
 def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
-    """Sentence for a vibration of which only a part acts along the line of sight. [m]"""
+    """Sentence for a vibration of which only the component `along` the line of sight [m] acts on the range.
+
+    With a direct path, the component is that in the range minus the direct path.
+    """
     where = "in the range less the direct path" if has_direct_path else "along the line of sight"
     return f"{stated}: {format_quantity(along, 'm')} of it {where}"
 
 
 @composed
 def does_as_much_as_along_the_sight(stated: str, along: float, has_direct_path: bool) -> str:
-    """Sentence for a slow vibration along several axes: the equivalent amplitude along the line of sight. [m]"""
+    """Sentence for a slow vibration along several axes: its equivalent amplitude `along` the line of sight [m].
+
+    With a direct path, the amplitude is that in the range minus the direct path.
+    """
     where = "in the range less the direct path" if has_direct_path else "along the line of sight"
     return f"{stated}: in the worst phase equivalent to {format_quantity(along, 'm')} {where}"
 
 
 @composed
 def spectrum_shakes(rms: float, level_db: float) -> str:
-    """Sentence for the vibration spectrum of a platform: its rms along the line of sight [m], and its shift [dB]."""
+    """Sentence for a vibration spectrum: its rms along the line of sight [m] and its shift in level [dB]."""
     shift = f", shifted by {level_db:g} dB" if level_db else ""
     return f"{format_quantity(rms, 'm')} rms along the line of sight{shift}, slow parts included"
 
 
 @composed
 def oscillator_does_not_vibrate(turns: bool) -> str:
-    """Sentence for an oscillator on a platform for which the file states no sinusoidal vibration and no spectrum."""
+    """Sentence for an oscillator on a platform without a stated vibration, sinusoidal or as a spectrum.
+
+    If the platform turns, the acceleration sensitivity acts on the acceleration of the turn only.
+    """
     used = "counts for the turn only" if turns else "has nothing to act on"
     return f"no sinusoidal vibration and no spectrum is stated: the acceleration sensitivity {used}"

@@ -65,7 +65,10 @@ def fit_changes_allowables(platform: str, acceleration: float, change: float, ro
 
 @composed
 def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence[float], has_axes: bool) -> str:
-    """Sentence for a path with the speed of a satellite but without the acceleration of an orbit. [m/s, m/s²]"""
+    """Sentence for a straight path with the speed of a satellite.
+
+    `speed` is in m/s. `acceleration` are the components of a circular orbit [m/s²] that the path lacks.
+    """
     components = ", ".join(f"{component + 0.0:.3f} m/s^2" for component in acceleration)
     if has_axes:
         how = "(gravity of a flattened Earth, less what its rotation adds)"

@@ -1,4 +1,4 @@
-"""Image points and range errors by exact ranges: no expansion in the size of an error, and many cases at once."""
+"""Image points and range errors of many cases at once, computed without a series expansion in the error."""
 
-# What other rooms may use.
+# Modules that other packages may import.
 __all__ = ["exact_ranges", "limit_search", "point_paths", "resolution"]

@@ -2,34 +2,35 @@
 
 A case is one collection. All functions take many cases at once.
 
-The data hold the ranges of the true path; the processor subtracts the ranges of the measured path. For a ground point
-x the range error ρ(τ; x) is the recorded range less the expected range. The phase over band and aperture is 2πfρ/c.
-To second order in that phase the image peaks where the variance of the phase is smallest. A constant phase does not
-count. So the image point minimises
+The recorded data contain the ranges of the true paths. The processor subtracts the ranges of the measured paths. For
+a ground point x the range error ρ(τ; x) is the recorded range less the expected range. The phase over band and
+aperture is 2πfρ/c. To second order in that phase the image peaks where the variance of the phase is smallest. A
+constant phase does not count. So the image point minimises
 
     V(x) = Var_τ(ρ) + b²⟨ρ²⟩,    b² = B²/(12 f₀²),
 
-for an evenly filled band of width B about f₀. ⟨ ⟩ is the mean over the aperture. The scalar product of V is
-⟨a, c⟩ = (1 + b²)⟨ac⟩ − ⟨a⟩⟨c⟩, so that V = ⟨ρ, ρ⟩. The image point satisfies ⟨∂ρ/∂x, ρ⟩ = 0. H is the matrix
-⟨g, gᵀ⟩ of the gradient g = ∂ρ/∂x (see `image_plane`). If b is much larger than the square of the angle by which the
-line of sight turns, ρ at the image point has no part along the Legendre polynomials P₀ and P₁ of the aperture. With a
-narrow band or a wide turn, parts along both polynomials remain.
+for an evenly filled band of width B about f₀. ⟨ ⟩ is the mean over the aperture. The scalar product of V is ⟨a, c⟩ =
+(1 + b²)⟨ac⟩ − ⟨a⟩⟨c⟩, so that V = ⟨ρ, ρ⟩. The image point satisfies ⟨∂ρ/∂x, ρ⟩ = 0. H is the matrix ⟨g, gᵀ⟩ of the
+gradient g = ∂ρ/∂x (see `image_plane`). The aperture is the interval −1 … 1 of the Legendre polynomials Pₙ. If b is
+much larger than the square of the angle by which the line of sight turns, ρ at the image point has no P₀ part and no
+P₁ part. With a narrow band or a wide turn, both parts remain.
 
 Legendre polynomials are fitted to ρ at the image point, at the nodes of Gauss-Legendre quadrature over the aperture.
-The P₂ and P₃ parts are the quadratic and the cubic phase. The rest beyond P₃ spreads energy over the image. V also
-has a part that is not quadratic, cubic or rest, because the band and the turn of the line of sight do not resolve it.
-The hidden phase is the quadratic phase that lowers the peak as much as this part of V.
+The P₂ and P₃ parts are the quadratic and the cubic phase. The remainder beyond P₃ spreads energy over the image. V
+also contains a part that is none of these: mainly P₀ and P₁ parts that the displacement cannot remove, because the
+band and the turn of the line of sight do not resolve it. The hidden phase is the quadratic phase that lowers the peak
+as much as this part of V.
 
 For errors so small that their effects are proportional to them, `ExactRanges.effect` gives the same results. The
 method is derived here. `tests/theory/test_image_point.py` checks it against images formed by direct sums.
 
-A receiver that hears the transmitter takes the direct path as its clock. The data then hold R_t + R_r minus the
-actual distance between the platforms. The processor subtracts the measured ranges minus the measured distance. The
-distance is the same for all ground points, so its error has the effect of a clock error, c·t̃ = |r̂_t − r̂_r| − |r_t
-− r_r|. No other clock error has an effect in that case.
+A receiver that receives the signal of the transmitter directly may use this direct path as its clock. The recorded
+range is then R_t + R_r minus the actual distance between the platforms. The processor subtracts the measured ranges
+minus the measured distance. The distance is the same for all ground points, so its error has the effect of a clock
+error, c·t̃ = |r̂_t − r̂_r| − |r_t − r_r|. No other clock error has an effect in that case.
 
 Arrays of samples over the aperture have the shape (nodes, cases). Arrays for errors have the shape (nodes, lanes). A
-lane is one error of one case. If there is a single case, it is the case of all lanes.
+lane is one error of one case. If there is only one case, all lanes belong to it.
 """
 
 import math
@@ -49,13 +50,13 @@ from bisar_budget.image_plane import FEWEST_PATH_NODES, LEGENDRE_LEADING, Ground
 if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
 
-Shifts = Sequence[Sequence[Floats] | Floats]  # east, north and up of each platform, (nodes, lanes) or alike. [m]
+Shifts = Sequence[Sequence[Floats] | Floats]  # [m] east, north, up of each platform; (nodes, lanes) or shared
 
-FINE_NODE_COUNT = 24  # nodes of courses less smooth than the courses of (22)
+FINE_NODE_COUNT = 24  # nodes for error histories that are less smooth than the polynomials of (22)
 RANGE_ROUNDING_FRACTION = 2e-15  # rounding error of a few operations, as a fraction of a range sum
-MAX_TURN_RAD = 1.0  # turn of a line of sight within the aperture up to which Legendre orders have a meaning
+MAX_TURN_RAD = 1.0  # largest turn of a line of sight within the aperture for which Legendre orders are meaningful
 
-# A quadratic phase φ at the aperture edge leaves the phase with a variance of 4φ²/45.
+# A phase history that is quadratic, with the value φ at the aperture edge, has the variance 4φ²/45.
 QUADRATIC_OF_VARIANCE = math.sqrt(45 / 4)
 
 NO_SHIFTS = [np.zeros((1, 1))] * 3  # shifts of a platform that no error moves
@@ -68,19 +69,21 @@ class PointSettings:
     Attributes
     ----------
     end_rad : float
-        Hidden phase above which a folded path ends: no ground point has the recorded range history. [rad]
+        Hidden phase above which a path that is near a fold ends, because no ground point has the recorded range
+        history. [rad]
     folded_fraction : float
         Root of the determinant of H at a point (the area that the gradient g spans), as a fraction of its value at
         the scene centre. A path on which the fraction is smaller is near a fold or beyond it.
     near_fold_fraction : float
-        The same fraction, below which the area changes much in a small step and one peak may fade into another.
+        The same fraction, as the upper bound of the neighbourhood of a fold. There the area changes much in a small
+        step, and one peak may fade into another.
     last_step_rad : float
         Largest change of a phase by the last step, not counting the part that is linear in the step. [rad]
     last_step_near_fold_fraction : float
-        Square of the last step near a fold, as a fraction of its square elsewhere.
+        Largest square of the last step near a fold, as a fraction of the largest square elsewhere.
     nearest_fraction : float
         Smallest accepted distance between a platform and a point, as a fraction of the nearest range. At a smaller
-        distance the line of sight is only rounding.
+        distance, rounding errors dominate the direction of the line of sight.
     shrinking_ratio : float
         Largest accepted ratio of the square of a Newton step to the square of the step before. If the ratio is
         larger, the iteration does not converge.
@@ -118,12 +121,12 @@ class PointSettings:
 
 POINT_SETTINGS = PointSettings()
 
-# Number of arrays of both platforms that hold measured paths, and the number together with the arrays of a step.
+# Numbers of work arrays for both platforms: those for the measured paths, and those plus the arrays of one step.
 _MEASURED_ARRAY_COUNT, _ARRAY_COUNT = 5, 11
 
 
 def aperture_nodes(aperture_time_s: float) -> Floats:
-    """Slow times of the nodes for error histories that are not smooth over the aperture, (FINE_NODE_COUNT,). [s]"""
+    """Slow times of the nodes at which error histories that are not smooth are sampled, (FINE_NODE_COUNT,). [s]"""
     return nodes(FINE_NODE_COUNT).places * (aperture_time_s / 2)
 
 
@@ -144,9 +147,9 @@ class Effect(NamedTuple):
 class FullEffect(NamedTuple):
     """Effect of one unit of a small error by the full model.
 
-    Fields are numbers for one case or arrays of cases. `east` and `north` are the displacement. [m/unit] `qpe` and
-    `cubic` are the quadratic and the cubic phase at the aperture edge [rad/unit], signed like the range error that
-    remains at the displaced point.
+    Fields are numbers for one case or arrays for many. `east` and `north` [m/unit] are the displacement. `qpe` and
+    `cubic` [rad/unit] are the quadratic and the cubic phase at the aperture edge. They have the sign of the range
+    error that remains at the displaced point.
     """
 
     east: PerCase
@@ -157,10 +160,10 @@ class FullEffect(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeTags:
-    """Errors of time tags among the lanes: a tag error δt shifts a platform by p(τ + δt) − p(τ) along its path.
+    """Lanes whose error is a time-tag error: an error δt shifts a platform by p(τ + δt) − p(τ) along its path p.
 
-    `paths` are the paths of transmitter and receiver. `times` are the slow times of the nodes, (nodes, cases). [s]
-    `case` (lanes,) is the case of each lane, or -1 for a lane that is not a time tag.
+    `paths` are the paths of transmitter and receiver. `times` (nodes, cases) are the slow times of the nodes. [s]
+    `case` (lanes,) is the case of each lane, or -1 for a lane whose error is of another kind.
     """
 
     paths: tuple[PlatformState, PlatformState]
@@ -173,10 +176,10 @@ class TimeTags:
         return replace(self, case=case) if (case >= 0).any() else None
 
     def put(self, platform: int, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> list[Any]:
-        """Return the shifts `along` of one platform, with those of the time-tag lanes replaced.
+        """Return the shifts `along` of one platform, with the values in time-tag lanes replaced.
 
-        Returns three arrays (nodes, lanes), one per axis. A time-tag lane gets the shift by its tag error `tag_s`
-        [m], or, if `is_rate`, the change of the shift per second of tag error. [m/s]
+        Returns three arrays (nodes, lanes), one per axis. A time-tag lane gets the shift that its time-tag error
+        `tag_s` [s] causes. [m] If `is_rate`, it gets the change of this shift per second of time-tag error. [m/s]
         """
         tagged = np.flatnonzero(self.case >= 0)
         (times,), tag_s = _take_cases([self.times], self.case[tagged]), tag_s[:, tagged]
@@ -197,16 +200,16 @@ class Lanes:
     case : (lanes,)
         The case of each error.
     at_nodes : (nodes, lanes)
-        Size of a unit error at the nodes: position error [m/unit]; range error for a clock [m/unit]; the sign of the
-        error for a time tag.
+        Size of a unit error at the nodes: the position error [m/unit], the range error by a clock [m/unit], or the
+        sign of a time-tag error.
     moves : (2, lanes)
         1 if the error moves the transmitter (first row) or the receiver (second row), else 0.
     directions : (2, 3, nodes, lanes)
         Directions in which a unit of each error moves transmitter and receiver; zero for a platform that the error
-        does not move. For a small time-tag error, the velocity. [m/s] The node axis has length 1 if no direction
+        does not move. For a small time-tag error it is the velocity. [m/s] The node axis has length 1 if no direction
         turns; the lane axis has length 1 if all lanes share the directions.
     order : (lanes,)
-        Power of slow time with which a position error grows; -1 for a clock. An error of velocity turns Doppler.
+        Power of slow time with which a position error grows; -1 for a clock error.
     tags : TimeTags, optional
         Paths of the lanes that are time tags, if any lane is.
     """
@@ -235,11 +238,14 @@ class Lanes:
         return Lanes(self.case.take(lanes), at_nodes, moves, directions, order, tags)
 
     def there(self, case: Indices) -> "Lanes":
-        """Return the errors for the cases that `ExactRanges.at` selects by `case`; the lanes are one per case."""
+        """Errors for the collections that `ExactRanges.at` returns for the same `case`.
+
+        The lanes must be one per case, in the order of the cases.
+        """
         return replace(self.of(case), case=np.arange(case.size))
 
     def shifts(self, size: Any) -> Floats:
-        """Shifts of both platforms at the nodes by errors of the given sizes, (2, 3, nodes, lanes). [m]"""
+        """Shifts of both platforms at the nodes caused by errors of the given sizes, (2, 3, nodes, lanes). [m]"""
         course = self.at_nodes * size
         shifts: Floats = self.directions * course
         return shifts if self.tags is None else self._tagged(self.tags, course, shifts)
@@ -265,13 +271,13 @@ class Lanes:
 
 
 class SmallErrors(NamedTuple):
-    """Unit errors, the same list for all cases, small enough for their effects to be proportional to them.
+    """List of unit errors, the same for all cases, so small that their effects are proportional to them.
 
-    `courses` are the distinct histories of errors over the aperture, (courses, nodes, cases). [m/unit] `course`
-    (errors,) is the index of each error's history. `ways` (errors, 7, cases) are the directions of each error:
+    `courses` (courses, nodes, cases) are the distinct error histories over the aperture. [m/unit] `course` (errors,)
+    is the index of each error's history. `ways` (errors, 7, cases) are the components of a unit of each error:
     transmitter east, north and up, receiver east, north and up, and the range error by the clock. The axis of cases
-    has length 1 if all cases share the directions. If the direction of an error turns, `turning` maps the index of
-    the error to its shifts at the nodes, (7, nodes, cases).
+    has length 1 if all cases share the components. If the direction of an error changes within the aperture,
+    `turning` maps the index of the error to its components at the nodes, (7, nodes, cases).
     """
 
     courses: Floats
@@ -302,12 +308,12 @@ class SmallErrors(NamedTuple):
 
 
 class ImagePoints(NamedTuple):
-    """Image points of lanes and the phases that remain there, by exact ranges, each (lanes,).
+    """Image points of lanes and the phases that remain there, computed from exact ranges; each field is (lanes,).
 
     `is_settled` is True where the search converged. `east` and `north` are the displacement. [m] `quadratic` and
-    `cubic` are the phases at the aperture edge, signed like β̃; `hidden` is the hidden phase, and `rest` the rms
-    phase beyond the cubic. [rad] `turn` is the root of the determinant of H at the point (the area that the gradient
-    g spans), as a fraction of its value at the scene centre.
+    `cubic` are the phases at the aperture edge, with the sign of the range error. `hidden` is the hidden phase, and
+    `rest` the rms phase beyond the cubic. [rad] `turn` is the root of the determinant of H at the point (the area
+    that the gradient g spans), as a fraction of its value at the scene centre.
     """
 
     is_settled: Booleans
@@ -322,11 +328,11 @@ class ImagePoints(NamedTuple):
 
 @dataclass(frozen=True)
 class ExactEffect:
-    """Effect of one error by exact ranges, in plain numbers.
+    """Effect of one error, computed from exact ranges, in plain numbers.
 
-    `displacement` is east and north. [m] `quadratic` and `cubic` are the phases at the aperture edge, signed like the
-    range error. `hidden` is the phase that band and turn of the line of sight do not resolve, and `rest` the rms
-    phase beyond the cubic. [rad]
+    `displacement` is the displacement east and north. [m] `quadratic` and `cubic` are the phases at the aperture
+    edge, with the sign of the range error. `hidden` is the phase that the band and the turn of the line of sight do
+    not resolve. `rest` is the rms phase beyond the cubic. [rad]
     """
 
     displacement: GroundVector
@@ -351,16 +357,16 @@ class ExactRanges:
     Parameters
     ----------
     half, k : (n,)
-        Half the aperture time [s], and 2π over the wavelength of the band's centre. [rad/m]
+        Half the aperture time [s], and the wavenumber 2π/λ at the band's centre. [rad/m]
     band : (n,)
         b²: variance of the frequency over the band, divided by the square of the centre frequency.
     sampling : Sampling
-        Slow times at which the paths are sampled, at nodes or anywhere.
+        Slow times at which the paths are sampled. They may be quadrature nodes or any other times.
     tracks : sequence of Vectors
         Positions of both platforms at the nodes, relative to the scene centre or to the ground point that replaces
         it, (nodes, n). [m]
     positions : sequence of Vectors
-        The same at the middle of the aperture, (n,). [m]
+        Positions of both platforms at the middle of the aperture, relative to the same point, (n,). [m]
     has_direct_path : bool
         Whether the receiver takes the direct path as its clock.
 
@@ -402,9 +408,9 @@ class ExactRanges:
         *,
         has_direct_path: bool = False,
     ) -> "ExactRanges":
-        """Exact ranges of collections to their scene centres.
+        """Compute the exact ranges from the platforms of one or many collections to their scene centres.
 
-        `paths` are those of transmitter and receiver, and `count` is the number of nodes.
+        `paths` are the paths of transmitter and receiver, and `count` is the number of nodes.
         """
 
         def of_each(value: PerCase) -> Floats:
@@ -425,9 +431,10 @@ class ExactRanges:
         return cls(half, k, band, sampling, tracks, middles, has_direct_path=has_direct_path)
 
     def at(self, east: Floats, north: Floats, case: Indices) -> "ExactRanges":
-        """Exact ranges to ground points instead of the scene centre, one point for each entry of `case`.
+        """Compute the exact ranges to ground points instead of the scene centres, one point for each entry of `case`.
 
-        `east` and `north` are the points, (case,) [m], and `case` the indices of their cases.
+        `east` and `north` are the coordinates of the points [m], and `case` the indices of their cases. All three
+        have the same shape (points,).
         """
         tracks = [(x - east, y - north, z) for x, y, z in (_take_cases([*track], case) for track in self.tracks)]
         positions = [(x[case] - east, y[case] - north, z[case]) for x, y, z in self.positions]
@@ -465,7 +472,7 @@ class ExactRanges:
 
     @cached_property
     def product_weights(self) -> Floats:
-        """Weights of the parts that `Sampling.centred` gives, in the scalar product ⟨a, c⟩ of V, (nodes + 1, n)."""
+        """Weights of the scalar product ⟨a, c⟩ of V for histories from `Sampling.centred`, (nodes + 1, n)."""
         return np.concatenate(((1 + self.band) * self.mean, self.band[None]))
 
     @cached_property
@@ -508,25 +515,28 @@ class ExactRanges:
 
     @cached_property
     def _between(self) -> VectorArrays:
-        """Position of the transmitter relative to the receiver at the nodes. [m]"""
+        """Position of the transmitter relative to the receiver at the nodes, three components (nodes, n). [m]"""
         (x, y, z), (u, v, w) = self.tracks
         return (x - u, y - v, z - w)
 
     @cached_property
     def baselines(self) -> Floats:
-        """Distance between the platforms at the nodes. [m]"""
+        """Distance between the platforms at the nodes, (nodes, n). [m]"""
         return np.asarray(norm(self._between))
 
     @cached_property
     def heard_along(self) -> tuple[VectorArrays, VectorArrays]:
-        """Unit vectors at the nodes: from receiver to transmitter, and from transmitter to receiver."""
+        """Unit vectors from receiver to transmitter and from transmitter to receiver, at the nodes."""
         x, y, z = (component / self.baselines for component in self._between)
         return ((x, y, z), (-x, -y, -z))
 
     # ------------------------------------------------------------------ small errors
     @cached_property
     def powers(self) -> dict[str, Floats]:
-        """Position error at the nodes for one unit of an error, by unit: 1, τ or τ²/2 of (22)."""
+        """Position error at the nodes caused by one unit of a polynomial error of (22), (nodes, n).
+
+        The keys are the units of the error: `m` for 1, `m/s` for τ, and `m/s^2` for τ²/2.
+        """
         return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
 
     def clock_course(self, terms: Sequence[PerCase]) -> Floats:
@@ -546,7 +556,7 @@ class ExactRanges:
         return change + dot(self.heard_along[platform], direction) if self.has_direct_path else change
 
     def range_error(self, lanes: Lanes) -> Floats:
-        """Range error at the nodes per unit of small errors. [m/unit]
+        """Range error at the nodes caused by one unit of each of a set of small errors, (nodes, lanes). [m/unit]
 
         The lanes are one error for each case, or any number of errors of a single case.
         """
@@ -562,7 +572,7 @@ class ExactRanges:
         The values are those that `effect` gives.
         """
         weights = self.phase_weights[0]
-        along = np.empty((7, *weights.shape))  # range change at the nodes by a metre along each way
+        along = np.empty((7, *weights.shape))  # range change at the nodes per metre along each component of `ways`
         for platform in (0, 1):
             of_axes = along[3 * platform : 3 * platform + 3]
             for axis in (0, 1, 2):
@@ -585,9 +595,10 @@ class ExactRanges:
 
     @cached_property
     def order_weights(self) -> Floats:
-        """Legendre orders 0 to 3 of the range error left at the displaced point, per metre at each node. [m/m]
+        """Weights that give Legendre orders 0 to 3 at the displaced point from range errors at the nodes. [m/m]
 
-        The array is (4, nodes, n).
+        The array is (4, nodes, n). The weights include the effect of the displacement. They give the value of each
+        order at the aperture edge.
         """
         (by_east, by_north), (east, north) = self.gradient, self.place_weights
         return np.asarray(self.fit[..., None] + by_east[:, None] * east + by_north[:, None] * north)
@@ -604,9 +615,9 @@ class ExactRanges:
     def hidden_weights(self) -> Floats:
         """Parts of the hidden phase from Legendre orders 0 to 3, per metre of range error at each node. [rad/m]
 
-        The array is (4, nodes, n). The square of the hidden phase is the sum of the squares of the four parts. The
-        rest of the range error beyond order 3 is not included. Its weight in the hidden phase is only b², which is
-        small, unless a line of sight turns by more than `MAX_TURN_RAD`.
+        The array is (4, nodes, n). The square of the hidden phase is the sum of the squares of the four parts. Range
+        errors beyond order 3 are not included. Their weight in the hidden phase is only b², which is small, unless a
+        line of sight turns by more than `MAX_TURN_RAD`.
         """
         of_orders = np.array([self.band, (1 + self.band) / 3, self.band / 5 / 1.5**2, self.band / 7 / 2.5**2])
         of_orders[3] += self.is_turned / (7 * 2.5**2)
@@ -619,16 +630,17 @@ class ExactRanges:
         The rows are quadratic, cubic and hidden phase [rad], and displacement. [m]
         """
         mean, slope, quadratic, cubic = np.abs(self.order_weights).sum(axis=1)
-        # The displacement never increases V, which is 1 + b² at most, its variance included.
+        # V of such an error, and the variance as a part of V, are at most 1 + b². The displacement never increases V.
         hidden = QUADRATIC_OF_VARIANCE * np.sqrt(self.band * (1 + self.band + mean**2) + slope**2 / 3)
         hidden = np.where(self.is_turned, QUADRATIC_OF_VARIANCE * np.sqrt(1 + self.band), hidden)
         east, north = (np.abs(weights).sum(axis=0) for weights in self.place_weights)
         return np.array((self.k * quadratic, self.k * cubic, self.k * hidden, np.hypot(east, north)))
 
     def effect(self, range_error: Floats) -> FullEffect:
-        """Displacement and remaining phases for small range errors at the nodes, (..., nodes, cases).
+        """Displacement and remaining phases caused by small range errors.
 
-        The phases include the effect of the displacement. Results that are only rounding are set to 0.
+        `range_error` is the range error at the nodes, (..., nodes, cases). [m] The phases include the effect of the
+        displacement. Results that are only rounding errors are set to 0.
         """
         size = np.abs(range_error)
         (east, seen_east), (north, seen_north) = (
@@ -643,7 +655,7 @@ class ExactRanges:
             phase = order_phase + by_east * east + by_north * north
             seen = most + np.abs(by_east) * seen_east + np.abs(by_north) * seen_north
             phases.append(self.k * _unless_rounding(phase, seen))
-        # Where terms cancel exactly, the rest is rounding and would give a limit where none exists.
+        # Where terms cancel exactly, a rounding error would remain and give a limit although none exists.
         return FullEffect(_unless_rounding(east, seen_east), _unless_rounding(north, seen_north), *phases)
 
     def left_of_small(self, range_error: Floats, moved: tuple[PerCase, PerCase]) -> Floats:
@@ -656,7 +668,7 @@ class ExactRanges:
         return np.asarray(range_error + by_east * east + by_north * north)
 
     def unresolved(self, remaining: Floats) -> tuple[Floats, Floats]:
-        """Hidden phase and rms phase beyond the cubic, from the range errors left at the nodes. [rad]
+        """Hidden phase and rms phase beyond the cubic, computed from the range errors that remain at the nodes. [rad]
 
         `remaining` is (..., nodes, cases). [m]
         """
@@ -665,7 +677,11 @@ class ExactRanges:
         return _unresolved(np.moveaxis(orders, -2, 0), squares, self.k, self.band, self.is_turned)
 
     def mean_squares(self, remaining: Floats, orders: Floats) -> tuple[Floats, Floats]:
-        """Mean square of the range errors left at the nodes, and mean square of their part beyond order 3. [m²]"""
+        """Mean squares of remaining range errors and of their part beyond Legendre order 3, (..., cases) each. [m²]
+
+        `remaining` (..., nodes, cases) are the range errors at the nodes, and `orders` (..., 4, cases) their orders 0
+        to 3. [m]
+        """
         beyond = remaining - self._legendre @ orders
         return self.fit[0] @ (remaining * remaining), self.fit[0] @ (beyond * beyond)
 
@@ -680,14 +696,15 @@ class ExactRanges:
     ) -> ImagePoints:
         """Find the points to which errors of given sizes displace the scene centre, and the phases that remain there.
 
-        The search starts at `near` [m] and finds points at which Newton's method converges. With `is_at_fold` it
-        descends V from the start instead. Use `point_paths` to follow a point as an error grows. Points beyond a line
-        on which the gradients of range and Doppler are parallel are not found, because no growing error leads there.
+        Newton's method searches from `near`, east and north. [m] With `is_at_fold` a descent of V from the same start
+        replaces it. Use `point_paths` to follow a point as an error grows. On the ground there may be a line on which
+        the gradients of range and Doppler are parallel. Points beyond it are not returned, because no growing error
+        leads there.
         """
         return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
     def left_over(self, lanes: Lanes, size: Floats, point: tuple[PerCase, PerCase]) -> Floats:
-        """Range error that errors of given sizes leave at ground points, at the nodes, (nodes, lanes). [m]"""
+        """Range error that remains at ground points for errors of given sizes, at the nodes, (nodes, lanes). [m]"""
         lane_count = lanes.case.size
         room = self._room(lane_count)
         clock, measured = self._measured(lanes.clock(size), lanes.shifts(size), lanes.case, room)
@@ -696,16 +713,16 @@ class ExactRanges:
         return np.asarray(clock - growth[0] - growth[1])
 
     def _heard(self, shifts: Iterable[Any], case: Indices) -> Floats:
-        """Clock error c·t̃ at the nodes that shifts of the platforms cause if the direct path is the clock. [m]"""
+        """Clock error c·t̃ that shifts of the platforms cause if the direct path is the clock, (nodes, lanes). [m]"""
         a, b, c = (of_transmitter - of_receiver for of_transmitter, of_receiver in zip(*shifts, strict=True))
         x, y, z, baseline = _take_cases([*self._between, self.baselines], case)
         grown = a * (2 * x + a) + b * (2 * y + b) + c * (2 * z + c)
         return np.asarray(grown / (baseline + np.sqrt(np.abs(baseline * baseline + grown))))
 
     def way(self, lanes: Lanes, size: Floats, point: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-        """Rate at which image points move as errors grow, east and north. [m/unit]
+        """Displacement of image points per unit of growth of the errors, east and north. [m/unit]
 
-        `point` are the image points for errors of the sizes `size`. The image point is the minimum of V. Its rate
+        `point` are the image points for errors of the sizes `size`. The image point is the minimum of V. The result
         follows from the second derivative of V and from the change of the slope of V with the error.
         """
         course, ways, shifts = lanes.at_nodes, lanes.ways(size), lanes.shifts(size)
@@ -769,7 +786,7 @@ class ExactRanges:
         This form has no rounding error of the size of the range. For a ground point at g = (east, north) instead of
         the origin, p is replaced by p − g·(2r̂ − g), with the measured position r̂ = r + d.
         """
-        if self.has_direct_path:  # no other clock error counts
+        if self.has_direct_path:  # the error of the distance is then the only clock error
             clock = clock + self._heard(shifts, case)
         measured = room[:_MEASURED_ARRAY_COUNT, ..., : case.size]
         for platform, (track, (a, b, c)) in enumerate(zip(self.tracks, shifts, strict=True)):
@@ -793,10 +810,10 @@ class ExactRanges:
 
 
 class _PointSearch:
-    """Search for the image points of lanes by Newton's method, from the range errors that measured paths leave.
+    """Search for the image points of lanes by Newton's method or by a descent.
 
     `lane` are the indices of the lanes that have not settled, `of` their cases, and `point` their current points,
-    east and north. [m] `settled` has one entry for each step in which lanes settled: their indices,
+    east and north. [m] `settled` has one entry for each step in which lanes settled. An entry holds their indices,
     `_GroundView.seen` before the step, the determinant of H there, the step, and the points after it.
     """
 
@@ -860,10 +877,10 @@ class _PointSearch:
             self.point = best_point + step
 
     def store(self, points: ImagePoints) -> None:
-        """Write the settled points and the phases that remain there into `points`, except points beyond a fold.
+        """Write the settled points and the phases that remain there into `points`; points beyond a fold are left out.
 
-        The range error at a point is the range error before the last step plus its linear change by the step. A phase
-        below the rounding counts as 0.
+        The range error at a point is the range error before the last step plus its linear change by the step. Phases
+        smaller than the rounding error are set to 0.
         """
         if not self.settled:
             return
@@ -887,7 +904,7 @@ class _PointSearch:
             kept[lanes] = values[is_ahead]
 
     def _view(self) -> "_GroundView":
-        """Range errors, gradients and distances at the current points."""
+        """Compute range errors, gradients and distances at the current points."""
         growth, looks, distances = _grown(self.measured, self.point, self.room)
         seen = np.empty((3, *growth.shape[1:]))
         np.subtract(self.clock, growth[0], out=seen[0])
@@ -897,7 +914,7 @@ class _PointSearch:
         return _GroundView(seen, looks, distances, self.exact.sampling.centred, self.weights)
 
     def _last_step(self, view: "_GroundView") -> Floats:
-        """Square of the step below which a lane has settled, divided by the distance to the nearer platform. [m]"""
+        """Square of the largest last step of each lane's search, divided by the range of the nearer platform. [m]"""
         is_near_fold = view.determinant < self.near_fold
         smaller, usual = (
             POINT_SETTINGS.last_step_near_fold_fraction * POINT_SETTINGS.last_step_rad,
@@ -906,13 +923,13 @@ class _PointSearch:
         return np.asarray(np.where(is_near_fold, smaller, usual) / self.k)
 
     def _set_cases(self) -> None:
-        """Take the numbers of each lane's case."""
+        """Look up the wavenumber, smallest range, fold threshold and product weights of each lane's case."""
         exact = self.exact
         of_cases = [exact.k, POINT_SETTINGS.nearest_fraction * exact.nearest, exact.near_fold, exact.product_weights]
         self.k, self.least_range, self.near_fold, self.weights = _take_cases(of_cases, self.of)
 
     def _go_on(self, going: Indices) -> None:
-        """Continue with the lanes of the indices `going` only."""
+        """Continue only with the lanes at the indices `going`."""
         self.lane, self.of = self.lane[going], self.of[going]
         self.point, self.clock, self.measured = _take([self.point, self.clock, self.measured], going)
         self.room = self.room[..., : going.size]
@@ -932,7 +949,8 @@ class _GroundView:
     Attributes
     ----------
     seen : (3, nodes, lanes)
-        Range errors left at the nodes [m], and their change per metre east and per metre north. [m/m]
+        Range errors that remain at the nodes [m], and their changes if the point moves a metre east and a metre
+        north. [m/m]
     looks : (2, 2, nodes, lanes)
         Horizontal components of the unit vectors to the platforms, by axis and platform.
     distances : (2, nodes, lanes)
@@ -979,7 +997,7 @@ class _GroundView:
         return xx - total, xy, yy - total
 
     def products(self, values: Floats) -> Floats:
-        """Scalar products ⟨g, a⟩ of V, (2, lanes), for histories a at the nodes.
+        """Scalar products ⟨g, a⟩ of V for histories a at the nodes, (2, lanes).
 
         g is the change of the range error per metre east (first row) and per metre north (second row).
         """
@@ -1051,18 +1069,18 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -
     exact : ExactRanges
         Exact ranges of the cases.
     clock : (nodes, lanes)
-        Range errors by clocks; zero if the direct path is the clock. [m]
-    shifts : two of three of (nodes, lanes)
-        Shifts of both platforms. [m]
+        Range errors by clocks; they are zero if the direct path is the clock. [m]
+    shifts : sequence
+        For each platform, its shifts east, north and up, each (nodes, lanes). [m]
     case : (lanes,)
         The case of each error.
 
     Returns
     -------
     ImagePoints
-        NaN if no ground point has the recorded range history, or if a growing error does not lead to the point that
-        has it. As in `point_paths`, no point has the history if the hidden phase exceeds half a cycle and the
-        determinant of H is small.
+        Image points and remaining phases. They are NaN if no ground point has the recorded range history, or if the
+        image point does not reach this ground point while the error grows to its full size. As in `point_paths`, no
+        point has the history if the hidden phase exceeds half a cycle and the determinant of H is small.
     """
     points = _within_ends(exact.settled(clock, shifts, (0.0, 0.0), case))
     for steps in POINT_SETTINGS.course_steps:
@@ -1075,7 +1093,7 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -
             fraction = (step + 1) / steps
             ahead = [[fraction * along for along in shift] for shift in moved]
             there = _within_ends(exact.settled(fraction * noise, ahead, near, case[missed]))
-            near = np.array((there.east, there.north)) * ((step + 2) / (step + 1))  # NaN from the first lost point on
+            near = np.array((there.east, there.north)) * ((step + 2) / (step + 1))  # NaN after the first lost point
         for column, later in zip(points, there, strict=True):
             column[missed] = later
     has_ended = (np.abs(points.turn) < POINT_SETTINGS.folded_fraction) & (points.hidden > POINT_SETTINGS.end_rad)
@@ -1086,7 +1104,7 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -
 
 
 def _within_ends(points: ImagePoints) -> ImagePoints:
-    """Replace points beyond the end of the image by NaN, and mark them as not settled."""
+    """Replace points beyond the end of their path by NaN, and mark them as not settled."""
     is_gone = (np.abs(points.turn) < POINT_SETTINGS.folded_fraction) & (points.hidden > POINT_SETTINGS.end_rad)
     return ImagePoints(points.is_settled & ~is_gone, *(np.where(is_gone, math.nan, column) for column in points[1:]))
 
@@ -1096,4 +1114,4 @@ def _take(arrays: Sequence[Floats] | Floats, indices: Indices) -> list[Floats]:
     return [array if array.shape[-1] == 1 else array.take(indices, axis=-1) for array in arrays]
 
 
-_take_cases = _take  # for cases, arrays (nodes, cases) or (cases,): all lanes share a single case
+_take_cases = _take  # the same selection for arrays (nodes, cases) or (cases,), where all lanes may share one case

@@ -2,8 +2,8 @@
 
 A search works with the square of a phase or displacement divided by the square of its limit, because the square is a
 smooth function of the size and the magnitude is not. After each step the search uses all known points of the path. It
-ends where an interpolation is close to the limit and no crest at a smaller size may exceed the limit. All searches
-take each step together.
+ends if an interpolated point is close enough to the limit, and if no local maximum at a smaller size may exceed the
+limit. All searches take their steps at the same time.
 """
 
 import math
@@ -27,7 +27,7 @@ from bisar_budget.ranges.point_paths import QUADRATIC as QUADRATIC_ROW
 
 QUADRATIC_LIMIT, CUBIC_LIMIT, DISPLACEMENT_LIMIT = range(3)
 
-LIMIT_FRACTION = 1e-5  # of a limit, to which a search finds it
+LIMIT_FRACTION = 1e-5  # accuracy of a search, as a fraction of the limit
 
 
 @dataclass(frozen=True)
@@ -43,18 +43,18 @@ class SearchSettings:
     bent_fraction : float
         Change of a slope within an interval, as a fraction of the slope.
     crest_fraction : float
-        Distance below the limit, as a fraction of the limit, from which the crest of an interpolation counts as a
-        possible value above the limit.
+        Tolerance below the limit, as a fraction of the limit. A local maximum of an interpolation within this
+        tolerance counts as possibly above the limit.
     departure_fraction : float
         Largest difference between the rise over an interval and the rise that the slope at its lower end predicts, as
         a fraction of the limit. If the difference is larger, the search also tries a size within the interval.
     trusted_interval_fraction : float
         Largest width of an interval within which an interpolation is trusted, as a fraction of the size.
     steep_ratio : float
-        Square of a value divided by its limit, above which a power of the size predicts the limit better than a
+        Squared ratio of a value to its limit. Above it, a power law in the size predicts the limit better than a
         cubic.
     growth_factor : float
-        Growth of the size in a step.
+        Factor by which the size grows in a step.
     newton_steps : int
         Steps of Newton's method on an interpolating cubic.
     max_rounds : int
@@ -75,8 +75,8 @@ class SearchSettings:
 
 SEARCH_SETTINGS = SearchSettings()
 
-# Sizes that a few searches try in addition: fractions of the first size, factors around the size where a limit is
-# expected, and factors of a size while the search looks for the limit.
+# Additional sizes to try if there are only a few searches: fractions of the first size, factors around the size at
+# which the limit is expected, and factors of the size as long as the limit is not yet exceeded.
 FIRST_SIZE_FRACTIONS = np.array((0.25, 0.5, 0.75, 1.3, 2.0))
 NEIGHBOUR_FACTORS = np.array((0.98, 0.996, 1.004, 1.02))
 GROWTH_FACTORS = SEARCH_SETTINGS.growth_factor ** np.arange(1, 5)
@@ -89,7 +89,7 @@ class LimitSearches:
     Attributes
     ----------
     lane : (searches,)
-        Lane of the path.
+        Lane of the path that is searched.
     requirement : (searches,)
         QUADRATIC_LIMIT, CUBIC_LIMIT or DISPLACEMENT_LIMIT.
     limit : (searches,)
@@ -106,7 +106,8 @@ class LimitSearches:
     group : (searches,)
         Group of each search. A search ends at the smallest size that a search of its group has found.
     is_alone : (searches,)
-        Whether only searches of the group for the same requirement end the search.
+        If True, only a search of the group for the same requirement can end the search. If False, any search of the
+        group can.
     """
 
     lane: Indices
@@ -166,7 +167,7 @@ def find_first_sizes(paths: PointPaths, searches: LimitSearches, smallest: Float
         index, size = state.next_sizes(going, is_several=tries_several_sizes(going.size, paths.is_alike))
         paths.step_toward(searches.lane[index], size)
         searches, tries, low = searches.of(going), tries[going] + state.is_between[going], state.low[going]
-    np.minimum.at(smallest, (searches.requirement, searches.group), low)  # safe: below every limit
+    np.minimum.at(smallest, (searches.requirement, searches.group), low)  # unfinished searches: a safe size
 
 
 class _SearchState:
@@ -214,19 +215,22 @@ class _SearchState:
         self.width = self.size[:, 1:] - self.size[:, :-1]
         chord = (self.square[:, 1:] - self.square[:, :-1]) / self.width
         self.slope = np.empty(self.size.shape)
-        self.slope[:, 0] = 0.0  # a square begins without a slope
+        self.slope[:, 0] = 0.0  # the square of a value that grows from 0 has no slope there
         before, after = self.width[:, :-1], self.width[:, 1:]
         self.slope[:, 1:-1] = (chord[:, :-1] * after + chord[:, 1:] * before) / (before + after)
         last = np.maximum(self.count - 1, 1)
         self.slope[every, last] = 2 * chord[every, last - 1] - self.slope[every, last - 1]
 
     def _doubtful_sizes(self, first_above: Indices) -> Floats:
-        """Size to try within each interval below the limit; NaN if no value within it may exceed the limit."""
+        """Size to try next within each interval below the limit, (searches, intervals). [unit]
+
+        NaN where no value within the interval can exceed the limit.
+        """
         low, width = self.size[:, :-1], self.width
         start, stop = self.square[:, :-1], self.square[:, 1:]
         rise, slope_low, slope_high = stop - start, self.slope[:, :-1] * width, self.slope[:, 1:] * width
         expected_rise = slope_low.copy()
-        expected_rise[:, 0] = (width[:, 0] / self.searches.first) ** 2  # the rise of a small error
+        expected_rise[:, 0] = (width[:, 0] / self.searches.first) ** 2  # rise of a linear effect
         is_wide = width > SEARCH_SETTINGS.trusted_interval_fraction * self.size[:, 1:]
         threshold = np.where(is_wide, (1 - SEARCH_SETTINGS.crest_fraction) ** 2, 1.0)
         departs = np.abs(rise - expected_rise) > SEARCH_SETTINGS.departure_fraction
@@ -255,14 +259,14 @@ class _SearchState:
             position = np.where((position >= 0) & (position <= 1), position, chord)
         size = self.high - (1 - position) * width
         is_narrow = width <= LIMIT_FRACTION * self.high
-        rise = np.sqrt(stop) - np.sqrt(start)  # of the value itself, whose slope a straight line keeps
+        rise = np.sqrt(stop) - np.sqrt(start)  # of the value: its slope is constant for a linear effect
         value_slope_low = np.where(start > 0, slope_low / (2 * np.sqrt(start)), rise)
         bend = np.abs(value_slope_low - slope_high / (2 * np.sqrt(stop)))
         is_bent = bend > SEARCH_SETTINGS.bent_fraction * np.abs(rise)
         trusted = np.where(is_bent, SEARCH_SETTINGS.trusted_bent_fraction, SEARCH_SETTINGS.trusted_fraction)
         is_close = (stop - 1 < 2 * trusted) & (self.high - size < 2 * trusted * self.high)
         is_close |= (1 - start < 2 * trusted) & (size - (self.high - width) < 2 * trusted * self.high)
-        # Every fourth try halves the interval, so that no search is slow.
+        # Every fourth try halves the interval, which bounds the number of steps.
         position = np.where(self.tries % 4 == 3, 0.5, np.minimum(np.maximum(position, 0.01), 0.99))
         self.inside = self.high - (1 - position) * width
         by_power = self._by_power(every, low, high)
@@ -301,7 +305,10 @@ class _SearchState:
         return ahead, is_close
 
     def next_sizes(self, going: Indices, *, is_several: bool) -> tuple[Indices, Floats]:
-        """Indices of the searches that try a size next, and the sizes: one per lane, or several if `is_several`."""
+        """Indices of searches and the error sizes that they try next, (tries,) each.
+
+        Each lane tries one size, or several if `is_several`.
+        """
         growth = SEARCH_SETTINGS.growth_factor
         low, bound, is_between = self.low[going], self.bound[going], self.is_between[going]
         grown = np.minimum(np.maximum(self.ahead[going], 1.01 * low), growth * low)

@@ -7,9 +7,9 @@ Near a fold the gradients of range and Doppler are almost parallel, and the dete
 phase does not exceed π at a fold, the path continues. If the peak on the path fades into a wider peak there, the path
 continues from the wider peak.
 
-A lane is one error of one case. All lanes take each step together. If there are only a few lanes, each tries several
-sizes in one step, because arrays of a few lanes cost little. `ranges.limit_search` finds the first size at which a
-path reaches a limit.
+A lane is one error of one case. All lanes take their steps at the same time. If there are only a few lanes, each
+tries several sizes in one step, because this adds little computing time. `ranges.limit_search` finds the first size
+at which a path reaches a limit.
 """
 
 import math
@@ -25,7 +25,7 @@ from bisar_budget.ranges.exact_ranges import POINT_SETTINGS, ExactRanges, Lanes
 SIZE, EAST, NORTH, QUADRATIC, CUBIC, HIDDEN, REST, AREA = ROWS = range(8)
 _NO_ERROR = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
 
-# Fractions of a step that a few lanes try in addition to the step itself.
+# Fractions of a step that are tried in addition to the step itself if there are only a few lanes.
 STEP_FRACTIONS = np.array((0.25, 0.5, 1.2, 2.0, 4.0))
 
 
@@ -39,7 +39,7 @@ class PathSettings:
         Largest distance of a point from its prediction, as a fraction of the step. A point farther away belongs to
         another path.
     stray_m : float
-        Distance that is allowed in addition, for steps of almost no length. [m]
+        Distance that is allowed in addition, because steps may have almost no length. [m]
     fade_fraction : float
         Largest distance between a peak that is lost at a fold and the peak into which it fades, as a fraction of the
         displacement.
@@ -79,12 +79,12 @@ PATH_SETTINGS = PathSettings()
 
 
 def tries_several_sizes(lane_count: int, is_alike: bool) -> bool:
-    """Whether a step tries several sizes per lane: if there are few lanes, or if `is_alike`."""
+    """Whether a step tries several sizes per lane: True if `is_alike` or if there are only a few lanes."""
     return is_alike or lane_count < PATH_SETTINGS.few_lanes_count
 
 
 def up_to(sizes: Floats, largest: Floats) -> Floats:
-    """Limit sizes to the size `largest`, and round sizes just below it up to it."""
+    """Replace sizes that exceed `largest`, or are equal to it except for rounding, by `largest`."""
     return np.where(sizes > (1 - PATH_SETTINGS.same_size_fraction) * largest, largest, sizes)
 
 
@@ -114,21 +114,24 @@ class PointPaths:
         lane_count = lanes.case.size
         self.end = np.full(lane_count, math.inf)
         self._slope_at_start = per_unit
-        self.known_points = np.full((len(ROWS), lane_count, 2), math.inf)  # by size; infinite where empty
+        self.known_points = np.full((len(ROWS), lane_count, 2), math.inf)  # sorted by size; unused: infinite
         self.known_points[:, :, 0] = _NO_ERROR[:, None]
         self._longest_step = np.full(lane_count, math.inf)
-        self._limited_from = np.zeros(lane_count)  # size from which `_longest_step` holds
-        self._missed_last = np.zeros(lane_count, dtype=bool)  # whether the last step of the lane led nowhere
-        self._missed_ever = np.zeros(lane_count, dtype=bool)  # after a miss the start of the path predicts no point
+        self._limited_from = np.zeros(lane_count)  # `_longest_step` applies from this size on
+        self._missed_last = np.zeros(lane_count, dtype=bool)  # whether the last step of the lane missed
+        self._missed_ever = np.zeros(lane_count, dtype=bool)  # if so, the path's start predicts no point
 
     def known(self, lane: Indices, size: Floats) -> Floats:
-        """Known points of paths at sizes to which `follow_to` went, (rows, lanes); NaN beyond the end of a path."""
+        """Known points of paths at given sizes, (rows, lanes). `follow_to` must have reached these sizes before.
+
+        NaN beyond the end of a path.
+        """
         points = self._point(lane, (self.known_points[SIZE, lane] <= size[:, None]).sum(axis=1) - 1)
         points[:, (points[SIZE] != size) | (size >= self.end[lane])] = math.nan
         return points
 
     def _point(self, lane: Indices, index: Indices) -> Floats:
-        """Known points of lanes by their index, (rows, lanes)."""
+        """Known points of lanes at given positions in their lists, (rows, lanes)."""
         return np.asarray(self.known_points[:, lane, index])
 
     # ---------------------------------------------------------------- steps
@@ -156,7 +159,7 @@ class PointPaths:
         begins = np.ones(lane.size, dtype=bool)
         begins[1:] = (lane[1:] != lane[:-1]) | (index[1:] != index[:-1])
 
-        # The steps before may predict a later point better than the last known point does.
+        # If a lane tries several sizes, its smaller ones may predict a point better than its last known point does.
         later = np.flatnonzero(~begins & ~is_on_path & found.is_settled)
         if later.size:
             is_second = begins[later - 1]
@@ -181,7 +184,7 @@ class PointPaths:
             & (np.abs(point[AREA]) < POINT_SETTINGS.folded_fraction)
             & (point[HIDDEN] > POINT_SETTINGS.end_rad)
         )
-        # Several steps may start from one known point. The steps before the first miss count.
+        # Several steps may start from one known point. Only those before the first miss are kept.
         is_miss = ~is_on_path | is_end
         misses = np.cumsum(is_miss)
         misses = misses - (misses - is_miss)[np.maximum.accumulate(np.where(begins, np.arange(lane.size), 0))]
@@ -199,8 +202,8 @@ class PointPaths:
     def _sizes_of_step(self, lane: Indices, size: Floats) -> tuple[Indices, Indices, Floats, Floats]:
         """Choose the error sizes that the next step of each lane tries.
 
-        Returns, for each size to try, the lane, the index of the last known point at a smaller size, the size, and
-        the increase in size from that point to a fold, (tries,) each, in the order of lanes and sizes.
+        Returns four arrays (tries,), sorted by lane and size: the lane, the index of its last known point at a
+        smaller size, the size to try, and the increase in size from that point to a fold.
         """
         index = (self.known_points[SIZE, lane] < size[:, None]).sum(axis=1) - 1
         last = self._point(lane, index)
@@ -208,7 +211,7 @@ class PointPaths:
         longest = np.where(last[SIZE] >= self._limited_from[lane], self._longest_step[lane], math.inf)
         is_far_fold = to_fold > PATH_SETTINGS.finest_step_fraction * last[SIZE]
         step = np.minimum(longest, np.where(is_far_fold, PATH_SETTINGS.fold_fraction * to_fold, math.inf))
-        # A size a little beyond the step is reached in one step too, except after a miss: it would miss again.
+        # A size slightly beyond the step is also reached in one step, but not after a miss: it would miss again.
         is_after_miss = self._missed_last[lane] & np.isfinite(longest)
         is_beyond = size - last[SIZE] >= np.where(is_after_miss, 1.0, 1.2) * step
         asked, size = size, np.where(is_beyond, last[SIZE] + step, size)
@@ -236,7 +239,7 @@ class PointPaths:
         end = _end_between(before, point)
         halved = np.maximum((point[SIZE] - before[SIZE]) / 2, reached)
         step = np.where(is_end, 0.9 * (end - before[SIZE]), halved)
-        curvature = (end - before[SIZE]) * (point[SIZE] - end)  # the error of a straight line grows with it
+        curvature = (end - before[SIZE]) * (point[SIZE] - end)  # bounds the error of the linear interpolation
         is_narrow = is_end & (curvature < (PATH_SETTINGS.end_fraction * point[SIZE]) ** 2)
         is_stuck = ~is_end & (step < PATH_SETTINGS.finest_step_fraction * point[SIZE])
         self.end[lane[is_narrow]] = end[is_narrow]
@@ -252,7 +255,7 @@ class PointPaths:
         changed, count = lane[first], np.diff(first, append=lane.size)
         filled = np.isfinite(self.known_points[SIZE, changed]).sum(axis=1)
         width, needed = self.known_points.shape[2], int((filled + count).max())
-        if needed > width:  # the first step adds few points, most other steps one
+        if needed > width:  # doubled at least, because most steps add only one point
             more = np.full((len(ROWS), self.end.size, max(width, needed - width)), math.inf)
             self.known_points = np.concatenate((self.known_points, more), axis=2)
         self.known_points[:, lane, np.repeat(filled - first, count) + np.arange(lane.size)] = point
@@ -265,8 +268,8 @@ class PointPaths:
     def _distance_to_fold(self, index: Indices, lane: Indices, last: Floats) -> Floats:
         """Increase in size up to the next fold, where gradients are parallel; infinite if no fold is ahead. [unit]
 
-        It is extrapolated by the parabola through the squares of the last three areas (roots of the determinant of
-        H).
+        The area is the root of the determinant of H. A parabola through the squares of the last three areas is
+        extrapolated to zero.
         """
         before, earlier = (self._point(lane, np.maximum(index - back, 0)) for back in (1, 2))
         step, step_before = last[SIZE] - before[SIZE], before[SIZE] - earlier[SIZE]
@@ -290,7 +293,7 @@ class PointPaths:
         is_straight = np.hypot(*bend) <= PATH_SETTINGS.straight_fraction * np.hypot(last[EAST], last[NORTH])
         east, north = u * size + bend[0] * growth, v * size + bend[1] * growth
         fresh = np.flatnonzero(index == 0)
-        if fresh.size:  # the slope at an early size tells how the path bends at its start
+        if fresh.size:  # the slope at a small size shows the curvature of the path at its start
             early = PATH_SETTINGS.early_fraction * size[fresh]
             slope = self._slopes_at(lane[fresh], np.array((early, u[fresh] * early, v[fresh] * early)))
             half = size[fresh] / (2 * PATH_SETTINGS.early_fraction)
@@ -330,7 +333,7 @@ class PointPaths:
 
 
 def _is_near(last: Floats, point: Floats, expected: tuple[Floats, Floats]) -> Booleans:
-    """Whether points are near enough to their prediction to be on the path."""
+    """Whether points are close enough to their predicted positions to belong to the path, (lanes,)."""
     stray = np.hypot(point[EAST] - expected[0], point[NORTH] - expected[1])
     predicted_step = np.hypot(expected[0] - last[EAST], expected[1] - last[NORTH])
     step = np.maximum(np.hypot(point[EAST] - last[EAST], point[NORTH] - last[NORTH]), predicted_step)
@@ -350,10 +353,11 @@ def _extrapolated(far: Floats, middle: Floats, near: Floats, size: Floats) -> tu
 
 
 def _end_between(before: Floats, beyond: Floats) -> Floats:
-    """Size between two points at which the path ends: the path is folded, and the hidden phase exceeds π.
+    """Size at which the path ends, between a point before and a point beyond the end. [unit]
 
-    The area is the root of the determinant of H. Near a fold its square is linear in the size; beyond a fold the
-    hidden phase is.
+    The path ends where two conditions are met: it is folded, and the hidden phase exceeds π. Both are found by linear
+    interpolation in the size: the first from the square of the area (the determinant of H), the second from the
+    hidden phase.
     """
     low, high, square, square_beyond = before[HIDDEN], beyond[HIDDEN], before[AREA] ** 2, beyond[AREA] ** 2
     to_hidden = np.where(low < POINT_SETTINGS.end_rad, (POINT_SETTINGS.end_rad - low) / (high - low), 0.0)

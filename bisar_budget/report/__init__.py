@@ -82,7 +82,7 @@ class Style(NamedTuple):
     table_width: int = 80  # columns of a table for a terminal, which has a row on one line if it fits
 
     def coloured(self, text: str, sgr: str) -> str:
-        """Text for a terminal, with the SGR escape sequence (ECMA-48) `sgr` if the style has colour."""
+        """Put text between the SGR escape sequence `sgr` (ECMA-48) and a reset, if the style has colour."""
         return f"\x1b[{sgr}m{text}\x1b[0m" if self.color else text
 
 
@@ -128,7 +128,7 @@ def joined(format_name: str, pieces: Sequence[Piece], version: str, style: Style
 
 
 def pictures(format_name: str, report: "Report", style: Style) -> Mapping[str, bytes]:
-    """Contents of the picture files of a report, by their names within `style.assets`; empty without pictures."""
+    """Contents of the picture files of a report, by their names within `style.assets`; empty if it has none."""
     if not FORMATS[format_name].has_pictures or not style.assets:
         return {}
     files: Mapping[str, bytes] = _module(format_name).pictures(report, style)

@@ -1,4 +1,4 @@
 """Derivation of the limits from the geometry, with SymPy. No other package imports SymPy."""
 
-# What other rooms may use.
+# Modules that other packages may import.
 __all__ = ["emit", "render"]

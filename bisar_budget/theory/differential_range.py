@@ -35,7 +35,7 @@ from bisar_budget.theory.symbols import (
     tau,
 )
 
-# Size of all errors together, for the expansion to first order.
+# Common factor of all errors, for the expansion to first order.
 _EPSILON = Symbol("epsilon", real=True)
 
 
@@ -158,7 +158,7 @@ def _first_order(platform: PlatformSymbols) -> Expr:
 
 
 def _grown(expression: Expr) -> Expr:
-    """First-order part of an expression in the position errors of both platforms, as functions of slow time."""
+    """First-order part of an expression in the position errors of both platforms, functions of slow time."""
     for platform in PLATFORM_SYMBOLS:
         grown = zip(measured_error(platform), _EPSILON * error_track(platform), strict=True)
         expression = expression.subs(dict(grown))

@@ -37,7 +37,7 @@ from bisar_budget.theory.symbols import (
 )
 
 SYMPY_VERSION: str = sympy.__version__
-TIMES = r" \, "  # between factors of LaTeX, so that numbers can replace the factors
+TIMES = r" \, "  # separator of factors in LaTeX, so that numbers can be inserted for the factors
 
 _EVALUATORS = '''\
 """Numeric evaluators of the derived formulas.
@@ -67,10 +67,10 @@ MathML the invisible times, so that numbers can be put in.
 
 @dataclass(frozen=True)
 class Evaluator:
-    """One function to emit: its arguments in order, and its rows of results, with names if there are several rows.
+    """One function to write to the generated module: its arguments in order, and its rows of results.
 
-    `quotients` names negated quotients -numerator/denominator that the rows contain. If a quotient is itself a
-    result, arrays are then divided only once and no intermediate array is kept.
+    The rows have names if there are several. `quotients` names quotients -numerator/denominator that occur in the
+    rows. If such a quotient is itself a result, arrays are divided only once and no intermediate array is kept.
     """
 
     name: str
@@ -87,7 +87,7 @@ class _Printer(PythonCodePrinter):  # type: ignore[misc]
         return str(pi.evalf(17))
 
     def _print_Pow(self, expr: Expr, rational: bool = False, sqrt: str = "") -> str:
-        if expr.exp == Rational(1, 2):  # no import for a root
+        if expr.exp == Rational(1, 2):  # a power needs no import, unlike a root
             return f"{self.parenthesize(expr.base, precedence(expr))}**0.5"
         return str(super()._print_Pow(expr, rational=rational))
 
@@ -222,7 +222,10 @@ def evaluators() -> tuple[Evaluator, ...]:
 
 
 def _of_random_errors() -> tuple[Evaluator, ...]:
-    """Evaluators of the effects of noise over an aperture; those of random processes give mean squares."""
+    """Evaluators of the effects of random errors over an aperture.
+
+    Evaluators for random processes give mean squares.
+    """
     figures = random_errors.inertial()
     columns = "Columns: quadratic and cubic phase at the aperture edge, what is left after the cubic. "
     parts = "Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic, "
@@ -351,12 +354,15 @@ def evaluators_module() -> str:
 
 
 # ---------------------------------------------------------------------- formulas for a reader
-# Of the paper: what a report says of the image plane. The full model is in all of its own.
+# Equations of the paper that a report shows, on the image plane. All equations of the full model are shown.
 _SHOWN = ("(11)", "(19)", "(22)", "(25)", "(30)", "(31)")
 
 
 def equations() -> tuple[Equation, ...]:
-    """Return the equations for a report, those of the paper first. (30) is for mid-aperture."""
+    """Return the equations for a report: first those of the paper, then those of the full model.
+
+    Equation (30) is given for mid-aperture.
+    """
     shown = (one for one in published.equations() if one.number in _SHOWN and not one.right.has(published.tau_i))
     return (*shown, *full.equations())
 
@@ -417,5 +423,5 @@ def _both(formula: Expr) -> tuple[str, str]:
 
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-# Files, and what gives the text of each.
+# Generated files, and the functions that return their text.
 GENERATED = {_PACKAGE / "evaluators.py": evaluators_module, _PACKAGE / "catalogue.py": catalogue_module}

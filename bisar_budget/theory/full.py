@@ -51,7 +51,7 @@ from bisar_budget.theory.symbols import (
     tau,
 )
 
-SLOW_TIME_ORDER = 4  # of slow time: the quartic term of a long aperture is partly a quadratic phase
+SLOW_TIME_ORDER = 4  # highest power of slow time; the quartic term of a long aperture is partly a quadratic phase
 
 DIRECT_PATH = ImmutableMatrix([real(f"b_{axis}") for axis in AXES])  # unit vector from receiver to transmitter
 DISPLACEMENT = ImmutableMatrix([real("xhat"), real("yhat")])
@@ -132,9 +132,9 @@ def ground_history() -> tuple[Matrix, ...]:
 
 
 def gradient_inverse() -> tuple[tuple[Symbol, ...], Matrix, Expr]:
-    """Symbols s_x, s_y, ṡ_x, ṡ_y of the gradients on the ground, and adjugate (2, 2) and determinant of Q = −[s; ṡ].
+    """Symbols of the ground gradients, and adjugate (2, 2) and determinant of Q = −[s; ṡ]. [-], [1/s]
 
-    Q maps a ground point to the constant and the linear term of its range. [-], [1/s]
+    The symbols are s_x, s_y, ṡ_x, ṡ_y. Q maps a ground point to the constant and the linear term of its range.
     """
     s, rate = Matrix([real("s_x"), real("s_y")]), Matrix([real("sdot_x"), real("sdot_y")])
     Q = -Matrix([list(s), list(rate)])
@@ -152,7 +152,7 @@ def amplitude_share(own: Expr, other: Expr) -> Expr:
 
 
 def motion_of_phase(phase: Expr) -> Expr:
-    """Motion of one platform along its line of sight that causes a given phase, by its one-way path. [m]"""
+    """Motion of one platform along its line of sight that causes a given phase by its one-way path change. [m]"""
     motion = positive("A")
     (solution,) = solve(Eq(published.one_way_phase(motion), phase), motion)
     return solution
@@ -194,7 +194,7 @@ def effective_coefficients() -> tuple[Expr, Expr, Expr]:
 
 @cache
 def table() -> FormulaTable:
-    """Table of the coefficients of the range error with all first-order terms, without those of the displacement."""
+    """Table of all first-order coefficients of the range error, without the effect of the displacement."""
     return FormulaTable(
         number="Full model",
         title="Differential range errors with the line of sight turning as it does",

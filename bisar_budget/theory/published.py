@@ -62,7 +62,7 @@ from bisar_budget.theory.symbols import (
 )
 
 ERROR_KINDS = ("position", "velocity", "acceleration")
-EQUAL_SHARE_QPE_RAD = pi / 8  # per platform, half of the monostatic custom, Section V
+EQUAL_SHARE_QPE_RAD = pi / 8  # for each platform: half of the usual monostatic limit, Section V
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ def table_2() -> FormulaTable:
 
 
 def one_way_phase(motion: Expr) -> Expr:
-    """Phase that a motion of one platform along its line of sight causes, 2πA/λ. [rad]"""
+    """Phase that a motion A of one platform along its line of sight causes by its one-way path, 2πA/λ. [rad]"""
     return 2 * pi * motion / wavelength
 
 
@@ -228,9 +228,9 @@ def vibration() -> FormulaTable:
 
 
 def pull_in_factor() -> Expr:
-    """Factor by which autofocus that corrects π·N_pull radians raises a limit: π·N_pull / total QPE.
+    """Factor by which autofocus raises a limit, if it corrects up to π·N_pull radians: π·N_pull / total QPE.
 
-    For the total of π/4 it is 4·N_pull, Section VI.
+    Section VI defines N_pull. For a total quadratic phase error (QPE) of π/4 the factor is 4·N_pull.
     """
     return pi * n_pull / total_qpe
 
@@ -256,7 +256,7 @@ k_x, k_y = (Symbol(f"k_{axis}", integer=True) for axis in "xy")
 N_x, N_y = (Symbol(f"N_{axis}", integer=True, positive=True) for axis in "xy")
 B_x, B_y, f_0 = positive("B_x"), positive("B_y"), positive("f_0")
 x_turned, y_turned = real("xprime"), real("yprime")
-x_of, y_of = IndexedBase("xprime"), IndexedBase("yprime")  # of the scatterers
+x_of, y_of = IndexedBase("xprime"), IndexedBase("yprime")  # positions of the scatterers
 
 phi_b = real("phi_b")
 beta = tuple(real(f"beta_{n}") for n in range(2))
@@ -342,7 +342,7 @@ def geometric_sum(step: Expr, count: Expr) -> tuple[Expr, Expr]:
 
 def response() -> Expr:
     """Return (16): the filter (14) applied to the samples (15), with two Dirichlet kernels for each scatterer."""
-    # The sums of one scatterer separate: exp(−j(4π/c)(x′ − x′_m)(f₀ + B_x k_x/N_x)), and the same in y′.
+    # The sums for one scatterer are separable: exp(−j(4π/c)(x′ − x′_m)(f₀ + B_x k_x/N_x)) times the same in y′.
     whole, kernels = [], []
     for offset, start, band, count in (
         (x_turned - x_of[m], f_0, B_x, N_x),
@@ -350,7 +350,7 @@ def response() -> Expr:
     ):
         turn, kernel = geometric_sum(4 * pi / c * offset * band / count, count)
         phase_of_it = -4 * I * pi / c * offset * start + turn
-        # Factor of the offset: 2f₀ + B_x − B_x/N_x, and B_y/N_y, which is left of −B_y + B_y.
+        # Factor of the offset: 2f₀ + B_x − B_x/N_x in x′. In y′, −B_y and B_y cancel and −B_y/N_y remains.
         whole.append(offset * expand(simplify(phase_of_it / offset / (-2 * I * pi / c))))
         kernels.append(kernel)
     turned = exp(-2 * I * pi / c * (whole[0] + whole[1]))

@@ -37,18 +37,18 @@ from sympy import (
 from bisar_budget.theory.published import Equation, FormulaTable, TableRow, one_way_phase
 from bisar_budget.theory.symbols import T, center_frequency, positive, real
 
-ORDER_COUNT = 4  # 0 to 3; the rest of a history spreads
+ORDER_COUNT = 4  # Legendre orders 0 to 3; higher orders spread energy over the image
 LEADING_RATIONALS = (
     1,
     1,
     Rational(3, 2),
     Rational(5, 2),
 )  # coefficient of xⁿ in Pₙ: the order's value at the aperture edge
-SERIES_TERMS = 9  # powers of a series about zero; the truncation is less than 1e-8 of it for arguments below 0.5
+SERIES_TERMS = 9  # terms of a series about zero; the relative error is below 1e-8 for arguments below 0.5
 
 along = positive("u")  # length of the line of sight; with a size for each axis, the root of Σ(u·σ)²
-# Along the line of sight, per unit: the specific force f that a tilt turns into it, |u × f|, and the excess of f by
-# each axis of a unit scale factor.
+# Specific force f that acts along the line of sight u: for a unit tilt |u × f|, and for a unit scale factor of each
+# axis its excess.
 turned, scaled = positive("f_u"), positive("f_s")
 ratio = positive("a")  # T/(2τ_c): half the aperture over the correlation time
 decay = positive("d")  # exp(−2a)
@@ -101,10 +101,11 @@ def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
 
 # ---------------------------------------------------------------------- inertial sensors
 def _from_middle(response: Callable[[Expr], Expr]) -> Callable[[Expr, Expr], Expr]:
-    """Return the covariance, at times m ≤ M after mid-aperture, of an error that white noise drives from there.
+    """Return the covariance function of an error that white noise drives from mid-aperture on.
 
-    `response` is the error at a time after a unit impulse of the noise. Both sides of mid-aperture are independent:
-    an error that is zero at mid-aperture grows by different noise before and after.
+    Its arguments are two times m ≤ M after mid-aperture. `response` is the error at a time after a unit impulse of
+    the noise. Both sides of mid-aperture are independent: an error that is zero at mid-aperture results from
+    different noise before and after.
     """
 
     def covariance(m: Expr, M: Expr) -> Expr:
@@ -115,7 +116,7 @@ def _from_middle(response: Callable[[Expr], Expr]) -> Callable[[Expr, Expr], Exp
 
 @cache
 def walk(order: int) -> Moments:
-    """Moments of white noise integrated `order` times from mid-aperture, for a unit density and T = 1."""
+    """Moments of white noise of unit density, integrated `order` times from mid-aperture, for T = 1."""
     covariance = _from_middle(lambda t: t ** (order - 1) / factorial(order - 1))
     squares = []
     for n in range(ORDER_COUNT):
@@ -123,11 +124,14 @@ def walk(order: int) -> Moments:
         one_side = 2 * integrate(expand(legendre(n, _M) * earlier), (_M, 0, 1))
         squares.append(Rational(2 * n + 1, 2) ** 2 * 2 * one_side)
     mean_square = integrate(covariance(_M, _M), (_M, 0, 1))
-    return moments(tuple(squares), mean_square).times(Rational(1, 2) ** (2 * order - 1))  # from half an aperture to T
+    return moments(tuple(squares), mean_square).times(Rational(1, 2) ** (2 * order - 1))  # scaled from T/2 to T
 
 
 def constant(order: int) -> Moments:
-    """Moments of τⁿ/n! for T = 1, with n = `order`: 2 for a constant acceleration, 3 for a constant rate of it."""
+    """Moments of τⁿ/n! for T = 1, with n = `order`.
+
+    This is the position error of a constant acceleration (n = 2) or of a constant rate of acceleration (n = 3).
+    """
     history = (_x / 2) ** order / factorial(order)
     squares = tuple(
         (Rational(2 * n + 1, 2) * integrate(expand(history * legendre(n, _x)), (_x, -1, 1))) ** 2
@@ -137,7 +141,10 @@ def constant(order: int) -> Moments:
 
 
 class SensorFigure(NamedTuple):
-    """Figure of merit of an inertial sensor: symbol, name, explanation, and mean squares of the phase of one unit."""
+    """Figure of merit of an inertial sensor: symbol, name, explanation, and moments of its phase.
+
+    The moments are the mean squares of the phase for one unit of the figure.
+    """
 
     symbol: Symbol
     name: str
@@ -191,7 +198,10 @@ def _gauss_markov_coefficients(m: int, n: int) -> Expr:
 
 @cache
 def gauss_markov() -> Moments:
-    """Moments of a stationary process of variance 1 and correlation exp(−|t|/τ_c), in `ratio` and `decay`."""
+    """Moments of a stationary process of variance 1 and correlation exp(−|t|/τ_c).
+
+    They are expressed by the symbols `ratio` and `decay`.
+    """
     return moments(tuple(_gauss_markov_coefficients(n, n) for n in range(ORDER_COUNT)), Integer(1))
 
 
@@ -209,10 +219,10 @@ def gauss_markov_slow() -> tuple[Expr, ...]:
 
 
 def _series(expression: Expr, variable: Symbol) -> Expr:
-    """Series about zero of a sum of powers of a variable times exponentials, sines and cosines.
+    """Series about zero of a sum of terms, each a power of a variable times exponentials, sines or cosines.
 
-    The terms of the sum cancel at zero. Taylor polynomials replace the functions: they are exact up to their order,
-    and SymPy is fast at sums of powers.
+    The terms of the sum cancel at zero. The functions are replaced by their Taylor polynomials, which are exact up to
+    their order. SymPy is fast at the sums of powers that result.
     """
     powers = range(4 * ORDER_COUNT + 2 * SERIES_TERMS)
     taylor = {
@@ -342,13 +352,16 @@ def vibrating_oscillator() -> Expr:
 
 
 def vibrating_path() -> Expr:
-    """Amplitude of the displacement by an acceleration a·cos(2πft), without the uniform motion. [m]"""
+    """Amplitude of the displacement that an acceleration a·cos(2πft) causes, apart from uniform motion. [m]"""
     wave = cos(2 * pi * _frequency * _time)
     return simplify(-integrate(integrate(_acceleration * wave, _time), _time) / wave)
 
 
 def of_spectrum(amplitude: Expr) -> Expr:
-    """Spectrum that results from accelerations of spectrum S_a, from the amplitude for a tone of acceleration."""
+    """Power spectrum of an effect of accelerations with the spectrum S_a.
+
+    `amplitude` is the amplitude of the effect for a tone of acceleration, to which it is proportional.
+    """
     return amplitude.subs(_acceleration, 1) ** 2 * positive("S_a")
 
 
@@ -382,7 +395,7 @@ def table() -> FormulaTable:
 
 
 def equations() -> tuple[Equation, ...]:
-    """Equations for the parts of a tone, integrals of power laws, rests after synchronisation, and vibration."""
+    """Equations for the parts of a tone, integrals of power laws, remainders after synchronisation, and vibration."""
     quadratic, cubic, left = tone()
     names = (("quadratic", "phi_2", quadratic), ("cubic", "phi_3", cubic))
     laws = (

@@ -93,7 +93,7 @@ class _Name:
         if self.accent == "prime":
             head += "'"
         elif self.accent:
-            # Only the last letter carries the accent: Δ R̃.
+            # The accent is only on the last letter: Δ R̃.
             start, _, last = head.rpartition(" ")
             head = f"{start} \\{self.accent}{{{last}}}".strip()
         subscript = _COMMANDS.get(self.subscript, self.subscript)
@@ -101,7 +101,7 @@ class _Name:
 
 
 class _Text(StrPrinter):  # type: ignore[misc]
-    printmethod = "_as_text"  # SymPy's own leads past _print_Indexed
+    printmethod = "_as_text"  # with SymPy's own name, _print_Indexed would not be called
 
     def _print_Symbol(self, expr: Symbol) -> str:
         return _Name.of(expr.name).text()
@@ -141,7 +141,7 @@ class _Latex(LatexPrinter):  # type: ignore[misc]
         return _Name.of(expr.name).latex()
 
     def _print_Function(self, expr: Basic, exp: str | None = None) -> str:
-        if expr.func.__module__ is not None:  # sin, cos: SymPy's own
+        if expr.func.__module__ is not None:  # functions of SymPy, such as sin and cos
             return str(super()._print_Function(expr, exp))
         arguments = ", ".join(self._print(argument) for argument in expr.args)
         return rf"{_Name.of(expr.func.__name__).latex()}\left({arguments}\right)"
@@ -171,7 +171,7 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
 
     def _print_Sum(self, expr: Basic) -> object:
         row = self.dom.createElement("mrow")
-        for n, first, last in expr.limits:  # SymPy's own draws the first alone
+        for n, first, last in expr.limits:  # SymPy's own method writes only the first limit
             sign, under = self.dom.createElement("munderover"), self.dom.createElement("mrow")
             for part in (self._print(n), self._leaf("mo", "="), self._print(first)):
                 under.appendChild(part)
@@ -259,7 +259,7 @@ def as_mathml_content(expression: Basic) -> str:
         ("ExponentialE", "e"),
     ):
         xml = xml.replace(f"&{name};", character)  # XML knows no HTML entities
-    return xml.replace("<mo>-</mo>", "<mo>−</mo>")  # a hyphen is no minus
+    return xml.replace("<mo>-</mo>", "<mo>−</mo>")  # SymPy writes a hyphen instead of a minus
 
 
 def derivation(selection: str, format_name: str) -> str:
@@ -301,7 +301,10 @@ _TITLE = "Equations of Rigling & Moses"
 
 
 def _heading(equation: Equation) -> str:
-    """Number and title of an equation; for the paper's own, also whether it is a definition or derived by SymPy."""
+    """Number and title of an equation.
+
+    For an equation of the paper, it also states whether the equation is a definition or derived by SymPy.
+    """
     return f"{equation.number} {equation.title} [{equation.origin}]" if equation.number else equation.title
 
 

@@ -27,22 +27,22 @@ c = positive("c")  # speed of light [m/s]
 wavelength = positive("lambda")  # at the centre frequency [m]
 center_frequency = positive("f_0")  # [Hz]; the paper's f₀ is the band's lower edge
 point = Matrix([real(axis) for axis in AXES])  # a point of the scene [m]
-scatterer = Matrix([real(f"{axis}_m") for axis in AXES])  # the m-th of the scene [m]
+scatterer = Matrix([real(f"{axis}_m") for axis in AXES])  # position of the m-th scatterer [m]
 clock_coefficients = tuple(real(f"ttilde_{n}") for n in range(4))  # t̃ₙ [s, 1, 1/s, 1/s²]
 total_qpe = positive("q")  # total budget for the quadratic phase error [rad]
 share = positive("s")  # share of one platform in a budget [-]
 pslr = positive("PSLR")  # power ratio [-]
 islr = positive("ISLR")  # power ratio [-]
-baseline = positive("D")  # distance of both platforms [m]
-n_pull = positive("N_pull")  # autofocus corrects π·N_pull radians
+baseline = positive("D")  # distance between the platforms [m]
+n_pull = positive("N_pull")  # autofocus corrects up to π·N_pull radians
 
 
 @dataclass(frozen=True)
 class PlatformSymbols:
     """Symbols of one platform at the aperture midpoint, and of the error of its measured motion.
 
-    Vectors are (3,), east-north-up. [m], [m/s], [m/s²] `look` are the unit vector to the platform and its first four
-    derivatives. [1/sⁿ] The model of the paper uses neither these nor the acceleration.
+    Vectors are (3,), east-north-up. [m], [m/s], [m/s²] `look` are the unit vector from the scene centre to the
+    platform and its first four derivatives. [1/sⁿ] The model of the paper uses neither `look` nor the acceleration.
     """
 
     name: str
@@ -60,7 +60,7 @@ class PlatformSymbols:
 
     def exact_slant_range(self) -> Expr:
         """Return |r| in terms of the components of the position. [m]"""
-        # Matrix.norm() wraps real components in Abs, which only hides the square.
+        # Matrix.norm() puts real components into Abs, which prevents simplification of their squares.
         return sqrt(sum(component**2 for component in self.position))
 
 

@@ -1,4 +1,4 @@
-"""Forms images with errors exactly at their limits, and gives verdicts on the limits. Needs NumPy."""
+"""Verifies limits with simulated images that contain errors exactly at their limits. Needs NumPy."""
 
 # What other rooms may use.
 __all__ = [

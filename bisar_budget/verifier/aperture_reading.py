@@ -1,12 +1,12 @@
-"""Phase of an error over the aperture, measured from a small image of a point (a chip).
+"""Phase of an error over the aperture, measured in a small image of a point target (a chip).
 
 The contribution of each pulse to each pixel follows from exact ranges along the measured paths. The phase over the
-aperture is modelled as a polynomial, which is fitted to the pixels. In this way the ends of the patch, where a finite
-image cuts off sidelobes, are modelled too. The fit starts at the position of the response by exact ranges. The
-remainder of the fit shows whether the polynomial describes the image. If it does not, the image is correlated with
-the contribution of each pulse, which gives the phase of the pulse. This is the projection of the spectrum to slow
-time, including range walk and curved lines. The error-free response is formed and read with the same paths, so that
-effects common to both responses cancel.
+aperture is modelled as a polynomial, which is fitted to the pixels. In this way the model also includes the ends of
+the patch, where a finite image cuts off sidelobes. The fit starts from the effect that exact ranges predict. The
+residual of the fit shows whether the polynomial describes the image. If it does not, the image is correlated with the
+contribution of each pulse, which gives the phase of the pulse. This corresponds to a projection of the image spectrum
+to slow time, including range walk and curved lines of equal range. The error-free response is formed and measured
+with the same paths, so that effects common to both responses cancel.
 """
 
 import math
@@ -33,32 +33,33 @@ from bisar_budget.simulator.image_formation import taylor_window
 from bisar_budget.simulator.impulse_response import place_of_peak
 from bisar_budget.simulator.phase_history import Complexes, Errors, Floats, cell_centres
 
-READ_CELLS = 1  # of range that a chip needs around the middle line, in addition to the range walk
-_READ_STRIDE_LINES = 2  # from one line that is read to the next
-_INNER_FRACTION = 0.95  # of the aperture, in the correlation; its edges ring in a patch of finite extent
-# Orders of the polynomial, each with the share of the aperture that it needs. A turn of ±0.5 rad shows sixth powers.
-# High orders are worthless where they are extrapolated beyond the patch.
+READ_CELLS = 1  # range cells that a chip needs around the middle line, in addition to the range walk
+_READ_STRIDE_LINES = 2  # distance between two lines that are used
+_INNER_FRACTION = 0.95  # part of the aperture that the correlation uses; the edges ring in a finite patch
+# Smallest covered part of the aperture, and the order of the polynomial that is then fitted.
+# A large rotation (±0.5 rad) causes phases of sixth order, but high orders cannot be extrapolated beyond the patch.
 _POLYNOMIAL_ORDERS = ((0.9, 6), (0.6, 3), (-1.0, 2))
-_PRESENT_FRACTION = 0.25  # of the median strength over the aperture; weaker pulses are smeared out of the patch
-_WALK_ROUNDS = 2  # of the fit, each with the range walk of the fit before
+_PRESENT_FRACTION = 0.25  # of the median strength over the aperture; weaker pulses lie outside the patch
+_WALK_ROUNDS = 2  # rounds of the fit, each with the range walk of the previous fit
 _MAX_REFINEMENT_STEPS, _MAX_HALVING_STEPS, _REFINEMENT_TOLERANCE_RAD = 20, 6, 1e-5
-# Norm of the remainder over the norm of the image, which is the RMS of the phase. Below the first limit the
-# polynomial fits the image. Below the second it does so for certain: a quarter of the allowed error of a measured
-# phase, 0.02 rad.
+# Norm of the residual divided by the norm of the image, which is the rms of the phase. Below the first limit the
+# polynomial describes the image. Below the second limit no other fit is tried; this limit is a quarter of the
+# permitted error of a measured phase, 0.02 rad.
 _FITTED_RAD, _EXACT_RAD = 0.05, 5e-3
-_BLOCK_CONTRIBUTIONS_COUNT = 1 << 18  # formed at once
+_BLOCK_CONTRIBUTIONS_COUNT = 1 << 18  # contributions that are computed at once
 _SPECTRUM_FRACTION = 0.4  # of the largest error-free spectral magnitude; the band's edges ring in a finite image
 _BLOCK_TIMES_COUNT = 64  # slow times read from the lines' spectra at once
 _KERNEL_CELLS = np.linspace(0, 64, 4097)  # range cells of a tapered range response
 
 
 class ApertureReading(NamedTuple):
-    """Phases of a response at the edge of the aperture, with the sign of the range error. [rad]
+    """Phases of a response at the edge of the aperture [rad], with the sign of the range error.
 
-    `across_pixels` is the offset of the response from the middle along y′, which follows from the linear part of the
-    phase. `walked_pixels` is the offset of the centre of gravity along x′, which follows from the other parts of the
-    phase: at a frequency of y′, the response lies at the range error minus its slope times slow time. `coverage` is
-    the fraction of the aperture that the patch contains. It is 1 unless the smeared response leaves the patch.
+    `across_pixels` is the offset of the response along y′ from the middle of the image, which follows from the linear
+    part of the phase. `walked_pixels` is the offset of its centre of gravity along x′, which follows from the other
+    parts of the phase: at each frequency along y′, the response lies at the range error minus its slope times slow
+    time. `coverage` is the fraction of the aperture that the patch contains. It is 1 unless the smeared response
+    leaves the patch.
     """
 
     quadratic: float
@@ -77,20 +78,21 @@ def read_aperture(
     half_lines: int = 0,
     expected: ExactEffect | None = None,
 ) -> ApertureReading:
-    """Measure the quadratic and cubic phase of a response.
+    """Measure the quadratic and cubic phase of a response in its image.
 
     Parameters
     ----------
     collection, errors
         Collection and errors from which the chips were formed. The measured paths contain the errors.
     centre : (2,) float
-        Middle of the chips, which is the position of the reference. [m]
+        Middle of the chips on the ground (east, north), which is the position of the reference. [m]
     chip, reference : Chip
-        Images with and without error, on the same pixels.
+        Images with and without errors, on the same pixels.
     half_lines : int
-        Number of additional lines to read on either side of the middle.
+        Number of additional lines to use on either side of the middle line.
     expected : ExactEffect, optional
-        Start of the fit. If no polynomial near it fits the pixels, the phases of single pulses are tried too.
+        Predicted effect, from which the fit starts. If no polynomial near it fits the pixels, the phases of single
+        pulses are tried too.
 
     Raises
     ------
@@ -129,14 +131,14 @@ def read_aperture(
     radar = collection.radar
     by_range = collection.range_lines(errors).gradients(np.asarray(centre, dtype=float))[0]
     lines_per_cell = collection.range_cell / (float(np.hypot(*by_range)) * chip.spacing[0])
-    # Range walk of a wavelength of range error, in range cells: the bandwidth over the centre frequency.
+    # A range error of one wavelength is a range walk of (bandwidth / centre frequency) range cells.
     walked = mean / (2 * math.pi) * (radar.bandwidth / radar.center_frequency) * lines_per_cell
     # The image's phase is −2π/λ times the range error; P₂ = (3t² - 1)/2, P₃ = (5t³ - 3t)/2.
     return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, coverage * 1.02))
 
 
 class _Pixels:
-    """Pixels (n, 3) of an image, and the contribution of each pulse to them for a point at a given position."""
+    """Pixels (n, 3) of an image [m], and the contribution of each pulse to them for a given point target."""
 
     def __init__(self, collection: PointCollection, errors: Errors, centre: GroundVector, pixels: Floats) -> None:
         self.collection, self.errors, self.places = collection, errors.smooth(), pixels
@@ -149,13 +151,14 @@ class _Pixels:
             self.kernel = np.cos(2 * math.pi * np.outer(_KERNEL_CELLS, frequency)) @ weights / 257
 
     def contributions(self, slow_time: Floats, remaining_range: Floats | None = None) -> NDArray[np.complex64]:
-        """Contributions of pulses (m,) to pixels (n,) at baseband, (m, n).
+        """Compute the contributions of pulses (m,) to the pixels (n,) at baseband, (m, n).
 
-        `remaining_range` (m,) is a range error that moves the range responses without changing the phase. [m]
+        `slow_time` (m,) are the times of the pulses [s]. `remaining_range` (m,) is a range error that moves the range
+        responses without changing the phase [m].
         """
         collection = self.collection
         paths = collection.flight(self.errors, slow_time).paths
-        if collection.is_tapered:  # over the aperture too
+        if collection.is_tapered:  # the window also weights the pulses
             weights = taylor_window(1024)
             by_time = np.interp(slow_time, cell_centres(collection.aperture_time, weights.size), weights)[:, None]
         contribution = np.empty((slow_time.size, self.places.shape[0]), dtype=np.complex64)
@@ -167,7 +170,7 @@ class _Pixels:
                 range_difference += _distance(path.measured[block], self.places, self.squares)
                 range_difference -= _distance(path.measured[block], self.point, _squares(self.point))
             # Whole cycles are subtracted in double precision. Single precision then holds the remainder to 1e-6 rad,
-            # in a quarter of the time.
+            # and takes a quarter of the time.
             cycles = (range_difference - self.carrier) / collection.wavelength
             cycles -= np.rint(cycles)
             phase = (2 * math.pi * cycles).astype(np.float32)
@@ -191,7 +194,7 @@ def _squares(points: Floats) -> Floats:
 def _distance(positions: Floats, points: Floats, squares: Floats) -> Floats:
     """Distances (m, n) from positions (m, 3) to points (n, 3), accurate to 1e-8 m even from geostationary orbit. [m]
 
-    `squares` (n,) are the squared norms of the points.
+    `squares` (n,) are the squared norms of the points [m²].
     """
     square: Floats = positions @ (-2 * points.T)
     square += _squares(positions)[:, None]
@@ -204,12 +207,12 @@ def _fit_to_pulses(
 ) -> tuple[Floats, float]:
     """Fit a polynomial to the phases of single pulses, and measure the part of the aperture that these pulses cover.
 
-    Returns the Legendre coefficients of the polynomial over the aperture [rad] and the fraction. The fraction is 0 if
-    the pulses in the middle of the aperture are missing, or if too few pulses remain. `images` are the image with
-    errors and the error-free image, at the same pixels, in lines of `columns` pixels.
+    Returns the Legendre coefficients of the polynomial over the aperture [rad], and the covered fraction of the
+    aperture. The fraction is 0 if the pulses in the middle of the aperture are missing, or if too few pulses remain.
+    `images` are the image with errors and the error-free image, at the same pixels, in lines of `columns` pixels.
     """
     scaled_time = 2 * slow_time / pulse_pixels.collection.aperture_time
-    # A taper over the ends of a line, each half as long as a response without smear.
+    # Taper at both ends of a line; each tapered end is half as long as a response without smear.
     inside = np.minimum(np.arange(columns) + 0.5, columns - np.arange(columns) - 0.5)
     taper = np.sin(math.pi / 2 * np.clip(inside / round(CUT_CELLS * OVERSAMPLING_FACTOR / 2), 0, 1)) ** 2
     tapered = np.stack([(image * taper).reshape(-1) for image in images])
@@ -245,9 +248,9 @@ def _fit_to_pulses(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Refined:
-    """A fitted polynomial of the phase.
+    """Legendre coefficients `fit` of a phase polynomial [rad].
 
-    `misfit` is the norm of the fit's remainder divided by the norm of the image.
+    `misfit` is the norm of the fit's residual divided by the norm of the image.
     """
 
     fit: Floats
@@ -255,7 +258,7 @@ class _Refined:
 
 
 class _Fitting:
-    """Fits polynomials of the phase to the pixels of an image, in a large image to a selection of the pixels."""
+    """Fits phase polynomials to the pixels of an image. In a large image only a selection of the pixels is used."""
 
     def __init__(
         self,
@@ -275,12 +278,15 @@ class _Fitting:
         self.gain = complex(np.vdot(at_rest, clean) / np.vdot(at_rest, at_rest))
 
     def refined(self, fit: Floats) -> _Refined:
-        """Refine a polynomial in several rounds. Each round uses the range walk of the previous fit."""
+        """Refine the coefficients of a polynomial. With range walk there are several rounds.
+
+        Each round uses the range walk of the previous fit.
+        """
         collection = self.fitted_pixels.collection
         scaled_time = 2 * self.slow_time / collection.aperture_time
         solution = _Refined(np.pad(fit, (0, _POLYNOMIAL_ORDERS[0][1] + 1 - fit.size)), math.inf)
         for _ in range(self.fits):
-            # The remaining range error also moves a pulse to other range cells.
+            # The range error that remains also moves a pulse to other range cells.
             phase = np.polynomial.legendre.legval(scaled_time, [0.0, *solution.fit[1:]])
             remaining_range = -collection.wavelength / (2 * math.pi) * phase
             contribution = self.fitted_pixels.contributions(self.slow_time, remaining_range)
@@ -289,14 +295,14 @@ class _Fitting:
 
 
 def _refined(fit: Floats, scaled_time: Floats, contribution: Complexes, image: Complexes, gain: complex) -> _Refined:
-    """Fit the phase polynomial to the pixels by Gauss-Newton steps. A step that gives no improvement is shortened."""
+    """Fit the phase polynomial to the pixels by Gauss-Newton steps. A step that gives no improvement is halved."""
     legendre = np.polynomial.legendre.legvander(scaled_time, fit.size - 1)
     norm = float(np.linalg.norm(image))
 
     def remainder_of(trial: Floats) -> tuple[Complexes, float, Complexes]:
         pulses = gain * np.exp(1j * (legendre @ trial))
         model = pulses @ contribution
-        # The constant phase is free: its best value is known in closed form.
+        # The constant phase is not fitted, because its best value follows directly.
         turn = np.angle(np.vdot(model, image))
         pulses, model = pulses * np.exp(1j * turn), model * np.exp(1j * turn)
         amplitude = float(abs(np.vdot(model, image)) / np.real(np.vdot(model, model)))
@@ -325,7 +331,7 @@ def _refined(fit: Floats, scaled_time: Floats, contribution: Complexes, image: C
 # ---------------------------------------------------------------------- displacement
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """Displacement of a response on the ground (east, north) [m], and azimuth of the line of its smear, 0 to π [rad].
+    """Displacement of a response on the ground (east, north) [m], and azimuth of its smear line, 0 to π [rad].
 
     `pixels` is the displacement along x′ and y′ of the image.
     """
@@ -336,16 +342,16 @@ class Shift:
 
 
 def measured_shift(chip: Chip, reference: Chip, reading: ApertureReading | None = None) -> Shift:
-    """Measure the displacement of a response from an error-free response on the same grid, and the line of its smear.
+    """Measure the displacement of a response from an error-free response on the same grid, and its smear line.
 
-    The displacement is the position of the peak. If the response is smeared so much that it has no single peak, the
-    displacement follows from a `reading` of its aperture. Along y′ it follows from the slope of the phase. Along x′
-    it is the centre of gravity minus its offset by the other parts of the phase.
+    The displacement is the distance between the two peaks. If the response is smeared so much that it has no single
+    peak, the displacement follows from a `reading` of its aperture. Along y′ it then follows from the slope of the
+    phase. Along x′ it is the centre of gravity minus the offset that the other parts of the phase cause.
 
     Each part of the aperture displaces the point differently, as in (26) to (28) of Rigling & Moses for three parts.
     In the spectrum of the image, the displacement is the gradient of the phase relative to an error-free response,
-    and the spread of the displacements is the smear. This also measures a smear far smaller than a resolution cell,
-    which is not yet visible in the shape of the response.
+    and the spread of the displacements is the smear. This also measures a smear that is far smaller than a resolution
+    cell, which is not yet visible in the shape of the response.
 
     Raises
     ------
@@ -362,7 +368,7 @@ def measured_shift(chip: Chip, reference: Chip, reading: ApertureReading | None 
         raise ValueError("the response is not in the image")
     steps = [_step(product, axis)[inside] for axis in (0, 1)]
     weights = np.abs(product[inside])
-    # A shift by d turns the spectrum by −2π·d/extent from one frequency to the next.
+    # A shift by d pixels changes the phase of the spectrum by −2π·d/extent from one frequency to the next.
     pixels = np.stack([-step * count / (2 * math.pi) for step, count in zip(steps, product.shape, strict=True)])
     ground = _pixel_vectors(reference.grid) @ pixels
     if reading is None:
@@ -384,7 +390,7 @@ def _step(product: Complexes, axis: int) -> Floats:
 
 
 def _pixel_vectors(grid: Floats) -> Floats:
-    """Vectors of one pixel along each axis at the middle of the grid, as columns (east, north), (2, 2). [m]"""
+    """Ground vectors of one pixel along x′ and y′ at the middle of the grid, as columns (east, north), (2, 2). [m]"""
     i, j = grid.shape[0] // 2, grid.shape[1] // 2
     columns = (grid[i + 1, j] - grid[i - 1, j], grid[i, j + 1] - grid[i, j - 1])
     vectors: Floats = np.stack([column[:2] / 2 for column in columns], axis=1)
@@ -402,12 +408,12 @@ def refocused(
 ) -> Chip:
     """Estimate one phase over the aperture from the middle lines of a chip, and remove it from all lines.
 
-    Along a line of equal range, each pulse has its own frequency by the measured paths. Over a long aperture, or
-    where the range and Doppler gradients are nearly parallel, equal times take up unequal parts of the band. A
-    quadratic phase in time is then not quadratic in frequency, and an estimate loses the part of the aperture that
-    falls into a few per cent of the band. Therefore the spectra of the lines are read at equal times and focused
-    there, and the phase is transferred back to their frequencies. The estimate uses `half_lines` lines on either side
-    of the middle.
+    Along a line of equal range, each pulse has its own frequency by the measured paths. Over a long aperture, or if
+    the range and Doppler gradients are nearly parallel, equal time intervals occupy unequal parts of the band. A
+    quadratic phase in time is then not quadratic in frequency, and an estimate in frequency would lose the part of
+    the aperture that is compressed into a few per cent of the band. Therefore the spectra of the lines are sampled at
+    equal time steps, the phase is estimated there, and then transferred back to the frequencies. The estimate uses
+    `half_lines` lines on either side of the middle line.
     """
     lines, columns = chip.image.shape
     slow_time = cell_centres(collection.aperture_time, max(64, round(columns / OVERSAMPLING_FACTOR)))
@@ -423,7 +429,7 @@ def refocused(
         block = slice(start, start + _BLOCK_TIMES_COUNT)
         aperture[:, block] = lines_used @ np.exp(-2j * math.pi * np.outer(pixel, frequency[block]))
     aperture *= np.abs(step)
-    # A separate image, sampled like the chip, with the aperture in the middle of a band.
+    # An auxiliary image with the sampling of the chip, in which the aperture lies in the middle of the band.
     count = slow_time.size
     samples = math.ceil(OVERSAMPLING_FACTOR * count)
     spectrum = np.zeros((lines_used.shape[0], samples), dtype=complex)
@@ -439,7 +445,7 @@ def refocused(
 def _frequency(
     collection: PointCollection, errors: Errors, centre: GroundVector, chip: Chip, slow_time: Floats
 ) -> Floats:
-    """Frequency of each pulse at the middle of the middle line, relative to the carrier, (times,). [cycles/pixel]"""
+    """Frequency of each pulse at the centre of the middle line, relative to the carrier, (times,). [cycles/pixel]"""
     line = chip.grid[chip.grid.shape[0] // 2]
     middle = line.shape[0] // 2
     slope = np.zeros(slow_time.size)

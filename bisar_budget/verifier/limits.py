@@ -1,4 +1,4 @@
-"""Form images with each error exactly at its limit, and measure whether the limit is correct."""
+"""Verification of limits: images with errors exactly at a limit show whether the limit is correct."""
 
 import math
 import time
@@ -46,14 +46,14 @@ from bisar_budget.verifier.spread_cases import (
 from bisar_budget.verifier.study import Responses, Study
 from bisar_budget.workers import MapBlocks, Progress, in_processes, unseen
 
-_CUT_UPSAMPLING_FACTOR = 4  # of a cut, so that its nulls look like nulls
-_MARGIN_AROUND_SMEAR_CELLS = 10  # of a cut, on each side
+_CUT_UPSAMPLING_FACTOR = 4  # upsampling of a cut, so that nulls are visible
+_MARGIN_AROUND_SMEAR_CELLS = 10  # resolution cells on each side of the smear in a cut
 _MAX_CHIP_PX = 96  # pixels along each axis
-_CUT_FLOOR_DB = -80.0  # the depth of a null is rounding; a deeper floor shows no more
-_LONG_S = 60.0  # far below it, no image is timed
-_SLOWEST_IMAGE_S = 1.0  # of the smallest image on a slow and busy machine
-_LARGE_IMAGE_FACTOR = 8  # cells of the large image over the smallest: 32 times its pixels and pulses
-_NEIGHBOUR_FACTOR = 1.25  # images at a limit and on both sides of it, over images at it
+_CUT_FLOOR_DB = -80.0  # lower levels of a cut are only rounding errors
+_LONG_S = 60.0  # if the upper bound of the time is shorter, no image is timed
+_SLOWEST_IMAGE_S = 1.0  # upper bound of the time for the smallest image, on a slow and busy machine
+_LARGE_IMAGE_FACTOR = 8  # the large image that is timed has this many times the cells of the smallest one
+_NEIGHBOUR_FACTOR = 1.25  # number of all images, including those beside a limit, divided by the number at a limit
 
 
 def verify_mission(
@@ -63,15 +63,13 @@ def verify_mission(
     progress: Progress = unseen,
     mapped: MapBlocks | None = None,
 ) -> VerifiedMission:
-    """Verify every limit of a mission whose row id matches a glob.
+    """Verify every limit of a mission whose row id matches the glob pattern `only`.
 
-    The verdicts do not depend on the number of processes.
-
-    The verdicts are in the order of `check`, including the vibration of both platforms together. After each row
-    `progress` is called with the number of finished rows and the number of all rows. `mapped` computes the rows on
-    remote workers instead of in processes on this machine.
+    The verdicts are in the order of `check`, including the vibration of both platforms together. They do not depend
+    on `jobs`, the number of processes. After each row `progress` is called with the number of finished rows and the
+    number of all rows. `mapped` computes the rows on remote workers instead of in processes on this machine.
     """
-    mission = mission._replace(places={})  # the parser's marks cannot be sent to a process, and are not needed here
+    mission = mission._replace(places={})  # the places of keys cannot be sent to a process and are not needed
     all_cases = cases(Study(mission), only)
     row_ids = list(all_cases)
     jobs = min(jobs, len(row_ids))
@@ -94,19 +92,19 @@ def verify_mission(
 
 
 def rows_to_verify(mission: Mission, only: str = "*") -> list[str]:
-    """Ids of the rows that `verify_mission` would verify."""
+    """List the ids of the rows that `verify_mission` would verify."""
     return list(cases(Study(mission), only))
 
 
 def cases(study: Study, only: str = "*") -> dict[str, Case]:
-    """Functions that verify the rows whose ids match a glob, by row id, in the order of `check`."""
+    """Map the row ids that match a glob pattern to functions that verify these rows, in the order of `check`."""
     return {row_id: case for row_id, case in _cases(study) if fnmatchcase(row_id, only)}
 
 
 def _warns_of_the_total(study: Study) -> bool:
-    """Whether the row of the mission's quadratic phase exists.
+    """Whether the check has a row for the mission's quadratic phase under `combine: each`.
 
-    It exists if each error is judged alone and all errors together exceed the total.
+    The row exists as a warning if all errors together exceed the total.
     """
     aggregates = Aggregates(Judging(1, study.mission.allocation.warn_above), study.analysis)
     rows = (row for model in study.models for row in aggregates.rows(model.name))
@@ -119,7 +117,7 @@ def _verify_row(mission: Mission, row_id: str) -> Verdict:
 
 
 def _conditions(mission: Mission) -> Iterator[str]:
-    """Yield texts that describe how the images are formed, and which keys of the file they ignore."""
+    """Yield texts that describe the conditions of the images, and the keys of the file that are ignored."""
     settings = mission.simulation or Simulation()
     yield f"one point, exact ranges, {settings.window} window"
     yield "no noise" if settings.noise is None else "no noise (simulation.noise is for `simulate`)"
@@ -133,7 +131,7 @@ def _order(vibration: Subject) -> tuple[int, int]:
 
 
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
-    """Yield the cases of sensors and clocks with a limit, of tones, and of the total power that noise spreads."""
+    """Yield the ids and verifying functions of the limited rows of random errors, tones and spread power."""
     for error in study.analysis.random:
         sizes = limits_of(study, error)
         if sizes and error.subject.kind == "other":
@@ -200,11 +198,11 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
 
 # ---------------------------------------------------------------------- how long it will take
 class _NotFormedError(ValueError):
-    """Raised instead of forming an image, once the size of the image is known."""
+    """Raised instead of forming an image, as soon as the size of the image is known."""
 
 
 class _Sizes(PointCollection):
-    """A collection that records the size of every requested image without forming the image."""
+    """A collection that only records the size of every requested image, to estimate the computing time."""
 
     def __init__(self, mission: Mission, study: Study) -> None:
         super().__init__(mission, study.geometry)
@@ -217,15 +215,15 @@ class _Sizes(PointCollection):
         cells: int = CUT_CELLS,
         range_cells: int = RANGE_CELLS,
     ) -> tuple[Chip, Chip]:
-        """Record the size of two images; raises `_NotFormedError` instead of forming them."""
+        """Record the size of a pair of images, and raise `_NotFormedError` instead of forming them."""
         self._require_room(cells, range_cells)
         self.asked.append(_size(cells, range_cells))
         raise _NotFormedError("its size is known")
 
     def window(self, count: int) -> Floats:
-        """Raise `_NotFormedError` instead of returning weights, so that no noise is drawn.
+        """Raise `_NotFormedError` instead of returning a window, so that no noise is drawn.
 
-        Drawing noise takes seconds, for images of any size.
+        Noise takes seconds to draw, whatever the size of the images.
         """
         raise _NotFormedError(f"{count} weights are not needed")
 
@@ -237,7 +235,7 @@ class _Sizes(PointCollection):
 
 
 def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float:
-    """Estimate the time that `verify_mission` will take; 0 if it is far below a minute. [s]
+    """Estimate the time [s] that `verify_mission` will take; 0 if it is far below a minute.
 
     The time per pixel and pulse depends on the machine, on its load, and on whether kernels are compiled. It is
     therefore measured on a small and a larger image of the mission, unless all images are clearly small.
@@ -254,22 +252,22 @@ def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float
         return 0.0
     study = Study(mission)
     try:
-        study.collection.chip((0.0, 0.0), Errors(), cells=2)  # compiled, imported
+        study.collection.chip((0.0, 0.0), Errors(), cells=2)  # compile and import before the time is measured
         smallest_seconds = _seconds(study, CUT_CELLS)
     except ValueError:
-        return 0.0  # if these cannot be formed, hardly any image can
+        return 0.0  # hardly any image of the mission can be formed either
     try:
         seconds_per_size = max(0.0, _seconds(study, _LARGE_IMAGE_FACTOR * CUT_CELLS) - smallest_seconds) / (
             _size(_LARGE_IMAGE_FACTOR * CUT_CELLS, RANGE_CELLS) - 1
         )
     except ValueError:
-        seconds_per_size = smallest_seconds  # no memory for a larger one
+        seconds_per_size = smallest_seconds  # there is no memory for the larger image
     seconds = _NEIGHBOUR_FACTOR * sum(smallest_seconds + seconds_per_size * (size - 1) for size in image_sizes)
     return seconds / max(1, min(jobs, len(row_cases)))
 
 
 def _size(cells: int, range_cells: int) -> float:
-    """Size of an image relative to the smallest image, as a ratio of pixels times pulses."""
+    """Cost of forming an image (pixels times pulses), relative to the smallest image."""
     return cells * range_cells * pulses_for(cells) / (CUT_CELLS * RANGE_CELLS * pulses_for(CUT_CELLS))
 
 
@@ -284,7 +282,7 @@ def _seconds(study: Study, cells: int) -> float:
 
 # ---------------------------------------------------------------------- images that a report shows
 def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[ImageEvidence, ...]:
-    """Form the images of the rows of a verified mission that decide most; empty if no row has an image.
+    """Form images for the most important rows of a verified mission; empty if no row has an image.
 
     The worst row comes first. `findings` must contain the verdicts of the images.
     """

@@ -1,4 +1,4 @@
-"""Verdicts on the limits of quadratic phase, with and without autofocus, of cubic phase, and of the location."""
+"""Verification of the limits on quadratic phase with and without autofocus, on cubic phase, and on location."""
 
 import math
 
@@ -19,18 +19,18 @@ from bisar_budget.simulator.point import sinusoids_of
 from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading
 from bisar_budget.verifier.study import Responses, Sizes, Study, VerdictFields
 
-TOLERANCE_FRACTION = 0.05  # of the budget, within which a limit is confirmed
+TOLERANCE_FRACTION = 0.05  # largest relative deviation from the budget at which a limit is confirmed
 INSIDE_FRACTION, BEYOND_FACTOR = 0.9, 1.1  # of the limit; between these sizes the phase must grow with the error
 FOCUSED_CELLS, FOCUSED_RAD = 2 * CUT_CELLS, 12.0  # of a small patch, and the largest phase that is read in it
-_PEAK_CELLS = 3  # of range around the lines that autofocus reads: the peak is between two lines
-_LOCATION_FRACTION = 1e-6  # of the requirement of the location, to which errors are scaled
-_MAX_SMEAR_CELLS = 64  # with a longer smear, no images are formed on both sides of a limit
+_PEAK_CELLS = 3  # additional range cells, because the peak may lie between two lines
+_LOCATION_FRACTION = 1e-6  # relative tolerance when errors are scaled to the location requirement
+_MAX_SMEAR_CELLS = 64  # with a longer smear, images are formed only at the limit and not beside it
 
 
 def quadratic(study: Study, source: ErrorSource) -> Verdict:
-    """Verdict on the limit of one error on its quadratic phase.
+    """Verify the limit on the size of one error that its quadratic phase sets, with and without autofocus.
 
-    If no quadratic phase limits the error, the verdict is on its limit by the cubic phase or the location.
+    If no size reaches this limit, the limit that the cubic phase or the location sets is verified instead.
     """
     budget, gain = study.allocation.qpe_limit(source.owner), study.allocation.autofocus_gain
     boundary = study.boundary(source, budget)
@@ -45,10 +45,10 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
 
 
 def slow_vibration(study: Study, vibration: Subject) -> Verdict:
-    """Verdict on a vibration below one cycle per aperture. Each of its axes vibrates alone, in its worst phase.
+    """Verify the limit on a vibration below one cycle per aperture.
 
-    For a vibration along several axes, the amplitudes are scaled until the sum of their phases by exact ranges
-    reaches the limit.
+    Each of its axes vibrates alone, with its worst starting phase. For a vibration along several axes, the amplitudes
+    are scaled until the sum of their phases, computed from exact ranges, reaches the limit.
     """
     name, entry, budget = vibration.owner, vibration.entry or 0, study.allocation.qpe_limit(vibration.owner)
     mission, tone = study.mission, study.analysis.slow_tones[vibration.id]
@@ -82,14 +82,14 @@ def slow_vibration(study: Study, vibration: Subject) -> Verdict:
 
 
 def _worst_phase(study: Study, name: str, line: PathSinusoid) -> Errors:
-    """The vibration with the starting phase that lowers the peak most, by exact ranges."""
+    """Return the vibration with the starting phase that lowers the peak most, computed from exact ranges."""
     lines = (line._replace(phase=2 * math.pi * step / TONE_PHASE_COUNT) for step in range(TONE_PHASE_COUNT))
     candidates = [Errors().of(name, PathError(sinusoids=(shifted,))) for shifted in lines]
     return max(candidates, key=lambda errors: study.collection.effect(errors).equal_loss)
 
 
 def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
-    """Verdict on an error that no quadratic phase limits: on its limit by the cubic phase or by the location."""
+    """Verify the limit that the cubic phase or the location sets on an error without a quadratic limit."""
     allowed, binding = study.allowed(source)
     size = allowed or 0.0
     blank = study.blank(source.id, size, source.unit)
@@ -121,7 +121,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
 
 
 def total(study: Study, row_id: str, owner: str) -> Verdict:
-    """Verdict on all declared errors of an owner together, with signs for which their phases add up."""
+    """Verify the limit on the sum of all declared errors of an owner, with signs for which their phases add up."""
     budget = study.allocation.qpe_limit(owner)
     blank = study.blank(row_id, budget, "rad", budget_rad=budget)
     if study.mission.allocation.combine != "sum":
@@ -133,25 +133,28 @@ def total(study: Study, row_id: str, owner: str) -> Verdict:
 
 
 def other(study: Study, source: ErrorSource) -> Verdict:
-    """Verdict without an image, on an error that is stated as a phase."""
+    """Return a verdict without an image on an error that is stated as a phase and not as a motion."""
     budget = study.allocation.qpe_limit(source.owner)
     return study.blank(source.id, budget, source.unit, budget_rad=budget, reason=phrases.note("phase-without-motion"))
 
 
 def stated(study: Study, row_id: str, limit: float, unit: str) -> Verdict:
-    """Verdict without an image, on an effect from elsewhere that is not a quadratic phase."""
+    """Return a verdict without an image on an `other` error that is not stated as a quadratic phase."""
     return study.blank(row_id, limit, unit, reason=phrases.note("stated-by-its-effect"))
 
 
 def dispersion(study: Study) -> Verdict:
-    """Verdict on the phase of free electrons over the band, which images over slow time cannot show."""
+    """Return a verdict without an image on dispersion, the phase of free electrons over the band.
+
+    The images are read over slow time and cannot show it.
+    """
     budget = study.allocation.qpe_total
     blank = study.blank("propagation.dispersion", budget, "rad", budget_rad=budget)
     return blank._replace(reason=phrases.note("images-are-read-over-slow-time"))
 
 
 def edge(study: Study) -> Verdict:
-    """Verdict on the difference between two points of the scene, without an image.
+    """Return a verdict without an image on the phase difference between the centre and the edge of the scene.
 
     Only the tests compare this difference with images.
     """
@@ -161,9 +164,9 @@ def edge(study: Study) -> Verdict:
 
 
 def cubic(study: Study, requirement: float) -> Verdict:
-    """Verdict on all declared errors together.
+    """Verify the limit on the cubic phase of all declared errors together.
 
-    The errors are scaled until the cubic phase of the gating model reaches the requirement.
+    The errors are scaled until the cubic phase by the gating model reaches the requirement [rad].
     """
     blank = study.blank("mission.cubic_phase_error", requirement, "rad", budget_rad=requirement)
     sizes = [(s, s.declared or 0.0) for s in study.declared]
@@ -186,12 +189,13 @@ def cubic(study: Study, requirement: float) -> Verdict:
 
 
 def pull_in(study: Study, n_pull: float) -> Verdict:
-    """Verdict on autofocus at the pull-in limit, from the image of a clock error with a phase of π·N_pull.
+    """Verify autofocus at its pull-in limit, in the image of a clock error with a quadratic phase of π·N_pull.
 
-    A clock error does not change the geometry. Range walk limits N_pull.
+    N_pull is the pull-in range `autofocus.n_pull`. A clock error is used because it does not change the geometry.
+    Range walk limits N_pull.
     """
     phase, budget, radar = math.pi * n_pull, study.allocation.qpe_total, study.mission.radar
-    walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # λN/2 over c/B
+    walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # range error λN/2 divided by the range cell c/B
     blank = study.blank("mission.autofocus_pull_in", phase, "rad", budget_rad=budget)
     clock = next(s for s in study.sources if s.id == "timing.quadratic")
     fields = refocused(study, [(clock, phase / abs(float(clock.effect.qpe)))], budget, holds_hidden=False)
@@ -200,10 +204,10 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
 
 
 def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool = True) -> VerdictFields:
-    """Refocus the image at the limit, and compare the phase that autofocus leaves with the budget without its gain.
+    """Refocus the image at the limit, and compare the phase that remains with the budget without autofocus gain.
 
-    If `holds_hidden`, the phase hidden by the band and by turns is included. It is left out if only the pull-in range
-    is verified, because separate rows judge it.
+    `budget` is in [rad]. If `holds_hidden`, the remaining phase includes the phase that the band and rotations hide
+    from autofocus. It is left out if only the pull-in range is verified, because separate rows judge it.
     """
     try:
         errors = study.together(sizes, study.worse_sign(sizes))
@@ -238,7 +242,7 @@ def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool =
 def _read_focused(study: Study, focused: Responses) -> ApertureReading:
     """Measure the phase that remains after autofocus.
 
-    If it is small, it is read from the middle of a large patch, otherwise from all of the patch.
+    A small phase is measured in the middle of a large patch, a large phase in all of the patch.
     """
     small, large = (
         focused._replace(chip=focused.chip.within(cells), reference=focused.reference.within(cells))
@@ -254,7 +258,7 @@ def _read_focused(study: Study, focused: Responses) -> ApertureReading:
 
 
 def predicted(effect: ExactEffect) -> VerdictFields:
-    """The fields of a verdict that follow from exact ranges."""
+    """Return the fields of a verdict that are computed from exact ranges."""
     return {
         "predicted_qpe_rad": abs(effect.quadratic),
         "equal_loss_qpe_rad": effect.equal_loss,
@@ -264,9 +268,10 @@ def predicted(effect: ExactEffect) -> VerdictFields:
 
 
 def _without_image(study: Study, blank: Verdict, error: ValueError) -> Verdict:
-    """Verdict if no image can be formed.
+    """Return the verdict on a limit at which no image can be formed.
 
-    A limit of the published model for which no ground point exists is optimistic.
+    A limit of the published model is optimistic if no ground point has the range history. Otherwise there is no
+    verdict.
     """
     if isinstance(error, NoGroundPointError) and not study.is_full:
         return blank._replace(verdict="optimistic", reason=phrases.note("no-image-at-the-limit"))
@@ -274,9 +279,10 @@ def _without_image(study: Study, blank: Verdict, error: ValueError) -> Verdict:
 
 
 def compare(excess: float, tolerance: float) -> str:
-    """Verdict on a limit, from the relative amount by which the measured phase exceeds the budget.
+    """Return the verdict on a limit from the relative amount by which the measured phase exceeds the budget.
 
-    The verdict is `confirmed` if the amount is within the tolerance.
+    The verdict is `confirmed` if the amount is within the tolerance, `optimistic` if it is larger, and `conservative`
+    if it is smaller.
     """
     if abs(excess) <= tolerance:
         return "confirmed"
@@ -284,7 +290,7 @@ def compare(excess: float, tolerance: float) -> str:
 
 
 def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
-    """Displacement that several errors together cause by (25); None if (25) has no solution."""
+    """Displacement that several errors together cause by (25) of the paper; None if (25) has no solution. [m]"""
     published = study.analysis.published  # (25)
     moves = [published.displacement(source.effect, scale * size) for source, size in sizes]
     if any(move is None for move in moves):
@@ -293,7 +299,7 @@ def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVe
 
 
 def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
-    """Form images with errors at the limit and on both sides, and compare the equal-loss phase with the budget."""
+    """Form images with errors at the limit and beside it, and compare the equal-loss phase with the budget."""
     budget = blank.budget_rad or 0.0
     by_table = abs(math.fsum(s.effect.qpe * size for s, size in sizes))
     blank = blank._replace(published_qpe_rad=by_table)
@@ -330,11 +336,12 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
 def _through_the_limit(
     inside: float | None, measured: float, beyond: float | None, budget: float
 ) -> tuple[str, Note | None]:
-    """Verdict on the phase at a limit, and a note if the phase does not grow with the error.
+    """Return the verdict on the phase at a limit, and a note if the phase does not grow with the error.
 
-    `inside` and `beyond` are the phases at sizes below and above the limit; None if no image is formed there. A limit
-    promises that no smaller error has more phase. If the phase at the smaller size is larger, the larger phase
-    counts, and the limit is not confirmed. Above the limit the phase may fall, which the note reports.
+    `inside` and `beyond` are the phases at sizes below and above the limit; None if no image is formed there.
+    `measured` is the phase at the limit. All phases are in [rad]. A limit implies that no smaller error has more
+    phase. If the phase at the smaller size is larger, it is used for the verdict, and the limit is not confirmed.
+    Above the limit the phase may fall, which the note reports.
     """
     verdict = compare(measured / budget - 1, TOLERANCE_FRACTION)
     falls_inside = inside is not None and inside >= measured
@@ -351,7 +358,7 @@ def _through_the_limit(
 
 
 def _of_response(study: Study, images: Responses, reading: ApertureReading) -> VerdictFields:
-    """Measured quantities of a response, without those that a long smear or a bent patch makes undefined."""
+    """Measure a response, without the quantities that a long smear or a curved patch makes undefined."""
     chip, reference, measures = images.chip, images.reference, VerdictFields()
     try:
         shift = study.shift(images, reading)
@@ -388,9 +395,9 @@ def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float
     Raises
     ------
     ValueError
-        No scale found: the phase exceeds the requirement where the point has no image, or never reaches it.
+        No scale is found: the phase exceeds the requirement where no image can be formed, or never reaches it.
     """
-    low, high = 0.0, math.inf  # scales with less phase, and with more or without a point
+    low, high = 0.0, math.inf  # scale with too little phase, and scale with too much phase or without an image
     for _ in range(60):
         try:
             cubic_phase = abs(study.effect(sizes, scale).cubic)
@@ -406,11 +413,11 @@ def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float
 
 # ---------------------------------------------------------------------- location
 def location(study: Study, requirement: float) -> Verdict:
-    """Verdict on all declared errors together, scaled until the gating model moves the image by the requirement.
+    """Verify the location limit: all declared errors are scaled until the gating model displaces the image by it.
 
-    The limit is confirmed if the image agrees with the gating model to 5 % of the requirement. For (25), each single
-    error must also agree with exact ranges. A displacement that is only shorter than expected is conservative; a
-    displacement in a different direction is not.
+    The limit is confirmed if the displacement of the image agrees with the gating model to 5 % of the requirement.
+    For the published model (25), the effect of each single error must also agree with exact ranges. A displacement
+    that is only shorter than expected is conservative; a displacement in a different direction is not.
     """
     blank = study.blank("mission.location_error", requirement, "m")
     sizes = [(s, s.declared or 0.0) for s in study.declared]
@@ -438,7 +445,7 @@ def location(study: Study, requirement: float) -> Verdict:
     measured = effect.moved(shift.displacement)
     comparisons = [("all of them together", expected, measured)]
     if not study.is_full:
-        # Together, errors may hide each other: an error may fly with a sign other than the declared one.
+        # Errors may cancel in the sum, and the true error may have a sign other than the declared one.
         for source, size in sizes:
             expected_alone = published_displacement(study, [(source, size)], scale)
             if expected_alone is not None:
@@ -466,7 +473,7 @@ def location(study: Study, requirement: float) -> Verdict:
 
 
 def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float | None:
-    """Scale of the errors for which the gating model moves the image by the requirement; None if it never moves."""
+    """Find the scale at which the gating model displaces the image by the requirement; None if it never moves."""
     if not study.is_full:
         displacement = published_displacement(study, sizes, 1.0)
         length = math.hypot(*displacement) if displacement else 0.0
@@ -486,7 +493,7 @@ def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float 
 
 
 def _along_and_across(study: Study, a: GroundVector, b: GroundVector) -> GroundVector:
-    """Distance between two displacements along x′ and along y′. [m]"""
+    """Components along x′ and y′ of the difference between two displacements, as magnitudes. [m]"""
     look = study.geometry.look_azimuth
     cosine, sine = math.cos(look), math.sin(look)
     east, north = b[0] - a[0], b[1] - a[1]

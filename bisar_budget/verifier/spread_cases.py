@@ -305,7 +305,7 @@ def limits_of(study: Study, error: RandomError) -> dict[str, float]:
 
 
 def _model(study: Study, error: RandomError) -> str:
-    """Name of the gating model that gives the error the larger effect."""
+    """Return the name of the gating model under which the error has the larger effect."""
     return max((model.name for model in study.models), key=lambda name: max(error.effect(name)[:2]))
 
 
@@ -349,7 +349,7 @@ def _spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cyc
 
 
 def verify_pslr(study: Study) -> Verdict:
-    """Verdict on the tones of the highest echo, in their worst phases, scaled together to the required PSLR."""
+    """Verify the PSLR of the tones that make the highest echo, in their worst phases, scaled to the required PSLR."""
     required = study.mission.requirements.pslr or 0.0
     row_id = subject("mission", "pslr").id
     blank = study.blank(row_id, required, "dB", requirement_db=required)
@@ -420,7 +420,7 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
 
 
 def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Generator) -> Verdict:
-    """Verdict on the displacement that a random error at its limit causes.
+    """Verify the limit on a random error that its displacement sets.
 
     The sigma of the displacement, times the coverage factor, is compared with the requirement.
     """
@@ -475,7 +475,7 @@ def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic:
 
 
 def _effects_of_draws(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
-    """Effects of many drawn histories of a sensor or of the air, by exact ranges, (draws,)."""
+    """Compute the effects of many drawn histories of a sensor or of the atmosphere from exact ranges, (draws,)."""
     moments = aperture_nodes(study.collection.aperture_time)
     if error.subject.kind in CORRELATED:  # not smooth between the nodes, unlike integrated noise
         return study.exact_effects(_smooth_noise(study, error, rng))
@@ -609,7 +609,7 @@ def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[
 
 # ---------------------------------------------------------------------- what spreads
 def verify_islr(study: Study, row_subject: Subject) -> Verdict:
-    """Verdict on all errors that spread power, scaled together until they reach the limit of the row's owner."""
+    """Verify the ISLR of all errors that spread power, scaled together to the limit of the row's owner."""
     mission, model = study.mission, study.models[-1].name
     limit = spread_limit(mission, study.allocation, row_subject.owner, model) or 0.0
     level = islr_db(limit**2, model, mainlobe_energy(mission))

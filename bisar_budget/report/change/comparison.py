@@ -25,7 +25,7 @@ from bisar_budget.settings import TABLE
 
 # ---------------------------------------------------------------------- inputs
 class Moved(NamedTuple):
-    """A changed value: the text of a key in the file or a number of the geometry; None if the value is missing."""
+    """A value before and after a change, of a key in the file or of the geometry; None where the value is missing."""
 
     name: str
     unit: str  # of a number; empty for a text
@@ -75,7 +75,7 @@ def texts_of_file(mission: Mission) -> dict[KeyPath, str]:
 
 
 def _set_values(mission: Mission) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the key paths and texts of the values that options set; a key that is not in the file has its option."""
+    """Yield key path and text of each value that an option sets, whether or not the file has the key."""
     changed = {".".join(map(str, path)): path for path, event in mission.places.items() if isinstance(event, Changed)}
     for change in mission.changes:
         parts = parts_of(change.key)
@@ -196,7 +196,7 @@ def _looser_specifications(before: Mission, after: Mission) -> Iterator[Loosened
 
 
 def _declarations(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Yield the words of `requirements.declare` that no longer require all the errors that they required before."""
+    """Yield the entries of `requirements.declare` whose errors are not all required any more."""
     later_kinds = {kind for word in after.requirements.declare for kind in _owned(word)}
     for word in before.requirements.declare:
         kept = later_kinds.intersection(_owned(word))
@@ -205,7 +205,7 @@ def _declarations(before: Mission, after: Mission) -> Iterator[Loosened]:
 
 
 def _owned(word: str) -> list[str]:
-    """Kinds of error, with their platform, that a word of `requirements.declare` requires."""
+    """Kinds of error that an entry of `requirements.declare` requires, each with its platform."""
     return [word] if "." in word or word == "timing" else [f"{name}.{word}" for name in PLATFORMS]
 
 
@@ -250,7 +250,7 @@ def _waivers(before: Mission, after: Mission) -> Iterator[Loosened]:
 def _names_as_much(old: Waiver, new: Waiver) -> bool:
     """Whether an earlier waiver covers every row of a new waiver.
 
-    False if the patterns differ and the new one has brackets, because this is not decided.
+    False if the patterns differ and the new one has brackets, because such patterns are not compared.
     """
     is_one_row = not any(char in new.id for char in "*?[")
     # A star of the old pattern also matches wildcards of the new pattern; the text beside the star is in both.
@@ -270,7 +270,7 @@ def _waived_rows(before: MissionFindings, after: MissionFindings) -> Iterator[Lo
 
 
 def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Yield the errors that are no longer declared, or are now zero; the axes of a motion error are one error."""
+    """Yield the errors that are no longer declared or now zero. A motion error with all its axes is one error."""
     old, new = _declared(before), _declared(after)
     stated = (row for row in before.rows if row.declared is not None and row.is_independent)
     for name in dict.fromkeys(_error(row) for row in stated if row.subject.kind not in SUMS):
@@ -281,7 +281,7 @@ def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosene
 
 
 def _fallen(before: MissionFindings, after: MissionFindings, gone_errors: Sequence[str]) -> Iterator[Loosened]:
-    """Yield the rows whose declared effect decreased, without rows of `gone_errors`, which are already listed."""
+    """Yield the rows whose declared effect decreased, except rows of `gone_errors`, which are listed separately."""
     for fall in fallen_effects(before, after):
         if not any(fall.id == name or fall.id.startswith(f"{name}.") for name in gone_errors):
             yield Loosened(fall.id, *fall.words)
@@ -302,7 +302,10 @@ def _distributions(before: Mission, after: Mission) -> Iterator[Loosened]:
 
 
 def _declared(findings: MissionFindings) -> dict[str, bool]:
-    """Map each declared error to True if it is larger than zero along any axis."""
+    """Map each declared error to whether it is nonzero along at least one axis.
+
+    Levels in dB and computed sizes count as nonzero.
+    """
     is_declared: dict[str, bool] = {}
     for row in findings.rows:
         if row.declared is not None:
@@ -388,7 +391,7 @@ class Change(NamedTuple):
 
     @property
     def is_newly_failing(self) -> bool:
-        """Whether the row newly fails or is newly not evaluated."""
+        """Whether the status of the row became worse: to fail, or to not evaluated from another status than fail."""
         return _is_newly_broken(_status(self.before), _status(self.after))
 
     @property
@@ -403,7 +406,7 @@ class Change(NamedTuple):
 
     @property
     def is_change(self) -> bool:
-        """Whether a reported value of the row differs. A moved line in the file does not count as a difference."""
+        """Whether status, declared value, allowable or utilization differ, or only one version has the row."""
         return _reported(self.before) != _reported(self.after)
 
     @property
@@ -415,9 +418,10 @@ class Change(NamedTuple):
         return _is_near(before.declared, after.declared) and _is_near(before.allowable, after.allowable)
 
     def breaks(self, tolerated: float) -> bool:
-        """Whether the row newly fails, or is judged and loses more than the tolerated fraction of its margin.
+        """Whether a gate refuses the change: the row newly fails, or loses more than the fraction `tolerated`.
 
-        A row that is waived before and after counts as judged, because the waiver was granted for its earlier value.
+        The fraction refers to the margin before the change, and only a judged row can lose margin. A row that is
+        waived before and after counts as judged, because the waiver was granted for its earlier value.
         """
         is_judged = self.after is not None and STATUS[self.after.status].is_held
         is_judged = is_judged or _status(self.before) == _status(self.after) == "waived"
@@ -439,7 +443,7 @@ class RequirementMove(NamedTuple):
 
     @property
     def is_newly_failing(self) -> bool:
-        """Whether the requirement is newly not met or newly not evaluated."""
+        """Whether the status of the requirement became worse: to fail, or to not evaluated from another than fail."""
         return _is_newly_broken(self.before, self.after)
 
 
@@ -489,7 +493,7 @@ class MissionChange(NamedTuple):
     loosened: tuple[Loosened, ...] = ()
 
     def broken(self, tolerated: float) -> list[Change]:
-        """Changes of rows that a gate refuses if it tolerates the loss of a fraction `tolerated` of a margin."""
+        """Row changes that a gate refuses if a row may lose at most a fraction `tolerated` of its margin."""
         return [change for change in self.changes if change.breaks(tolerated)]
 
     def refusals(self, gate: Gate) -> list[Refusal]:

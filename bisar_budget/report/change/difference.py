@@ -55,7 +55,7 @@ def _refusals(change: MissionChange | ChangeSet, gate: Gate | None) -> list[Refu
 
 
 class _ChangeInWords(NamedTuple):
-    """A change as text: its kind, such as `input`, its name, and "before -> after" or the reason of a refusal."""
+    """A change as text: its kind, such as `input`, its name, and `before -> after` or the reason for a refusal."""
 
     kind: str
     name: str
@@ -108,7 +108,7 @@ def _refused_lines(change: MissionChange | ChangeSet, gate: Gate | None) -> list
 
 
 def _items(changes: Iterable[_ChangeInWords]) -> list[str]:
-    """Changes as a list in Markdown."""
+    """Markdown list with an item for each change."""
     return [f"- {change.kind} {markdown_text(change.name)}: {_arrows(change.words)}" for change in changes]
 
 

@@ -27,10 +27,10 @@ from bisar_budget.report.change.names import plain, plain_file
 from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.units import format_quantity
 
-SUMS = (*REQUIREMENT_NAMES, "autofocus_pull_in")  # kinds of rows that are no error
-_RESULTS = (*SUMS, "spatial_variance", "dispersion")  # kinds of rows that only other rows make
-_SIZE_TOLERANCE_FRACTION = 1e-6  # by which the same error may use less of the same limit, as searches settle
-_ANY_DAY = date(2000, 1, 1)  # waivers decide no use of a limit
+SUMS = (*REQUIREMENT_NAMES, "autofocus_pull_in")  # kinds of rows that sum errors and are no error themselves
+_RESULTS = (*SUMS, "spatial_variance", "dispersion")  # kinds of rows that follow from other rows
+_SIZE_TOLERANCE_FRACTION = 1e-6  # decrease of a utilization that may come from the tolerance of a search
+_ANY_DAY = date(2000, 1, 1)  # waivers depend on the day, utilizations do not
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class FallenEffect:
 
     @property
     def words(self) -> tuple[str, str]:
-        """Text of the utilization before and after, or of the declared values if they cannot be compared."""
+        """Texts of the earlier and later utilization, or declared value if the utilizations cannot be compared."""
         if _tells(self.before, self.after):
             uses = [100 * (row.utilization or 0.0) if row else 0.0 for row in (self.before, self.after)]
             old, new = (percent(use / 100) for use in uses)
@@ -63,9 +63,9 @@ class FallenEffect:
 
 
 class NotComparable(NamedTuple):
-    """A key of the later errors that is invalid in the earlier collection, and the reason.
+    """A key of the later errors that is invalid with the geometry and waveform before the change, and the reason.
 
-    With such a key no effect can be compared.
+    Such a key prevents any comparison of effects.
     """
 
     id: str
@@ -73,7 +73,7 @@ class NotComparable(NamedTuple):
 
     @property
     def words(self) -> tuple[str, str]:
-        """Two texts: how effects are compared, and why this effect cannot be compared."""
+        """Two texts: the way in which effects are compared, and the reason why this comparison is impossible."""
         return "effects compared in the earlier collection", f"not comparable, since there it {self.problem}"
 
 
@@ -94,7 +94,7 @@ def fallen_effects(before: MissionFindings, after: MissionFindings) -> Sequence[
     renamed = _named_anew(before, after)
     if falls:
         return [fall for fall in falls if fall.id not in renamed]
-    # With `each` the row of a total is there only where no error fails alone.
+    # With the rule `each`, a total has a row only if no single error fails.
     is_judged = before.combine != "each"
     return [fall for fall in _falls(_sums(before), _sums(rechecked)) if is_judged or fall.after is not None]
 
@@ -125,7 +125,7 @@ def _held_alike(before: MissionFindings, after: MissionFindings) -> Mission | No
 
 
 def _flown_before(old: Platform, new: Platform, axes: SceneAxes | None) -> Platform:
-    """Return a platform with its earlier path and its later errors. The two files may state paths differently.
+    """Return a platform with its earlier path and its later errors.
 
     Errors along `ric` axes need the direction from the Earth's centre. If the earlier file does not define this
     direction, it is derived from the scene `axes` of the later file.
@@ -137,7 +137,7 @@ def _flown_before(old: Platform, new: Platform, axes: SceneAxes | None) -> Platf
 
 
 def _misfits(mission: Mission) -> dict[KeyPath, str]:
-    """Return the keys of errors that are invalid in the collection of a mission, each with the reason."""
+    """Map the key of each error that is invalid with the mission's geometry and waveform to the reason."""
     problems = [(problem.at, problem.problem) for problem in Mission.problems(mission._asdict())]
     for name, platform in mission.platforms._asdict().items():
         problems += [
@@ -192,12 +192,15 @@ def _size(row: Row) -> tuple[float, float]:
 
 
 def _tells(before: Row, after: Row | None) -> bool:
-    """Whether the utilizations show how the effect changed: the earlier one is positive, the later one is known."""
+    """Whether the utilizations can be compared: the earlier one is positive, and the later one, if any, is known."""
     return bool(before.utilization) and (after is None or after.utilization is not None)
 
 
 def _is_less(before: Row, after: Row | None) -> bool:
-    """Whether a row is gone or has a smaller utilization, or a smaller declared value if `_tells` is false."""
+    """Whether the effect of a row decreased, or the row is gone.
+
+    The effect is the utilization, or the declared value if `_tells` is false.
+    """
     if after is None:
         return before.declared != 0 or before.unit == "dB"
     sizes = (before.declared or 0.0, after.declared or 0.0)
@@ -209,7 +212,7 @@ def _is_less(before: Row, after: Row | None) -> bool:
 
 
 def _family(row: Row) -> tuple[str, ...]:
-    """Key of the rows that are compared as a group: the numbered entries of one list, else the row alone."""
+    """Key of the group of a row: owner, kind and axis for a numbered entry of a list, else the id of the row."""
     subject = row.subject
     if subject.entry is None or subject.kind == "other":
         return (row.id,)
@@ -217,7 +220,7 @@ def _family(row: Row) -> tuple[str, ...]:
 
 
 def _named_anew(before: MissionFindings, after: MissionFindings) -> set[str]:
-    """Ids of rows whose later source or part is one that the earlier file does not name for them.
+    """Ids of the rows with a new source or part, one that the earlier file does not name for the row.
 
     A key that was removed, or that overrides a part, does not name a new source: the source or part that its section
     names already applied to the row.
@@ -244,7 +247,7 @@ def _source(mission: Mission, row: Row) -> str:
 
 
 def _is_named(source: str, mission: Mission, row: Row) -> bool:
-    """Whether a mission names `source` for a row or its whole section, or has overridden a part of that name."""
+    """Whether a mission names `source` for a row or its section, or overrides values of a part of that name."""
     if source in ("", _source(mission, row)):
         return True
     if row.owner not in PLATFORMS:

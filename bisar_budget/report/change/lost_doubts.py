@@ -17,7 +17,7 @@ from bisar_budget.report.change.names import plain, plain_file
 from bisar_budget.units import format_quantity
 
 _CHOICES = ("object", "talker", "track", "instance")  # keys that name a source within a file
-_NOT_OF_FORM = ("object", "planned")  # keys of an orbit beside its source
+_NOT_OF_FORM = ("object", "planned")  # keys of an orbit other than the format of its source
 
 
 class LostDoubt(NamedTuple):
@@ -29,7 +29,7 @@ class LostDoubt(NamedTuple):
 
 
 def lost_doubts(before: Mission, after: Mission) -> Iterator[LostDoubt]:
-    """Yield the doubts about the earlier paths that the later mission lacks although its errors do not cover them."""
+    """Yield the doubts about the earlier paths that disappeared, although the later errors do not cover them."""
     doubts = {_name(doubt) for doubt in input_doubts(before)}
     if not doubts:
         return
@@ -56,7 +56,10 @@ def _words(doubt: InputDoubt) -> str:
 
 
 def _takes(doubt: InputDoubt, old: Platform, new: Platform) -> Iterator[tuple[str, str]]:
-    """Yield the keys that suppress a doubt, with reasons; nothing if the path has another or a better one."""
+    """Yield the keys that suppress a doubt, each with a text about its new value.
+
+    There is none if the path has a new or better source.
+    """
     was, now = old.path, new.path
     if was is None:
         return
@@ -84,7 +87,7 @@ def _is_same_source(old: Platform, new: Platform) -> bool:
 
 
 def _files(platform: Platform) -> tuple[str, ...]:
-    """Plain names of two files: the file of a path, and the file that states its accuracy."""
+    """Plain names of the files of a path and of its accuracy; empty without a path."""
     path = platform.path
     return () if path is None else (plain_file(path.file), plain_file(path.accuracy and path.accuracy[0]))
 
@@ -96,7 +99,7 @@ def _chosen(platform: Platform) -> list[str]:
 
 
 def _key(platform: Platform) -> str:
-    """Key that states the source of a path, within the section of its platform: the kind of path and the format."""
+    """Key of the source of a path within the section of its platform, such as `orbit.tle`: path kind and format."""
     stated = getattr(platform, platform.way)
     form = next(key for key in stated._fields if key not in _NOT_OF_FORM and getattr(stated, key) is not None)
     return f"{platform.way}.{form}"
@@ -110,7 +113,7 @@ def _is_sourced_anew(doubt: InputDoubt, old: Platform, new: Platform) -> bool:
 
 
 def _changed(was: FlownPath, now: FlownPath) -> Iterator[str]:
-    """Yield the files of a path whose contents changed."""
+    """Yield the names of the path file and of the accuracy file if their contents changed."""
     if now.file is not None and was.sha256 != now.sha256:
         yield now.file
     if now.accuracy is not None and was.accuracy is not None and was.accuracy[1] != now.accuracy[1]:

@@ -180,7 +180,8 @@ def _command(findings: MissionFindings, study: TradeStudy, file: str) -> str:
 def _stretches(trade: Trade) -> Iterator[tuple[doc.Line, str]]:
     """Yield the table lines of a sweep over one axis, each with a sentence about it.
 
-    Neighbouring values with the same status and the same worst row share a line; each word has its own line. The
+    Neighbouring numbers with the same status and the same worst row share a line. A value that is a word has its own
+    line. The
     binding requirement follows the name of the row, unless the name ends with it.
     """
     (axis,) = trade.axes
@@ -209,8 +210,8 @@ def _uses(uses: NumbersOrWords) -> str:
 def _binding_lines(trade: Trade, by_word: Mapping[str, Trade]) -> Iterator[tuple[doc.Line, str]]:
     """Yield the table lines of a sweep over two axes, each with a sentence about it.
 
-    Each line counts the cases of a word. Without words, it counts the cases of a worst row; the line with the most
-    cases comes first.
+    If one axis has words as values, each line counts the cases of one word. Otherwise each line counts the cases with
+    one worst row, and the line with the most cases comes first.
     """
     cases: dict[str, Mapping[str, NumbersOrWords]] = {printable(word): each.values for word, each in by_word.items()}
     if not by_word:
@@ -304,7 +305,7 @@ def _images(page: Page, evidence: ImageEvidence, number: int) -> doc.Group:
 
 
 def _page_size(image: PointImage) -> tuple[int, int]:
-    """Width and height of an image on a page, at most 240 px each. [px]"""
+    """Width and height of an image on a page [px], reduced to at most 240 each."""
     width, height = chip_size(image)
     shrink = max(1.0, width / 240, height / 240)
     return max(1, round(width / shrink)), max(1, round(height / shrink))

@@ -124,7 +124,7 @@ class Head:
 
 
 def heads(*heads: Head | str) -> list[Head]:
-    """Make a list of column heads. A plain text becomes the head of a column of text."""
+    """Make a list of column heads. A plain string becomes the head of a column of text."""
     return [Head(head) if isinstance(head, str) else head for head in heads]
 
 
@@ -173,7 +173,7 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class ShownImage:
-    """A small image: `name` of its file, title, caption, PNG, width and height on a page. [px]"""
+    """A small image: `name` of its file, title, caption, PNG data, and its width and height on a page [px]."""
 
     name: str
     title: str
@@ -191,7 +191,7 @@ class Images:
 
 @dataclass(frozen=True, slots=True)
 class Equality:
-    """A general formula that belongs to no row. Both sides are names in the catalogue."""
+    """A general formula that belongs to no row. Both sides are names of formulas in the catalogue."""
 
     left: str
     right: str

@@ -22,7 +22,7 @@ _BREAK_POINT = re.compile(
     r"([._/])(?=\w{2})"
 )  # where a long name may break; one-letter axes stay with the name before
 _BAR_ATTRIBUTES = 'viewBox="0 0 {} 8" preserveAspectRatio="none" aria-hidden="true" focusable="false"'
-_USE_ATTRIBUTES = _BAR_ATTRIBUTES.format(120)  # the limit is at 96
+_USE_ATTRIBUTES = _BAR_ATTRIBUTES.format(120)  # a utilization of 100 % is at 96
 _SHARE_ATTRIBUTES = _BAR_ATTRIBUTES.format(100)
 
 

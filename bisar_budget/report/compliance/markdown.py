@@ -13,7 +13,7 @@ from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.notation import Sum, WorkedEquation
 from bisar_budget.report.words.sentences import markdown_row, markdown_text, uri
 
-_BAR_WIDTH, _LIMIT_WIDTH = 20, 16  # characters: of a bar, and of a use of 100 %
+_BAR_WIDTH, _LIMIT_WIDTH = 20, 16  # characters of a whole bar, and of a utilization of 100 %
 _BRACKETED = {"own-id": " ({})", "origin": "({})"}
 _DESCRIPTION = re.compile("<desc[^>]*>(.*?)</desc>", re.DOTALL)
 

@@ -28,8 +28,8 @@ from bisar_budget.report.words.sentences import (
 )
 from bisar_budget.units import format_in, format_quantity
 
-_MAX_LARGEST_ROWS = 8  # contributions of a summary
-_MAX_MATRIX_ROWS = 40  # of a summary; the annex has further rows, which use less
+_MAX_LARGEST_ROWS = 8  # contributions in each table of a summary
+_MAX_MATRIX_ROWS = 40  # rows in a summary; the annex has the other rows, with smaller utilizations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -215,7 +215,7 @@ def source_of_limit(page: Page, row: Row) -> str:
         return f"declared: {', '.join(requirements.declare)}"
     if row.subject.kind == "autofocus_pull_in":
         return "total QPE within the pull-in range of autofocus, π·N_pull"
-    if row.subject.kind == "spatial_variance":  # one correction serves the whole scene, so that autofocus has no gain
+    if row.subject.kind == "spatial_variance":  # autofocus has one correction for the whole scene, so no gain here
         return f"QPE differs over the scene by ≤ {phase_limit(allocation.qpe_total, findings)}"
     if row.subject.kind == "dispersion":
         return f"quadratic phase at the edges of the band ≤ {phase_limit(allocation.qpe_total, findings)}"
@@ -237,8 +237,8 @@ def method(row: Row, verdict: str | None) -> str:
 class Contribution:
     """Effect of one declared error. `fraction` is its size relative to the largest effect.
 
-    `model_cells` are more table cells for a phase: its share of the sum, and its values by the published and the full
-    model.
+    `model_cells` are additional table cells for a phase: its share of the sum, and its values by the published and
+    the full model.
     """
 
     id: str

@@ -138,13 +138,13 @@ _WAIVED = (
 
 
 def _judged(status: str, waived: Sequence[int]) -> str:
-    """Text of the verdict for a status, with the numbers of waived rows and requirements in `waived`."""
+    """Text of the verdict for a status, with the two counts of `_waived` in `waived`."""
     clauses = [f"{count} {words[count > 1]} waived" for count, words in zip(waived, _WAIVED, strict=True) if count]
     return "; ".join([STATUS[status].verdict, *clauses])
 
 
 def _waived(findings: MissionFindings) -> tuple[int, int]:
-    """Two counts: waived rows over their limit, and waived rows and requirements that cannot be judged.
+    """Count the waived rows over their limit, and the waived rows and requirements that cannot be judged.
 
     A waived requirement is counted only if none of its rows is waived.
     """
@@ -475,7 +475,7 @@ def _validity(page: Page) -> Iterator[doc.Block]:
         yield doc.Paragraph(" ".join(texts))
 
 
-# Further files of a path.
+# Files of a path besides the file of its positions.
 _PATH_FILE_NAMES = {"accuracy": "Accuracy", "earth_orientation": "The Earth’s orientation"}
 
 
@@ -567,7 +567,7 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
 
 
 def _air_of(propagation: Propagation) -> str:
-    """Text that states whether both legs cross the same air, and how fast its delays change."""
+    """Text about the delays in the air: whether they are the same on both legs, and how fast they change."""
     legs = {name: propagation.leg(name) for name in Platforms._fields}
     times = {name: leg.correlation_time for name, leg in legs.items() if leg is not None}
     change_words = {

@@ -77,7 +77,7 @@ def numbers_in_words(evidence: ImageEvidence) -> Iterator[str]:
 
 
 def chip_png(image: PointImage) -> bytes:
-    """Write a chip as an 8-bit grey PNG with x′ to the right and y′ up. Black is −40 dB below the error-free peak.
+    """Write a chip as an 8-bit grey PNG with x′ to the right and y′ up. Black is 40 dB below the error-free peak.
 
     The data is stored without compression, so that the bytes do not depend on a compression library.
     """
@@ -135,7 +135,7 @@ def _phase(value: float | None) -> str:
 def cut_panel(
     canvas: svg.Canvas, top: float, width: float, height: float, title: str, curves: Sequence[Curve]
 ) -> float:
-    """Draw cuts on a panel with its title above. Returns the bottom of the panel. [px]"""
+    """Draw cuts on a panel with its title above. Returns the y coordinate of the bottom of the panel. [px]"""
     frame = svg.Box(_CUTS_LEFT_PX, top + _CUTS_TITLE_PX, width - _CUTS_EDGE_PX, top + _CUTS_TITLE_PX + height)
     positions = [position for curve in curves for position in curve.positions]
     across = svg.Scale(min(positions), max(positions), frame.left, frame.right)

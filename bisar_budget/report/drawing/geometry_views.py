@@ -22,15 +22,15 @@ _AXIS_PX, _VIEW_EDGE_PX = (54.0, 34.0), 8.0  # margins of a panel: beside and be
 _SPOT_PX = 30.0  # distance below which two objects share one spot of the drawing
 _ENLARGED_PX = 60.0  # distance in space below which objects on one spot get an enlargement
 _COINCIDENT_PX = 1e-6  # distance below which no enlargement separates two objects
-_MIN_SPREAD_RATIO = 0.15  # half the height and width of an enlargement, at least, over the distance that it shows
-_MIN_ENLARGEMENT_RATIO = 2.0  # smallest enlargement with a panel
+_MIN_SPREAD_RATIO = 0.15  # least half-width of an enlargement, relative to the distance that it shows
+_MIN_ENLARGEMENT_RATIO = 2.0  # an enlargement by a smaller factor is not drawn
 _VELOCITY_PX, _LOOK_PX, _SMEAR_PX = 44.0, 62.0, 40.0  # lengths of arrows
-_END_ON_RATIO = 0.3  # component of a velocity in the plane of the drawing, below which its arrow is drawn end on
+_END_ON_RATIO = 0.3  # in-plane component of a unit velocity below which its arrow is drawn end on
 _MIN_PATH_PX = 20.0  # shorter paths are hidden by marker and arrow
 _NOTE_CHARACTERS = 88
 _SCENE_CENTRE: PlanePoint = (0.0, 0.0)
 _PATH_STEPS, _STEPS_PER_PIECE = 32, 4
-_ENLARGEMENT_HEIGHT_RATIO = 0.75  # largest height of an enlargement over the largest height of the main panel
+_ENLARGEMENT_HEIGHT_RATIO = 0.75  # largest height of an enlargement, relative to that of the main panel
 # Smallest and largest height of a panel, and its margins around the points: left and right, above, below. [px]
 _PLAN, _SIDE = ((210.0, 400.0), (74.0, 66.0, 66.0)), ((130.0, 360.0), (82.0, 52.0, 34.0))
 
@@ -273,7 +273,10 @@ def _platforms_at_scene(view: _View, main: _Panel) -> list[_Platform]:
 
 
 def _enlargement(view: _View, main: _Panel) -> _Panel | None:
-    """Panel below the main panel for platforms close to the scene or to each other; None if it shows no more."""
+    """Panel below the main panel for platforms close to the scene or to each other.
+
+    None if there are none, or if the panel would not separate them or enlarge enough.
+    """
     top = main.frame.bottom + _AXIS_PX[1] + 26
     first, second = view.platforms
     separation = math.dist(first.state.position, second.state.position)
@@ -296,7 +299,7 @@ def _enlargement(view: _View, main: _Panel) -> _Panel | None:
 
 
 def _symbols(view: _View, panels: Sequence[_Panel]) -> Iterator[str]:
-    """Yield sentences that explain the symbols without a label."""
+    """Yield sentences that explain the symbols that have no label."""
     if any(not p.is_still and not _is_end_on(p) for p in view.platforms):
         yield "Arrows at the platforms: direction of flight, not speed."
     if any(_shows_path(panel, p) for panel in panels for p in view.platforms):
@@ -306,7 +309,7 @@ def _symbols(view: _View, panels: Sequence[_Panel]) -> Iterator[str]:
 
 
 def _extent(view: _View, centre: PlanePoint, reach: float) -> list[PlanePoint]:
-    """Outermost points of a circle: four points in the view from above, two at ground level from the side."""
+    """Outermost points of a circle with radius `reach` [m]: four in the view from above, two in the side view."""
     x, y = centre
     ends = [(x - reach, y), (x + reach, y)]
     return [*ends, (x, y - reach), (x, y + reach)] if view.is_plan else ends
@@ -325,7 +328,7 @@ def _fitted(view: _View, points: Sequence[PlanePoint], top: float, height_fracti
     )
     height = min(max(lowest, tall * scale + margin_above + margin_below), highest)
     slack = (height - tall * scale - margin_above - margin_below) / 2 if view.is_plan else 0.0
-    # With unequal margins the middle of the frame is not that of the points; the ground is at the bottom.
+    # The margins are unequal, so the points are not centred. From the side, the lowest point is at the bottom margin.
     low = min(ys) - (margin_below + slack) / scale
     centre = ((max(xs) + min(xs)) / 2, low + height / 2 / scale)
     return _Panel(svg.Box(_AXIS_PX[0], top, _AXIS_PX[0] + width, top + height), centre, scale)
@@ -452,7 +455,7 @@ def _range(view: _View, platform: _Platform) -> str:
 
 
 def _directions(canvas: svg.Canvas, panel: _Panel, view: _View) -> Iterator[svg.DrawnLabel]:
-    """Draw the look direction φ_b, equation (11), and the line across it along which errors smear, equation (31)."""
+    """Draw the look direction φ_b (11) and the smear direction (31) as arrows, and yield their labels."""
     scene, look = panel.pixel(_SCENE_CENTRE), float(view.findings.geometry.look_azimuth)
     tip = _turned(scene, _LOOK_PX, look)
     ends = [_turned(scene, sign * _SMEAR_PX, look + math.pi / 2) for sign in (-1, 1)]

@@ -35,14 +35,14 @@ _FINE_FACTOR, _CUT_FACTOR = 4, 8  # largest interpolation of a picture, and that
 _MAX_PICTURE_PIXELS = 3e5
 _DRAWN_DB = -20.0  # level above which pixels are within the pictures
 _MARGIN_PIXELS = 6  # around these pixels, two resolution cells
-_NEAR_RATIO = 1.0  # distance of a target that is still shown, over the larger side of a picture
-_MAX_READING_ERROR_DB = 0.05  # of an error-free peak, which is read to 1e-4 dB on a regular grid
-_MAX_RESTORED_LOSS_DB = 1.0  # of a focused peak, which is usually a fraction of it below the error-free peak
-_MAX_EQUAL_SCALE_RATIO = 8.0  # of the sides of an image with equal scales on both axes
+_NEAR_RATIO = 1.0  # largest distance of a target that is shown, relative to the longer side of the image
+_MAX_READING_ERROR_DB = 0.05  # larger errors of the error-free peak get a remark; a regular grid gives 1e-4 dB
+_MAX_RESTORED_LOSS_DB = 1.0  # a larger peak loss after autofocus gets a remark; it is usually much smaller
+_MAX_EQUAL_SCALE_RATIO = 8.0  # ratio of the sides up to which an image has equal scales on both axes
 _MARK_COLOR, _GRID_COLOR = "#c1502e", "#dddddd"
 _NOT_FORMED_COLOR = "#3a3a3a"  # of a panel beside a narrow patch
 _TARGET_COLOR, _PREDICTION_COLOR, _PEAK_COLOR = "#5fd3f3", "#7CFC9A", "#f5f0a0"
-_PEAK_APART_PIXELS = 2  # distance across from which the position by (25) is apart from the peak
+_PEAK_APART_PIXELS = 2  # cross-range distance from which the position by (25) counts as apart from the peak
 _CUT_SIZE_PX = (300.0, 170.0)  # width of the drawing of the cuts, and height of its frame
 
 Limits = tuple[float, float, float, float]
@@ -111,7 +111,7 @@ def sheet(images: PointImages) -> Sheet:
     """Compute the numbers of all figures from the images of a mission."""
     peak = float(np.abs(images.error_free).max())
     cosine, sine = math.cos(images.look_azimuth), math.sin(images.look_azimuth)
-    turn = np.array([[cosine, -sine], [sine, cosine]])  # (10), from the right
+    turn = np.array([[cosine, -sine], [sine, cosine]])  # rotation (10), applied from the right
     true = np.array([[target.east, target.north] for target in images.targets.points])
     middle = len(images.points) // 2
     predicted = images.points[middle] - np.asarray(images.effect.displacement)  # against exact ranges
@@ -209,7 +209,7 @@ def _decibels(samples: Complexes, peak: float) -> Floats:
 
 
 def _cuts_of(images: PointImages, turned: Floats, region: tuple[slice, slice], peak: float) -> tuple[Curve, ...]:
-    """Cross-range cuts through the peaks, with levels along y′."""
+    """Cross-range cuts through the peaks: levels [dB] at positions along y′ [m]."""
     columns = np.arange(region[1].start * _CUT_FACTOR, (region[1].stop - 1) * _CUT_FACTOR + 1)
     cuts = []
     shown = (
@@ -236,7 +236,7 @@ MarkStyle = dict[str, Any]
 
 
 def figure(drawn: Sheet, title: str) -> "Figure":
-    """Lay all panels on one Matplotlib figure."""
+    """Arrange all panels on one Matplotlib figure."""
     page = new_figure(figsize=(16.5, 8))
     panels = page.subplots(2, 4)
     for name, panel in zip(("fig3", "fig4", "fig5", "cuts", "fig6", "fig7", "fig7_back"), panels.flat, strict=False):

@@ -1,4 +1,7 @@
-"""Draw the share of each error in the limits of rows as stacked bars. The errors are numbered as in the sheet."""
+"""Draw the shares of the errors in the limits of rows as stacked bars.
+
+The errors have the numbers of the specification sheet.
+"""
 
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
@@ -10,7 +13,7 @@ _SHARES_WIDTH_PX = 860.0  # of the drawing
 _NAMES_PX, _SHARES_EDGE_PX = 250.0, 16.0  # beside the bars: for the names of rows, and at the right
 _SHARES_ROW_PX, _BAR_PX = 34.0, 20.0  # height of a row, and of its bar
 _MIN_NUMBERED_PX = 13.0  # width of a segment with room for a number
-LEAST_WEIGHT_FRACTION = 1e-4  # multiplier, as a fraction of the weights, from which a row limits a specification
+LEAST_WEIGHT_FRACTION = 1e-4  # a row with a smaller multiplier, relative to the weights, is not limiting
 _TONE_COUNT = 5
 _SHARES_STYLE = (
     "svg.drawing .fixed{fill:var(--muted,#595f66)}"

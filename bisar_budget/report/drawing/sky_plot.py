@@ -20,7 +20,7 @@ _DIRECTION_NAMES_PX = 34.0  # margin for the names of directions
 _SKY_GAP_PX = 78.0  # between the sky and the axes of the resolution
 _SKY_RIGHT_PX = 24.0  # margin beside the axes, for half a date
 _ARROW_HEAD_PX = 7.0
-_MIN_THIN_COUNT, _THIN_PX, _BROAD_PX = 20, 1.3, 2.0  # tracks above which lines are thin; widths of lines
+_MIN_THIN_COUNT, _THIN_PX, _BROAD_PX = 20, 1.3, 2.0  # number of tracks from which lines are thin, and widths of lines
 _MAX_NUMBERED_COUNT = 40  # passes with numbers
 _HOUR_S = 3600.0
 _DATE_STEPS_HOURS = (1, 2, 3, 6, 12, 24, 48, 120, 240, 480, 1200, 2400)
@@ -61,7 +61,7 @@ def sky_plot(passes: Passes, title: str, verdict: str) -> str:
 
 
 def _style(statuses: Sequence[str], width: float) -> str:
-    """CSS rules of drawings of passes."""
+    """CSS rules for a drawing of passes; `width` is the line width of a track [px]."""
     light, _ = svg.colours()
     rules = [
         f".track{{fill:none;stroke-width:{width};stroke-linecap:round}}",
@@ -189,7 +189,7 @@ def _resolutions(canvas: svg.Canvas, frame: svg.Box, passes: Passes) -> None:
 
 
 def _sizes(overpass: SatellitePass) -> tuple[float, float] | None:
-    """Range and cross-range resolution; None without an image."""
+    """Range and cross-range resolution [m]; None for a pass without an image."""
     range_resolution, cross_range_resolution = overpass.range_resolution, overpass.cross_range_resolution
     if (
         range_resolution is None

@@ -57,20 +57,20 @@ _MARGIN_PX = 2.0  # around a label
 
 @dataclass(frozen=True)
 class _LabelCosts:
-    """Costs of a label position, in units of covered area. [px²]
+    """Costs of a label position. Their unit is that of a covered area. [px²]
 
     Attributes
     ----------
     outside : float
-        For a position that leaves its box.
+        Cost of a position that leaves the box of the label.
     covered : float
-        For each obstacle that it covers, in addition to the covered area.
+        Cost of each obstacle that the label covers, in addition to the covered area.
     crossed_per_px : float
-        For the length of a line that it covers.
+        Cost of each pixel of a line that the label covers.
     distance_per_px : float
-        For the distance between the label and its point.
+        Cost of each pixel between the label and its point.
     direction : float
-        For each step in the order of directions.
+        Cost of each step in the order of preferred directions.
     """
 
     outside: float = 1e4
@@ -91,7 +91,7 @@ _LABEL_GAPS_PX = (8.0, 15.0, 24.0, 36.0, 52.0)  # from the point to the label
 
 
 class Box(NamedTuple):
-    """A rectangle. [px]"""
+    """A rectangle on the page, given by its edges [px]."""
 
     left: float
     top: float
@@ -218,7 +218,7 @@ class Canvas:
             self.polygon([end, *sides], f"solid {colour}".rstrip(), is_obstacle=False)
 
     def text(self, at: Point, lines: Sequence[str], style: str = "", anchor: str = "start") -> None:
-        """Write lines of text. `at` is on the baseline of the first line, which is a name if there are more lines."""
+        """Write lines of text, beginning at `at`, on the baseline. The first of several lines is styled as a name."""
         x, y = at
         spans = []
         for index, line in enumerate(lines):
@@ -315,7 +315,7 @@ def text_width(line: str) -> float:
 def _positions(at: Point, width: float, height: float) -> Iterator["_LabelPosition"]:
     """Yield possible positions of a label around a point, with costs.
 
-    The cost grows with the distance from the point, and from direction to direction in a fixed order.
+    The cost grows with the distance from the point, and with the place of the direction in the order of preference.
     """
     for gap in _LABEL_GAPS_PX:
         for order, (x, y) in enumerate(_DIRECTIONS):
@@ -390,7 +390,7 @@ _MIN_AXIS_STEP_SIZE = 1e-9  # smallest step of an axis, if all values are equal
 _NUMBER_ROOM_PX = {"x": 46.0, "y": 26.0}  # space for a number at an axis
 _LEGEND_INDENT_PX = 18.0
 _LEGEND_CHARACTERS = 76  # of a line of a legend
-_SMALL_FONT_RATIO = 0.9  # width of a text in the font of a legend over its usual width
+_SMALL_FONT_RATIO = 0.9  # width of a text in the font of a legend, relative to its usual width
 
 
 def axis_number(value: float) -> str:
@@ -501,19 +501,19 @@ def grid(canvas: Canvas, frame: Box, across: Scale | None, up: Scale | None) -> 
 
 
 class LegendLine(NamedTuple):
-    """An entry of a legend: its text, and a function that draws its 25 px wide mark from a left middle point."""
+    """An entry of a legend: its text, and a function that draws its mark, 25 px wide, to the right of a point."""
 
     words: str
     mark: Callable[[Point], None]
 
 
 def line_entry(canvas: Canvas, words: str, style: str) -> LegendLine:
-    """Legend entry for a line of a style."""
+    """Legend entry for a line that is drawn in `style`."""
     return LegendLine(words, lambda at: canvas.lines([(at, (at[0] + 25, at[1]))], style))
 
 
 def circle_entry(canvas: Canvas, words: str, radius: float, style: str) -> LegendLine:
-    """Legend entry for a circle of a style; `radius` is in px."""
+    """Legend entry for a circle that is drawn in `style`; `radius` is in px."""
     return LegendLine(words, lambda at: canvas.circle((at[0] + 13, at[1]), radius, style))
 
 
@@ -543,7 +543,7 @@ def legend(canvas: Canvas, top: float, width: float, entries: Sequence[LegendLin
     return y + 6
 
 
-EMPTY_TONE = "reserve"  # colour of a case without a mission
+EMPTY_TONE = "reserve"  # colour of a case without a valid mission
 
 
 @cache
@@ -564,7 +564,7 @@ def style_sheet(rules: Iterable[str], tones: Iterable[str]) -> str:
 
 
 def has_no_mission(status: str) -> bool:
-    """Whether a status means that there was no mission to check."""
+    """Whether a status means that a case has no valid mission to check."""
     return STATUS[status].junit == "error"
 
 

@@ -11,7 +11,7 @@ from bisar_budget.report.words.sentences import percent
 MAX_BAR_COUNT = 20
 _TORNADO_WIDTH_PX, _TORNADO_EDGE_PX = 860.0, 12.0  # width of the drawing, and of the margin at its right
 _MAX_NAME_WIDTH_PX = 580.0  # of the names of numbers
-_BOLD_RATIO = 0.86  # width of a plain text over the width of the bold text
+_BOLD_RATIO = 0.86  # width of a plain text, relative to the same text in bold
 _TORNADO_ROW_PX, _HALF_BAR_PX = 22.0, 8.0  # height of a row, and half the height of its bar
 _TORNADO_STYLE = (
     "svg.drawing .worse{fill:var(--receiver,#a8471a)}svg.drawing .better{fill:var(--transmitter,#1f5fa8)}"
@@ -77,7 +77,7 @@ def _label(slope: Slope) -> str:
 
 
 def _even(slope: Slope) -> str:
-    """Text of the change in the number that its bar shows."""
+    """Text of the change in a number, of which its bar shows the effect."""
     if slope.measure == COMPARED_CHANGE_FRACTION:
         return slope.per_text
     size, _, unit = slope.per_text.partition(" ")

@@ -62,7 +62,7 @@ def trade_drawing(
     trade : Trade
         Sweep over one key or two. The first axis of a polar map is the azimuth.
     rows : Mapping[str, ndarray]
-        Utilizations of the rows that matter, over the only key that varies. [-]
+        Utilizations of the rows that are the worst row in some case, (cases,) each, if only one key varies. [-]
     key : str
         Key that makes the ids of the drawing unique.
     title, description : str
@@ -98,7 +98,7 @@ def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
 
 
 def _style(trade: Trade) -> str:
-    """CSS rules of drawings of sweeps."""
+    """CSS rules for a drawing of a sweep."""
     light, _ = svg.colours()
     rules = []
     for index, (name, dashes) in enumerate(zip(_CURVE_COLOURS, _CURVE_DASHES, strict=True)):
@@ -138,7 +138,7 @@ def _heat_colour(fraction: float) -> str:
 
 
 def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> svg.Scale:
-    """Axis scale for a column. For utilizations [%] it is logarithmic, and includes 100 % and a decade below."""
+    """Axis scale for the values of a column. For utilizations [%] it is logarithmic and includes 10 % and 100 %."""
     finite = values[np.isfinite(values)]
     if is_use:
         finite = np.append(finite[finite > 0], 100.0)
@@ -379,7 +379,10 @@ def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[fl
 
 
 def _limit(trade: Trade, plane: _Plane) -> list[tuple[svg.Point, svg.Point]]:
-    """Contour line of a utilization of 100 %. It is interpolated in the logarithm, which is less curved."""
+    """Contour line where the utilization is 100 %.
+
+    It is interpolated in the logarithm of the utilization, which is less curved than the utilization.
+    """
     uses = np.asarray(trade.values["utilization"], float)
     # With a row that is not evaluated, the other rows do not determine the distance to the limit.
     unknown = [name for name in trade.statuses if not STATUS[name].is_held]

@@ -30,8 +30,8 @@ def check_plot(cases: Cases, *, is_polar: bool) -> None:
     Raises
     ------
     QuestionError
-        The sweep is not a grid, does not vary one or two keys, or has too many cases; or a polar map has no azimuth
-        or no number from 0 for its radius.
+        The sweep is not a grid, does not vary one or two keys, or has too many cases. A polar map has no azimuth, or
+        its other key is not a number or has negative values.
     """
     accepted = "accepted: --vary of one key, or of two"
     if not cases.is_grid:
@@ -54,7 +54,7 @@ def check_plot(cases: Cases, *, is_polar: bool) -> None:
 
 
 def varying_keys(cases: Cases) -> list[Varied]:
-    """Keys of a sweep with more than one value."""
+    """Keys that have more than one value in a sweep."""
     return [varied for varied, size in zip(cases.varied, cases.shape, strict=True) if size > 1]
 
 
@@ -124,7 +124,7 @@ class Gathered:
 
 
 def _is_log(values: Floats) -> bool:
-    """Whether an axis is logarithmic: its values span a large factor, and are closer to equal ratios than steps."""
+    """Whether an axis is logarithmic: its values span a large factor, and their ratios vary less than their steps."""
     if values[0] <= 0 or values[-1] / values[0] < _LOG_SPAN_RATIO or values.size < 3:
         return False
     steps, ratios = np.diff(values), np.diff(np.log(values))
@@ -203,7 +203,7 @@ class MapRegion(NamedTuple):
 
 
 def thinned(trade: Trade) -> Trade:
-    """Reduce a sweep over two keys to as many values as a drawing can show. The first and last values are kept."""
+    """Reduce a sweep over two keys to at most `_MAX_MAP_CELLS` numbers per axis. The first and last ones are kept."""
     picks = [
         np.arange(size)
         if axis.words

@@ -680,7 +680,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
     effect = error.effect(model)
     limited = held_effect(mission, effect, error.coverage(mission), allocation.autofocus_gain)
     limit = allocation.qpe_allowed(error.owner)
-    if error.is_covered:  # an effect from elsewhere has no quadratic phase here
+    if error.is_covered:  # an error stated by its effect on the image has no quadratic phase
         yield from limit_steps(allocation, error.owner, limit)
     sizes: dict[str, float] = {}
     required = mission.requirements
@@ -733,7 +733,7 @@ def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, limi
     """
     k, factor = _covered(mission, error), float(error.coverage(mission))
     values = {"cubic/unit": effect.cubic, "left/unit": effect.spread * k, "k": factor}
-    # The remainder is shown for one sigma, the cubic phase with the coverage factor of the declared value or without.
+    # The residual is per sigma; the cubic phase contains the coverage factor unless the declared value does.
     formula = "4*(cubic/unit)^2/175" if k == factor else "4*(cubic/unit/k)^2/175"
     formula = f"sqrt((left/unit)^2 + {formula})" if effect.spread else f"sqrt({formula})"
     worked = WorkedEquation(

@@ -95,7 +95,7 @@ def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iter
 def _tones_and_cubic(
     analysis: Analysis, allocation: Allocation, owner: str, model: str, members: Mapping[str, float]
 ) -> Iterator[Step]:
-    """Yield the steps to the spread power of tones and of the cubic phase, if no own requirement judges these."""
+    """Yield the steps to the spread power of tones and of the cubic phase, unless these have requirements."""
     powers = [
         Sum(f"{tone.subject.id} = {number(tone.phase)}^2/2 = {with_unit(members[tone.subject.id], 'rad²')}")
         for tone in tones(analysis.mission)

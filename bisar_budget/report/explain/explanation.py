@@ -77,7 +77,7 @@ from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, numb
 from bisar_budget.report.words.requirements import requirement_finding, requirement_id
 from bisar_budget.report.words.sentences import own_id, percent, row_limit, row_size, wrapped
 
-_CONTINUATION_COLUMNS = 3  # further indent of a broken equation, at which no equals sign can be
+_CONTINUATION_COLUMNS = 3  # additional indent of continued lines, at which no equals sign is expected
 _MAX_UNIT_CHARACTERS = 16  # of a unit after a number
 
 
@@ -113,7 +113,7 @@ def _text(mission: Mission, title: str, body: Iterable[str]) -> str:
 
 
 def _fitted(line: str) -> list[str]:
-    """Wrap a line. The next lines of an equation are indented more; `=`, result and unit stay on one line."""
+    """Wrap a line. Continued lines are indented more. An `=` stays with the next word, a unit with its number."""
     start = len(line) - len(line.lstrip())
     if not start:
         return wrapped(line, "  ")
@@ -371,7 +371,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
 def _limit(
     model: str, formula: str, values: Mapping[str, float], result: float, *, is_power: bool
 ) -> Iterator[WorkedEquation]:
-    """Yield the equations for the limit of a vibration amplitude by a model. [m]
+    """Yield the equations for the limit of a vibration amplitude [m] by a model.
 
     With `is_power` the formula gives an rms value, and a second equation multiplies it by √2.
     """
@@ -419,7 +419,7 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, tone: Sl
 
 
 def _of_axes(symbol: str, phases: Sequence[Floats]) -> Sum:
-    """Text of the sum of the phases of all axes, in radians."""
+    """Text of the sum of the `phases` of all axes [rad], with `symbol` for the sum."""
     numbers = [phase.item() for phase in phases]
     return Sum(f"{symbol} = {' + '.join(map(number, numbers))} = {with_unit(math.fsum(numbers), 'rad')}")
 

@@ -141,7 +141,7 @@ _HEADS = (
     ("doubt", "", ">"),
     ("use", "", ">"),
 )
-_WAIVERS = ("waived by", "", "<")  # a column where any pass is waived
+_WAIVERS = ("waived by", "", "<")  # column that is shown only if a pass is waived
 
 
 def as_text(passes: Passes, style: Style) -> str:
@@ -179,7 +179,7 @@ def verdict(passes: Passes) -> str:
 def _counted(passes: Passes) -> Iterator[str]:
     """Yield texts with the number of passes for each status.
 
-    If no pass is unevaluated or without a mission, this number is left out.
+    The numbers of passes that are not evaluated, or have no valid mission, are left out if they are zero.
     """
     counts = passes.counts
     count = len(passes.found)

@@ -196,7 +196,7 @@ def _broken_words(row: Broken) -> list[str]:
 
 
 def _way_out(sheet: SpecificationSheet) -> str:
-    """Sentence on how to get room for the specified errors if the other errors leave none."""
+    """Sentence with the remedy if the other errors leave no room for the specified errors."""
     used = [math.inf if row.used is None else row.used for row in sheet.broken]
     room_fraction = 1 - max(used) / (1 - MIN_ROOM_FRACTION)
     permille = math.ceil(1e3 * room_fraction) - 1 if room_fraction > 0 else -1  # strictly less than the room
@@ -221,7 +221,7 @@ def _remarks(sheet: SpecificationSheet) -> Iterator[str]:
 
 
 def _side(figure: OfferedFigure) -> str:
-    """Text that says whether an offered figure is inside its specification, or why it cannot be compared."""
+    """Text about an offered figure: whether it is inside its specification, or why it cannot be compared."""
     if figure.is_inside is None:
         return figure.remark
     return "inside" if figure.is_inside else "OUTSIDE"

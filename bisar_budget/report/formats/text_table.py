@@ -238,7 +238,10 @@ def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
 
 
 def _limited_by(row: Row) -> str:
-    """Text that names the requirement that binds a row if it is not its own, otherwise the equation."""
+    """Text about the limit of a row for a table column.
+
+    It is the name of the requirement that sets the allowable, or the equation if this is the row's own metric.
+    """
     binding = binding_words(row)
     if binding:
         return binding if row.binding_requirement == END_OF_IMAGE else binding.split()[0]
