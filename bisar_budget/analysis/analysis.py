@@ -229,7 +229,7 @@ class Case:
     @cached_property
     def geometry(self) -> BistaticGeometry:
         """Geometry of this case."""
-        return self.mission.geometry
+        return self.analysis.geometry if self.analysis.is_by_itself else self.mission.geometry
 
     @cached_property
     def resolution(self) -> Resolution:

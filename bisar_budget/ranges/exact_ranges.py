@@ -481,6 +481,10 @@ class ExactRanges:
             for track, ranges in zip(self.tracks, self.ranges, strict=True):
                 looks = np.stack(np.broadcast_arrays(*(component / ranges for component in track)))
                 looks = np.concatenate((looks, self.sampling.to_ends @ looks), axis=1)
+                middle = looks[:, len(self.fit[0]) // 2]
+                # Within half the angle of one line of sight, no two are a whole angle apart: no pair is compared.
+                if (np.einsum("an,amn->mn", middle, looks) > math.cos(MAX_TURN_RAD / 2)).all():
+                    continue
                 for later in looks.swapaxes(0, 1):
                     least = np.minimum(least, np.einsum("an,amn->mn", later, looks).min(axis=0))
         return np.asarray(least < math.cos(MAX_TURN_RAD))
