@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis.allocation import Allocation, allocate, autofocus_gain_of
 from bisar_budget.analysis.peak_loss import peak_loss_db
-from bisar_budget.analysis.spread import Tone, tones
+from bisar_budget.analysis.spread import SpreadPhase, Tone, rests, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.tone_displacement import ToneDisplacement, tone_displacements
 from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
@@ -92,6 +92,7 @@ class Analysis:
         self.is_by_itself, self.is_complete = geometry is None, is_complete
         self.geometry = mission.geometry if geometry is None else geometry
         self._together: dict[str, Together] = {}
+        self._rests: dict[str, list[SpreadPhase]] = {}
 
     @cached_property
     def exact(self) -> ExactRanges:
@@ -163,6 +164,12 @@ class Analysis:
                 self.errors, model, self.slow, self.displacing_tones, self.random, self.groups
             )
         return self._together[model]
+
+    def rests(self, model: str) -> list[SpreadPhase]:
+        """Phases beyond the cubic in a model; see `spread.rests`."""
+        if model not in self._rests:
+            self._rests[model] = rests(self, model)
+        return self._rests[model]
 
     @cached_property
     def stated(self) -> list[ErrorSource]:

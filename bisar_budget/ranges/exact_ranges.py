@@ -44,7 +44,7 @@ from bisar_budget import image_plane
 from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.geometry import GroundVector, PlatformState, VectorArrays, Vectors, dot, norm
-from bisar_budget.image_plane import FEWEST_PATH_NODES, LEGENDRE_LEADING, GroundMatrix, Sampling, band_variance, nodes
+from bisar_budget.image_plane import FEWEST_PATH_NODES, GroundMatrix, Sampling, band_variance, nodes
 
 if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
@@ -670,13 +670,8 @@ class ExactRanges:
 
     def mean_squares(self, remaining: Floats, orders: Floats) -> tuple[Floats, Floats]:
         """Mean square of the range errors left at the nodes, and mean square of their part beyond order 3. [m²]"""
-        beyond = remaining - self._legendre @ orders
+        beyond = remaining - self.sampling.polynomials @ orders
         return self.fit[0] @ (remaining * remaining), self.fit[0] @ (beyond * beyond)
-
-    @cached_property
-    def _legendre(self) -> Floats:
-        """Legendre polynomials P₀ to P₃ at the nodes, each divided by its leading coefficient, (nodes, 4)."""
-        return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEGENDRE_LEADING)
 
     # ------------------------------------------------------------------ errors of any size
     def phases(
@@ -949,6 +944,11 @@ class _GroundView:
         The matrix H.
     determinant : (lanes,)
         Determinant of H.
+    node_weights : (nodes, lanes)
+        Weights at the nodes that give the scalar product ⟨a, ρ⟩ of V for a history a: the sum of the weights times a
+        over the nodes is the scalar product with the range error ρ at the point.
+    bends : three of (lanes,)
+        Half the second derivatives of V at the points: east-east, east-north, north-north.
     """
 
     def __init__(self, seen: Floats, looks: Floats, distances: Floats, centred: Floats, weights: Floats) -> None:
@@ -960,27 +960,16 @@ class _GroundView:
         self.slope, self.matrix = products[:, 0], products[:, 1:]
         (xx, xy), (_, yy) = self.matrix
         self.determinant = xx * yy - xy * xy
+        self.node_weights = centred.T @ self._weighted[0]
+        bends = self.node_weights / distances
+        turned, total = np.einsum("apnc,bpnc->abc", looks * bends, looks), bends.sum(axis=(0, 1))
+        (xx, xy), (_, yy) = self.matrix + turned
+        self.bends = xx - total, xy, yy - total
 
     @property
     def variance(self) -> Floats:
         """Value of V at the points, (lanes,). [m²]"""
         return np.asarray(np.einsum("nc,nc->c", self._weighted[0], self._parts[0]))
-
-    @cached_property
-    def node_weights(self) -> Floats:
-        """Weights at the nodes that give the scalar product ⟨a, ρ⟩ of V for a history a, (nodes, lanes).
-
-        The sum of the weights times a over the nodes is the scalar product with the range error ρ at the point.
-        """
-        return np.asarray(self._centred.T @ self._weighted[0])
-
-    @cached_property
-    def bends(self) -> tuple[Floats, Floats, Floats]:
-        """Half the second derivatives of V at the points: east-east, east-north, north-north, (lanes,) each."""
-        bends = self.node_weights / self.distances
-        turned, total = np.einsum("apnc,bpnc->abc", self.looks * bends, self.looks), bends.sum(axis=(0, 1))
-        (xx, xy), (_, yy) = self.matrix + turned
-        return xx - total, xy, yy - total
 
     def products(self, values: Floats) -> Floats:
         """Scalar products ⟨g, a⟩ of V, (2, lanes), for histories a at the nodes.
