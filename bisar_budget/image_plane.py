@@ -73,6 +73,11 @@ class Sampling:
         return np.concatenate((np.eye(self.places.size) - self.fit[0], self.fit[:1]))
 
     @cached_property
+    def polynomials(self) -> Floats:
+        """Legendre polynomials P₀ to P₃ at the samples, each divided by its leading coefficient, (samples, 4)."""
+        return np.asarray(np.polynomial.legendre.legvander(self.places, 3) / LEGENDRE_LEADING)
+
+    @cached_property
     def to_ends(self) -> Floats:
         """Weights (2, samples) that extrapolate a smooth history from the samples to both ends of the aperture."""
         return self._weights_at(np.array((-1.0, 1.0)))

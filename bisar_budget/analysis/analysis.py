@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis.allocation import Allocation, allocate, autofocus_gain_of
 from bisar_budget.analysis.peak_loss import peak_loss_db
-from bisar_budget.analysis.spread import Tone, tones
+from bisar_budget.analysis.spread import SpreadPhase, Tone, rests, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.tone_displacement import ToneDisplacement, tone_displacements
 from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
@@ -92,6 +92,7 @@ class Analysis:
         self.is_by_itself, self.is_complete = geometry is None, is_complete
         self.geometry = mission.geometry if geometry is None else geometry
         self._together: dict[str, Together] = {}
+        self._rests: dict[str, list[SpreadPhase]] = {}
 
     @cached_property
     def exact(self) -> ExactRanges:
@@ -165,6 +166,12 @@ class Analysis:
             )
         return self._together[model]
 
+    def rests(self, model: str) -> list[SpreadPhase]:
+        """Phases beyond the cubic in a model; see `spread.rests`."""
+        if model not in self._rests:
+            self._rests[model] = rests(self, model)
+        return self._rests[model]
+
     @cached_property
     def stated(self) -> list[ErrorSource]:
         """Declared errors along the axes in which the file states them."""
@@ -230,7 +237,7 @@ class Case:
     @cached_property
     def geometry(self) -> BistaticGeometry:
         """Geometry of this case."""
-        return self.mission.geometry
+        return self.analysis.geometry if self.analysis.is_by_itself else self.mission.geometry
 
     @cached_property
     def resolution(self) -> Resolution:

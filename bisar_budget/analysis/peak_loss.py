@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bisar_budget.analysis.spread import CUBIC_POWER, noise, rests
+from bisar_budget.analysis.spread import CUBIC_POWER, noise
 from bisar_budget.arrays import Floats
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.declared import DeclaredErrors
@@ -44,7 +44,7 @@ def peak_loss_db(analysis: "Analysis") -> Floats:
             cubic = 0.0 if phase.cubic_rad is None else np.where(errors.exact.is_turned, 0.0, phase.cubic_rad)
             variance = (phase.judged(1.0) / QUADRATIC_OF_VARIANCE) ** 2 + CUBIC_POWER * cubic**2
             variances[phase.row_id] = errors.array(variance)
-    for spread in (*noise(analysis, "full"), *rests(analysis, "full")):
+    for spread in (*noise(analysis, "full"), *analysis.rests("full")):
         if spread.row_id not in of_motion:
             variances[spread.row_id] = variances.get(spread.row_id, 0.0) + np.nan_to_num(
                 errors.array(spread.variance)

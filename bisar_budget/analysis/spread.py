@@ -241,7 +241,7 @@ def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str)
     has no image. A variance [rad²] is NaN in cases that do not have the phase.
     """
     mission, split, together = analysis.mission, analysis.allocation.islr, analysis.together(model)
-    spreads = noise(analysis, model) + rests(analysis, model)
+    spreads = noise(analysis, model) + analysis.rests(model)
     if mission.requirements.pslr is None:
         for spread in analysis.tones:
             variance = np.where(spread.is_there, spread.phase**2 / 2, math.nan)[()]

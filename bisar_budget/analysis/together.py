@@ -197,9 +197,9 @@ class Together:
         over all errors is one further entry. Under the other rules, each error has the sign that moves the image
         farther.
         """
-        does = {error.subject.id: self.errors.does(self.model, error) for error in self.motion}
         if rule != "sum":
-            return [(row_id, effect.farthest) for row_id, effect in does.items()]
+            return [(error.subject.id, self.errors.farthest(self.model, error)) for error in self.motion]
+        does = {error.subject.id: self.errors.does(self.model, error) for error in self.motion}
         ahead, back = (
             np.array([getattr(effect, side) for effect in does.values()]).reshape(-1, 2, self.errors.cases)
             for side in ("displacement", "opposite")

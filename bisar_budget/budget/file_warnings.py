@@ -135,16 +135,17 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
     """
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
-        speed, axes = float(norm(platform.state.velocity)), mission.scene.axes
-        is_in_space = speed > _MIN_ORBIT_SPEED_MPS and platform.state.position[2] > LEAST_FALLING_HEIGHT_M
-        if not (speed > MAX_FLIGHT_SPEED_MPS or (is_in_space and platform.state.fall is None)):
-            continue
         if platform.acceleration is not None or platform.is_of_the_earth:
+            continue
+        state, axes = platform.state, mission.scene.axes
+        speed = float(norm(state.velocity))
+        is_in_space = speed > _MIN_ORBIT_SPEED_MPS and state.position[2] > LEAST_FALLING_HEIGHT_M
+        if not (speed > MAX_FLIGHT_SPEED_MPS or (is_in_space and state.fall is None)):
             continue
         key = ("platforms", name, "speed" if platform.velocity is None else "velocity")
         from bisar_budget.paths.earth import free_fall  # the import takes 8 ms and most missions do not need it
 
-        acceleration = free_fall(plain_vector(platform.state.position), plain_vector(platform.state.velocity), axes)
+        acceleration = free_fall(plain_vector(state.position), plain_vector(state.velocity), axes)
         yield _Warned(
             key, phrases.satellite_flies_straight(name, speed, acceleration, axes is not None), is_doubt=True
         )

@@ -70,7 +70,7 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
     for kind in _MOTION_KINDS:
         units = np.array(
             [
-                [np.broadcast_to(effect.qpe, (len(sides),)) for effect in listing.legs(place, kind)[1]]
+                [np.broadcast_to(effect.qpe, (len(sides),)) for effect in listing.full_legs(place, kind)]
                 for place in range(len(PLATFORMS))
             ]
         )  # (platforms, axes, sides)

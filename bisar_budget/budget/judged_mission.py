@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
-from bisar_budget.analysis.spread import noise, rests
+from bisar_budget.analysis.spread import noise
 from bisar_budget.arrays import Booleans, Floats, PerCaseFlag
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations, swings_nothing
@@ -297,7 +297,7 @@ class _Judgement:
         level = negligible_rad(self.mission)
         has_any = [~np.isnan(array(phase.variance)) for model in gates for phase in noise(self.analysis, model)]
         has_any += [
-            np.sqrt(array(phase.variance)) >= level for model in gates for phase in rests(self.analysis, model)
+            np.sqrt(array(phase.variance)) >= level for model in gates for phase in self.analysis.rests(model)
         ]
         if self.mission.requirements.pslr is None:
             has_any += [np.broadcast_to(phase.is_there, (self.cases,)) for phase in self.analysis.tones]
@@ -465,12 +465,10 @@ class RowStatuses:
 
     def rows_with(self, status: Codes) -> tuple[Judged, ...]:
         """Return the rows with the given statuses (rows, cases). A row that has become `info` has no utilization."""
-        rows = []
-        for row, code, why in zip(self.rows, status, self.why, strict=True):
-            is_info = (code == CODE["info"]) & (row.status != code)
-            use = np.where(is_info, np.nan, row.utilization) if is_info.any() else row.utilization
-            rows.append(row._replace(status=code, why=why, utilization=use))
-        return tuple(rows)
+        becomes_info = (status == CODE["info"]) & (np.array([row.status for row in self.rows]) != status)
+        utilizations = np.where(becomes_info, np.nan, np.array([row.utilization for row in self.rows]))
+        changes = zip(self.rows, status, self.why, utilizations, strict=True)
+        return tuple(row._replace(status=code, why=why, utilization=use) for row, code, why, use in changes)
 
 
 def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None = None) -> list[Judged]:

@@ -123,7 +123,8 @@ class Judged(NamedTuple):
 
     def at(self, row_index: int, row_subject: Subject) -> "Judged":
         """Extract one row, at `row_index`, from several rows that were judged together as arrays (rows, cases)."""
-        return self._of_columns(lambda column: column[row_index], _ARRAY_FIELDS)._replace(subject=row_subject)
+        columns = {name: getattr(self, name)[row_index] for name in _ARRAY_FIELDS}
+        return self._replace(subject=row_subject, **columns)
 
     def where(self, takes_other: PerCaseFlag, other: "Judged") -> "Judged":
         """Return this row with the values of `other` in the cases where `takes_other` is true."""

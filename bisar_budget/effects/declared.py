@@ -619,6 +619,7 @@ class DeclaredErrors:
         self.blocks = [ErrorBlock(self, self.listed[start : start + size]) for start in starts]
         self._place = {error.id: divmod(place, size) for place, error in enumerate(self.listed)}
         self._does: dict[tuple[str, int], Declared] = {}
+        self._farthest: dict[tuple[str, int], tuple[Floats, Floats]] = {}
 
     def array(self, value: PerCase | PerCaseFlag | None) -> Floats:
         """Array with one number for each case, (cases,)."""
@@ -714,6 +715,18 @@ class DeclaredErrors:
         if key not in self._does:
             self._does[key] = self.blocks[block].does(model, self.blocks[block].declared)
         return self._does[key]
+
+    def farthest(self, model: str, error: ErrorSource) -> tuple[Floats, Floats]:
+        """Displacement by a declared error for the sign that moves the image farther, (cases,) each. [m]
+
+        See `Declared.farthest`, which is computed for all errors of a block at once.
+        """
+        block, index = self._place[error.id]
+        key = (model, block)
+        if key not in self._farthest:
+            self._farthest[key] = self.of_block(model, block).farthest
+        east, north = self._farthest[key]
+        return east[index], north[index]
 
     def is_large(self, error: ErrorSource) -> Booleans:
         """Cases in which the effects of a declared error may not be proportional to its size."""

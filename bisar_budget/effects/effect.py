@@ -66,6 +66,7 @@ def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: 
 
 
 PLATFORMS = ("transmitter", "receiver")
+_PLATFORMS_OF = {name: (index,) for index, name in enumerate(PLATFORMS)}  # indices by owner of an error
 MOTION_UNITS = dict(zip(MOTION, ("m", "m/s", "m/s^2"), strict=True))
 CLOCK_UNITS = {"constant": "s", "linear": "s/s", "quadratic": "1/s", "cubic": "1/s^2"}  # t̃₀ … t̃₃ of (1)
 NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of an error that is no motion
@@ -245,8 +246,7 @@ class ErrorSource(NamedTuple):
 
         An error of the mission is in the positions of both platforms.
         """
-        owners = (self.owner,) if self.owner in PLATFORMS else PLATFORMS
-        return tuple(map(PLATFORMS.index, owners)) if self.is_position else ()
+        return _PLATFORMS_OF.get(self.owner, (0, 1)) if self.is_position else ()
 
     @property
     def is_common(self) -> bool:

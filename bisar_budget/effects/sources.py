@@ -4,9 +4,9 @@ A check lists all errors, including those that the file does not declare, becaus
 allowable sizes. A sweep lists only the declared errors, and the errors whose rows are requested.
 """
 
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -71,6 +71,18 @@ def distribution_of(mission: Mission, source: ErrorSource) -> str:
 _published_motion: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.published_motion
 
 
+class _Flown(NamedTuple):
+    """One unit of an error whose platforms are in free fall.
+
+    `full` is the effect per unit of a small error. `shifts` are the motions of both platforms at the nodes,
+    (nodes, cases). [m] `rates` are the velocities at mid-aperture of a position error in `ric`, otherwise None. [m/s]
+    """
+
+    full: FullEffect
+    shifts: tuple[VectorArrays, VectorArrays]
+    rates: tuple[Vectors, Vectors] | None
+
+
 class ErrorListing:
     """List of the errors of a mission's cases, as the file states them. See `DeclaredErrors` for the parameters."""
 
@@ -79,7 +91,7 @@ class ErrorListing:
     ) -> None:
         self.mission, self.geometry, self.exact, self.shown = mission, geometry, exact, shown
         self.factor = mission.allocation.coverage_factor
-        self._legs: dict[tuple[int, str], tuple[list[Effect], list[FullEffect]]] = {}
+        self._full_legs: dict[tuple[int, str], list[FullEffect]] = {}
 
     def listed(self) -> Iterator[ErrorSource]:
         """Yield every position, velocity, acceleration, clock and other error, in the order of the contract."""
@@ -104,19 +116,21 @@ class ErrorListing:
             for path in self.geometry.both
         ]
 
-    def legs(self, platform_index: int, kind: str) -> tuple[list[Effect], list[FullEffect]]:
-        """Effects of one unit of a kind of error of one platform along x, y and z, in both models.
+    def published_legs(self, platform_index: int, kind: str) -> list[Effect]:
+        """Effects of one unit of a kind of error of one platform along x, y and z by Tables I and II."""
+        first = 3 * list(MOTION_UNITS).index(kind)
+        return [Effect._make(row) for row in self._published[platform_index][first : first + 3]]
 
-        The first result follows from Tables I and II, the second from the full model.
+    def full_legs(self, platform_index: int, kind: str) -> list[FullEffect]:
+        """Effects of one unit of a kind of error of one platform along x, y and z by the full model.
+
+        The motions are those of (22). `_flown` has the motions in free fall.
         """
-        if (platform_index, kind) not in self._legs:
-            first = 3 * list(MOTION_UNITS).index(kind)
-            published = [Effect._make(row) for row in self._published[platform_index][first : first + 3]]
+        if (platform_index, kind) not in self._full_legs:
             along = np.stack([self.exact.along(platform_index, axis) for axis in _UNIT_VECTORS])
             effects = self.exact.effect(along * self.exact.powers[MOTION_UNITS[kind]])
-            full = [FullEffect._make(row) for row in zip(*map(np.asarray, effects), strict=True)]
-            self._legs[platform_index, kind] = published, full
-        return self._legs[platform_index, kind]
+            self._full_legs[platform_index, kind] = _of_each(effects)
+        return self._full_legs[platform_index, kind]
 
     @cached_property
     def _motions(self) -> list[Any]:
@@ -129,58 +143,49 @@ class ErrorListing:
             path.fall and path.fall.motions(path, exact.half, exact.sampling.places) for path in self.geometry.both
         ]
 
-    def _flown(
-        self, kind: str, directions: Mapping[int, Vectors], frame: str
-    ) -> tuple[FullEffect, tuple[VectorArrays, VectorArrays], tuple[Vectors, Vectors] | None] | None:
-        """Effect of one unit of an error whose platforms are in free fall.
+    def _falls(self, platforms: Iterable[int]) -> bool:
+        """Whether any of the platforms, given by index, is in free fall."""
+        return any(self._motions[platform_index] is not None for platform_index in platforms)
 
-        None if none of the platforms that have the error is in free fall. In free fall the error follows the dynamics
-        of the orbit. In the frame `ric`, velocities are relative to the stars: a position error without a velocity
-        error does not rotate. In all other frames it rotates with the Earth.
+    def _flown(self, kind: str, errors: Sequence[Mapping[int, Vectors]], frame: str) -> list[_Flown]:
+        """Motions of errors of platforms of which at least one is in free fall, with their effects.
+
+        In free fall an error follows the dynamics of the orbit. In the frame `ric`, velocities are relative to the
+        stars: a position error without a velocity error does not rotate. In all other frames it rotates with the
+        Earth.
 
         Parameters
         ----------
         kind : str
             Position, velocity or acceleration.
-        directions : mapping of int to Vectors
-            Direction of the error for the index of each platform that has it.
+        errors : sequence of mapping of int to Vectors
+            For each error, its direction on each platform that has it, by the index of the platform.
         frame : str
-            Frame in which the file states the error.
-
-        Returns
-        -------
-        full : FullEffect
-            Effect per unit of a small error.
-        shifts : two of Vectors
-            Motions at the nodes, (nodes, cases). [m]
-        rates : two of Vectors, optional
-            Velocities at mid-aperture of position errors in `ric`. [m/s]
+            Frame in which the file states the errors.
         """
-        if all(self._motions[platform_index] is None for platform_index in directions):
-            return None
-        moved = np.zeros_like(self.exact.times)
-        shifts, rates = dict[int, VectorArrays](), dict[int, Vectors]()
-        for platform_index, direction in directions.items():
-            motions, fall = self._motions[platform_index], self.geometry.both[platform_index].fall
-            is_at_rest = kind == "position" and frame == "ric" and fall is not None
-            rates[platform_index] = fall.rate_against_stars(direction) if is_at_rest and fall else NOWHERE
-            if motions is None:
-                course = self.exact.powers[MOTION_UNITS[kind]]
-                x, y, z = (component * course for component in direction)
-            else:
-                state = motions[list(MOTION_UNITS).index(kind)]
-                x, y, z = sum(state[axis] * direction[axis] for axis in range(3))
-                if is_at_rest:
-                    turned = sum(motions[1][axis] * rates[platform_index][axis] for axis in range(3))
-                    x, y, z = x + turned[0], y + turned[1], z + turned[2]
-            shifts[platform_index] = (x, y, z)
-            moved = moved + self.exact.along(platform_index, shifts[platform_index])
+        shifts, rates = [dict[int, VectorArrays]() for _ in errors], [dict[int, Vectors]() for _ in errors]
+        moved = np.zeros((len(errors), *self.exact.times.shape))
+        for index, directions in enumerate(errors):
+            for platform_index, direction in directions.items():
+                motions, fall = self._motions[platform_index], self.geometry.both[platform_index].fall
+                is_at_rest = kind == "position" and frame == "ric" and fall is not None
+                rate = fall.rate_against_stars(direction) if is_at_rest and fall else NOWHERE
+                if motions is None:
+                    course = self.exact.powers[MOTION_UNITS[kind]]
+                    x, y, z = (component * course for component in direction)
+                else:
+                    state = motions[list(MOTION_UNITS).index(kind)]
+                    x, y, z = sum(state[axis] * direction[axis] for axis in range(3))
+                    if is_at_rest:
+                        turned = sum(motions[1][axis] * rate[axis] for axis in range(3))
+                        x, y, z = x + turned[0], y + turned[1], z + turned[2]
+                rates[index][platform_index], shifts[index][platform_index] = rate, (x, y, z)
+                moved[index] += self.exact.along(platform_index, (x, y, z))
         has_rates = kind == "position" and frame == "ric"
-        return (
-            self.exact.effect(moved),
-            _of_both_platforms(shifts),
-            _of_both_platforms(rates) if has_rates else None,
-        )
+        return [
+            _Flown(full, _of_both_platforms(shift), _of_both_platforms(rate) if has_rates else None)
+            for full, shift, rate in zip(_of_each(self.exact.effect(moved)), shifts, rates, strict=True)
+        ]
 
     def _of_motion(self, platform_index: int, name: str, kind: str, unit: str) -> Iterator[ErrorSource]:
         error: MotionError = getattr(self.mission.platforms, name).motion_error
@@ -189,16 +194,24 @@ class ErrorListing:
         if not any(self._is_listed(row_subject, values) for row_subject, *_ in scene_rows):
             return
         in_scene = error.frame == "scene"
-        published, full = self.legs(platform_index, kind)
+        published = self.published_legs(platform_index, kind)
         axes = self.geometry.both[platform_index].frame(error.frame)
         covariance = error.covariance if kind != "acceleration" else None
         key = "covariance" if covariance is not None else error.key_of(kind)
         path: KeyPath = ("platforms", name, "motion_error", key)
         notes, evidence = override_notes(name, error.overridden, kind), error.evidence(kind)
-        for axis, (row_subject, row_path, equation, no_limit) in enumerate(scene_rows):
-            # Where the file states an error along other axes, its scene axes are listed only if all rows are.
-            if self.shown is not None and row_subject.id not in self.shown and not (in_scene and values is not None):
-                continue
+        # Where the file states an error along other axes, its scene axes are listed only if all rows are.
+        listed_axes = [
+            axis
+            for axis, (row_subject, *_) in enumerate(scene_rows)
+            if self.shown is None or row_subject.id in self.shown or (in_scene and values is not None)
+        ]
+        falls = self._falls([platform_index])
+        flown: list[_Flown] = []
+        if falls:
+            flown = self._flown(kind, [{platform_index: _UNIT_VECTORS[axis]} for axis in listed_axes], "scene")
+        for index, axis in enumerate(listed_axes):
+            row_subject, row_path, equation, no_limit = scene_rows[axis]
             on_axis: PerCase | None = None
             if values is not None:
                 if in_scene:
@@ -211,40 +224,40 @@ class ErrorListing:
                     )
             if covariance is not None:
                 row_path = (*path, *covariance.path(kind, axis))
-            flown = self._flown(kind, {platform_index: _UNIT_VECTORS[axis]}, "scene")
             yield ErrorSource(
                 subject=row_subject,
                 unit=unit,
                 declared=on_axis,
                 path=row_path if in_scene and values is not None and key != "sensor" else path,
                 effect=published[axis],
-                full=full[axis] if flown is None else flown[0],
+                full=flown[index].full if falls else self.full_legs(platform_index, kind)[axis],
                 direction=_UNIT_VECTORS[axis],
                 equation=equation,
                 no_limit=no_limit,
                 evidence=evidence,
                 is_independent=in_scene,
                 notes=notes,
-                shifts=flown and flown[1],
+                shifts=flown[index].shifts if falls else None,
             )
         if in_scene or values is None:
             return
+        if falls:
+            flown = self._flown(kind, [{platform_index: direction} for direction in axes], error.frame)
         for index, (axis_name, direction) in enumerate(zip(FRAME_AXES[error.frame], axes, strict=True)):
-            flown = self._flown(kind, {platform_index: direction}, error.frame)
             yield ErrorSource(
                 subject=subject(name, kind, axis_name, error.frame),
                 unit=unit,
                 declared=values[index] * self.factor,
                 path=(*path, *((index,) if covariance is None else covariance.path(kind, index))),
                 effect=_along(published, direction),
-                full=_along(full, direction) if flown is None else flown[0],
+                full=flown[index].full if falls else _along(self.full_legs(platform_index, kind), direction),
                 direction=direction,
                 equation=_equation(kind, None),
                 no_limit=_no_limit(kind, _axis_of(error.frame, axis_name)),
                 evidence=evidence,
                 notes=notes,
-                shifts=flown and flown[1],
-                rates=flown and flown[2],
+                shifts=flown[index].shifts if falls else None,
+                rates=flown[index].rates if falls else None,
             )
 
     def _of_clock(self) -> Iterator[ErrorSource]:
@@ -393,6 +406,7 @@ class ErrorListing:
             return
         in_scene, names = error.frame == "scene", FRAME_AXES[error.frame]
         frames = [path.frame(error.frame) for path in self.geometry.both]
+        falls = self._falls((0, 1))
         for kind, unit in MOTION_UNITS.items():
             values = getattr(error, kind)
             for axis, name in enumerate(names):
@@ -400,16 +414,19 @@ class ErrorListing:
                 if not self._is_listed(row_subject, values):
                     continue
                 ways = [frame[axis] for frame in frames]
-                both = [self.legs(platform_index, kind) for platform_index in (0, 1)]
-                published = self._of_both([legs for legs, _ in both], axis, None if in_scene else ways)
-                full = self._of_both([legs for _, legs in both], axis, None if in_scene else ways)
-                flown = self._flown(kind, dict(enumerate(ways)), error.frame)
-                if flown is not None:
-                    full = flown[0]
-                elif kind == "position" and name in ("x", "y"):
-                    # A horizontal shift of both platforms is a shift of the scene: x̂ is the error itself, and β̃ₙ and
-                    # ½s̈·x̂ cancel. The rest of a sum of rounded numbers would give a limit where none exists.
-                    full = full._replace(qpe=0.0 * full.qpe, cubic=0.0 * full.cubic)
+                published_legs = [self.published_legs(platform_index, kind) for platform_index in (0, 1)]
+                published = self._of_both(published_legs, axis, None if in_scene else ways)
+                flown: _Flown | None = None
+                if falls:
+                    (flown,) = self._flown(kind, [dict(enumerate(ways))], error.frame)
+                    full = flown.full
+                else:
+                    full_legs = [self.full_legs(platform_index, kind) for platform_index in (0, 1)]
+                    full = self._of_both(full_legs, axis, None if in_scene else ways)
+                    if kind == "position" and name in ("x", "y"):
+                        # A horizontal shift of both platforms is a shift of the scene: x̂ is the error itself, and β̃ₙ
+                        # and ½s̈·x̂ cancel. The rest of a sum of rounded numbers would give a limit where none exists.
+                        full = full._replace(qpe=0.0 * full.qpe, cubic=0.0 * full.cubic)
                 no_limit = phrases.note("no-quadratic-term-of-position")
                 if kind != "position":
                     cause = "velocities" if kind == "velocity" else "lines of sight"
@@ -429,8 +446,8 @@ class ErrorListing:
                     evidence=error.source,
                     notes=(phrases.note("held-to-the-total", owners="both platforms"),),
                     of_receiver=None if in_scene else ways[1],
-                    shifts=flown and flown[1],
-                    rates=flown and flown[2],
+                    shifts=flown and flown.shifts,
+                    rates=flown and flown.rates,
                 )
 
     @staticmethod
@@ -474,7 +491,7 @@ class ErrorListing:
             [self.exact.along(platform_index, ways[platform_index]) for platform_index in platform_indices], axis=0
         )
         effects = [
-            _along(self.legs(platform_index, kind)[0], vector)
+            _along(self.published_legs(platform_index, kind), vector)
             for platform_index in platform_indices
             for kind, vector in zip(MOTION_UNITS, self.geometry.both[platform_index].rates, strict=False)
         ]
@@ -540,8 +557,8 @@ class ErrorListing:
         height = self.mission.scene.height_error
         if height is None:
             return
-        both = [self.legs(platform_index, "position") for platform_index in (0, 1)]
-        published, full = _sum([legs[2] for legs, _ in both]), _sum([legs[2] for _, legs in both])
+        published = _sum([self.published_legs(platform_index, "position")[2] for platform_index in (0, 1)])
+        full = _sum([self.full_legs(platform_index, "position")[2] for platform_index in (0, 1)])
         yield ErrorSource(
             subject=subject("mission", "terrain"),
             unit="m",
@@ -623,6 +640,11 @@ def _of_both_platforms(vectors: Mapping[int, AnyVector]) -> tuple[AnyVector, Any
     """
     first = next(iter(vectors.values()))
     return vectors.get(0, first), vectors.get(1, first)
+
+
+def _of_each(effects: FullEffect) -> list[FullEffect]:
+    """Effects of single errors, from the effects of several errors, (errors, cases)."""
+    return [FullEffect._make(row) for row in zip(*map(np.asarray, effects), strict=True)]
 
 
 def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:

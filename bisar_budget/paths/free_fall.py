@@ -184,8 +184,13 @@ class _Collocation:
 
 def _integral(places: Floats, times: int) -> Floats:
     """Values (places, N) at places of the Legendre polynomials integrated `times` times from 0."""
-    of_each = np.polynomial.legendre.legint(np.eye(_NODE_COUNT), m=times, lbnd=0.0)
-    return np.asarray(np.polynomial.legendre.legvander(places, _NODE_COUNT - 1 + times) @ of_each)
+    return np.asarray(np.polynomial.legendre.legvander(places, _NODE_COUNT - 1 + times) @ _integrated(times))
+
+
+@cache
+def _integrated(times: int) -> Floats:
+    """Legendre coefficients of the Legendre polynomials integrated `times` times from 0, one column each."""
+    return np.asarray(np.polynomial.legendre.legint(np.eye(_NODE_COUNT), m=times, lbnd=0.0))
 
 
 @cache

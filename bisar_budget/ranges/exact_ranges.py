@@ -45,7 +45,7 @@ from bisar_budget import image_plane
 from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.geometry import GroundVector, PlatformState, VectorArrays, Vectors, dot, norm
-from bisar_budget.image_plane import FEWEST_PATH_NODES, LEGENDRE_LEADING, GroundMatrix, Sampling, band_variance, nodes
+from bisar_budget.image_plane import FEWEST_PATH_NODES, GroundMatrix, Sampling, band_variance, nodes
 
 if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
@@ -488,6 +488,10 @@ class ExactRanges:
             for track, ranges in zip(self.tracks, self.ranges, strict=True):
                 looks = np.stack(np.broadcast_arrays(*(component / ranges for component in track)))
                 looks = np.concatenate((looks, self.sampling.to_ends @ looks), axis=1)
+                middle = looks[:, len(self.fit[0]) // 2]
+                # Within half the angle of one line of sight, no two are a whole angle apart: no pair is compared.
+                if (np.einsum("an,amn->mn", middle, looks) > math.cos(MAX_TURN_RAD / 2)).all():
+                    continue
                 for later in looks.swapaxes(0, 1):
                     least = np.minimum(least, np.einsum("an,amn->mn", later, looks).min(axis=0))
         return np.asarray(least < math.cos(MAX_TURN_RAD))
@@ -682,13 +686,8 @@ class ExactRanges:
         `remaining` (..., nodes, cases) are the range errors at the nodes, and `orders` (..., 4, cases) their orders 0
         to 3. [m]
         """
-        beyond = remaining - self._legendre @ orders
+        beyond = remaining - self.sampling.polynomials @ orders
         return self.fit[0] @ (remaining * remaining), self.fit[0] @ (beyond * beyond)
-
-    @cached_property
-    def _legendre(self) -> Floats:
-        """Legendre polynomials P₀ to P₃ at the nodes, each divided by its leading coefficient, (nodes, 4)."""
-        return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEGENDRE_LEADING)
 
     # ------------------------------------------------------------------ errors of any size
     def phases(
@@ -963,6 +962,11 @@ class _GroundView:
         The matrix H.
     determinant : (lanes,)
         Determinant of H.
+    node_weights : (nodes, lanes)
+        Weights at the nodes that give the scalar product ⟨a, ρ⟩ of V for a history a: the sum of the weights times a
+        over the nodes is the scalar product with the range error ρ at the point.
+    bends : three of (lanes,)
+        Half the second derivatives of V at the points: east-east, east-north, north-north.
     """
 
     def __init__(self, seen: Floats, looks: Floats, distances: Floats, centred: Floats, weights: Floats) -> None:
@@ -974,27 +978,16 @@ class _GroundView:
         self.slope, self.matrix = products[:, 0], products[:, 1:]
         (xx, xy), (_, yy) = self.matrix
         self.determinant = xx * yy - xy * xy
+        self.node_weights = centred.T @ self._weighted[0]
+        bends = self.node_weights / distances
+        turned, total = np.einsum("apnc,bpnc->abc", looks * bends, looks), bends.sum(axis=(0, 1))
+        (xx, xy), (_, yy) = self.matrix + turned
+        self.bends = xx - total, xy, yy - total
 
     @property
     def variance(self) -> Floats:
         """Value of V at the points, (lanes,). [m²]"""
         return np.asarray(np.einsum("nc,nc->c", self._weighted[0], self._parts[0]))
-
-    @cached_property
-    def node_weights(self) -> Floats:
-        """Weights at the nodes that give the scalar product ⟨a, ρ⟩ of V for a history a, (nodes, lanes).
-
-        The sum of the weights times a over the nodes is the scalar product with the range error ρ at the point.
-        """
-        return np.asarray(self._centred.T @ self._weighted[0])
-
-    @cached_property
-    def bends(self) -> tuple[Floats, Floats, Floats]:
-        """Half the second derivatives of V at the points: east-east, east-north, north-north, (lanes,) each."""
-        bends = self.node_weights / self.distances
-        turned, total = np.einsum("apnc,bpnc->abc", self.looks * bends, self.looks), bends.sum(axis=(0, 1))
-        (xx, xy), (_, yy) = self.matrix + turned
-        return xx - total, xy, yy - total
 
     def products(self, values: Floats) -> Floats:
         """Scalar products ⟨g, a⟩ of V for histories a at the nodes, (2, lanes).

@@ -156,8 +156,7 @@ class PointPaths:
         found = self.exact.phases(self.lanes.of(lane), size, expected)
         point = np.array((size, *found[1:]))
         is_on_path = found.is_settled & _is_near(last, point, expected)
-        begins = np.ones(lane.size, dtype=bool)
-        begins[1:] = (lane[1:] != lane[:-1]) | (index[1:] != index[:-1])
+        begins = _begins(lane) | _begins(index)
 
         # If a lane tries several sizes, its smaller ones may predict a point better than its last known point does.
         later = np.flatnonzero(~begins & ~is_on_path & found.is_settled)
@@ -223,9 +222,8 @@ class PointPaths:
                 for array in (lane, index, to_fold)
             )
         order = np.lexsort((size, lane))
-        is_new = np.ones(order.size, dtype=bool)
-        next_lane, next_size = lane[order], size[order]
-        is_new[1:] = (np.diff(next_lane) > 0) | (np.diff(next_size) > VECTOR_ROUNDING_FRACTION * next_size[1:])
+        is_new, next_size = _begins(lane[order]), size[order]
+        is_new[1:] |= next_size[1:] - next_size[:-1] > VECTOR_ROUNDING_FRACTION * next_size[1:]
         order = order[is_new]
         return lane[order], index[order], size[order], to_fold[order]
 
@@ -251,8 +249,8 @@ class PointPaths:
         """Insert known points; the points of each lane stay sorted by size."""
         if not lane.size:
             return
-        first = np.flatnonzero(np.diff(lane, prepend=-1))
-        changed, count = lane[first], np.diff(first, append=lane.size)
+        first = np.flatnonzero(_begins(lane))
+        changed, count = lane[first], np.append(first[1:], lane.size) - first
         filled = np.isfinite(self.known_points[SIZE, changed]).sum(axis=1)
         width, needed = self.known_points.shape[2], int((filled + count).max())
         if needed > width:  # doubled at least, because most steps add only one point
@@ -330,6 +328,13 @@ class PointPaths:
         east, north = self.exact.way(self.lanes.of(lane), points[SIZE], (points[EAST], points[NORTH]))
         (u, v), is_start = self._slope_at_start[:, lane], points[SIZE] == 0
         return np.where(is_start, u, east), np.where(is_start, v, north)
+
+
+def _begins(values: Indices) -> Booleans:
+    """Whether each value differs from the value before it; the first one does."""
+    begins = np.ones(values.size, dtype=bool)
+    begins[1:] = values[1:] != values[:-1]
+    return begins
 
 
 def _is_near(last: Floats, point: Floats, expected: tuple[Floats, Floats]) -> Booleans:

@@ -97,7 +97,7 @@ def test_a_race_track_has_a_node_for_each_of_its_turns(tmp_path: Path) -> None:
     assert count >= 1.5 * mission.platforms.receiver.path.pieces
     own, fine = (
         np.array(
-            [[e.qpe, e.east, e.north] for e in ErrorListing(mission, geometry, exact).legs(1, "position")[1]], float
+            [[e.qpe, e.east, e.north] for e in ErrorListing(mission, geometry, exact).full_legs(1, "position")], float
         )
         for exact in (exact_ranges(mission, geometry, nodes) for nodes in (count, 4 * count))
     )
