@@ -138,7 +138,7 @@ ERROR_KEYS: dict[str, ErrorKey] = {
         SPECTRUM, {"20 Hz": "1e-4 g^2/Hz", "100 Hz": "1e-4 g^2/Hz"}, "receiver.vibration.spectrum"
     ),
     f"{VIBRATION}spectrum_level": ErrorKey("3 dB", "6 dB", "receiver.vibration.spectrum", _LEVEL),
-    f"{ERROR}sensor": ErrorKey("stim300", "adis16405", "receiver.imu.gyro_bias"),
+    f"{ERROR}sensor": ErrorKey("stim300", "adis16405", "receiver.imu.velocity_random_walk"),
     f"{ERROR}imu.accelerometer_bias": ErrorKey("200 ug", "400 ug", "receiver.imu.accelerometer_bias"),
     f"{ERROR}imu.accelerometer_scale_factor": ErrorKey(
         "500 ppm", "1000 ppm", "receiver.imu.accelerometer_scale_factor"

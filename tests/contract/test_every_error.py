@@ -7,6 +7,7 @@ entry in `error_keys` fails the first test.
 import io
 import json
 import math
+import re
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,7 @@ from tests.contract.error_keys import (
 
 KEYS = pytest.mark.parametrize("key", ERROR_KEYS)
 DRAWS = 2000
+NOT_DRAWN = ("vibration-is-not-drawn", "stated-power-is-not-drawn")  # notes of Monte Carlo that list rows
 DEVIATIONS = 5  # standard deviations by which a drawn rms may differ from its expectation
 LAST_FIRST_LINE = "displacement"  # of the summary of `simulate`: what it flies is said above this line
 
@@ -224,7 +226,12 @@ def test_a_phase_history_has_the_error(key: str, folder: Path) -> None:
         for document in (mission_with_key(key), mission_without_key(key))
     )
     if with_key.shape == without_key.shape and np.allclose(with_key, without_key, rtol=0, atol=1e-6):
-        assert ERROR_KEYS[key].row in point_plot.flown_words(loaded(mission_with_key(key)))
+        assert is_left_out(ERROR_KEYS[key].row, point_plot.flown_words(loaded(mission_with_key(key))))
+
+
+def is_left_out(row: str, words: str) -> bool:
+    """Whether the words of `simulate` name a row among those that are not flown."""
+    return re.search(rf"without \w+ \([^)]*\b{re.escape(row)}\b", " ".join(words.split())) is not None
 
 
 @KEYS
@@ -254,10 +261,10 @@ def test_the_image_has_the_error(key: str) -> None:
     except SimulationError as error:
         assert str(error)
         return
-    first_lines = point_plot.summary(with_key.images, loaded(mission_with_key(key))).partition(LAST_FIRST_LINE)[0]
-    if ERROR_KEYS[key].row not in first_lines:
-        images = with_key.images.rotated, without_key.images.rotated
-        assert images[0].shape != images[1].shape or not np.allclose(*images, rtol=0, atol=1e-6)
+    images = with_key.images.rotated, without_key.images.rotated
+    if images[0].shape == images[1].shape and np.allclose(*images, rtol=0, atol=1e-6):
+        first_lines = point_plot.summary(with_key.images, loaded(mission_with_key(key))).partition(LAST_FIRST_LINE)[0]
+        assert is_left_out(ERROR_KEYS[key].row, first_lines)
 
 
 @pytest.mark.parametrize("key", a_few(24))
@@ -275,7 +282,7 @@ def test_monte_carlo_draws_the_error_or_says_that_it_does_not(key: str) -> None:
     """The rms of the draws is that of the errors, of which the row has a share; or a note names the row."""
     drawn = bb.monte_carlo(loaded(mission_with_key(key)), DRAWS)
     row = row_of(key)
-    if any(row.id in note for note in drawn.notes):
+    if any(note.code in NOT_DRAWN and row.id in note.values[0] for note in drawn.notes):
         return
     sigmas = {requirement.id: requirement for requirement in drawn.requirements}
     effects = {
