@@ -14,6 +14,7 @@ import os
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import date
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -24,7 +25,9 @@ from numpy.typing import NDArray
 from bisar_budget import __version__
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.arrays import Records
+from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
+from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
@@ -54,6 +57,11 @@ _BYTES_PER_EXPORTED_SAMPLE = 16 * 5 + 8 * 3  # of the phase history as it is for
 _MAX_SCATTERERS_COUNT = 1 << 20
 _EXPORT_CLUTTER_STREAM_INDEX = 2  # beside the file's seed
 _CHANNEL = "1"
+# Kinds of rows that are no errors: sums, requirements, and effects of other rows.
+_KINDS_OF_SUMS = (
+    *("quadratic_phase_error", "cubic_phase_error", "pslr", "islr", "location_error", "autofocus_pull_in"),
+    *("spatial_variance", "dispersion", "specification", "declare"),
+)
 
 # Per vector parameters of the standard, each with its number of words of 8 bytes.
 _VECTOR_WORDS = (
@@ -439,6 +447,7 @@ def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
         # The schema requires CollectionStartTime.
         sensor = {**(clock_sigmas if owner == "receiver" else {}), "CollectionStartTime": 0.0}
         leaves |= {f"{side}/RadarSensor/{key}": value for key, value in sensor.items()}
+    added |= _rows_without_element(mission, added)
     has_no_sigmas = all(
         added.get(f"{owner}.{kind}") for owner in ("transmitter", "receiver") for kind in ("position", "velocity")
     )
@@ -446,6 +455,22 @@ def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
         return {}
     leaves |= {f"AddedParameters/Parameter@name={ADDED} {key}": value for key, value in added.items()}
     return {f"ErrorParameters/Bistatic/{path}": value for path, value in leaves.items()}
+
+
+def _rows_without_element(mission: Mission, added: Mapping[str, str]) -> dict[str, str]:
+    """Declared sizes, by row, of errors for which the standard has no element, without the coverage factor.
+
+    Errors that `added` has in the words of the file are left out.
+    """
+    alone = mission._replace(allocation=mission.allocation._replace(coverage_factor=1.0))
+    sizes: dict[str, str] = {}
+    for row in check_mission(alone, date.min).rows:
+        has_element = row.owner in PLATFORMS and row.subject.kind in ("position", "velocity", "acceleration")
+        has_element |= row.id in ("timing.constant", "timing.linear") or row.id in added
+        has_element |= row.owner == "mission" and row.subject.kind in ("position", "velocity")
+        if row.declared is not None and not has_element and row.subject.kind not in _KINDS_OF_SUMS:
+            sizes[row.id] = f"{row.declared:.12g} {row.unit}".rstrip()
+    return sizes
 
 
 def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, str]) -> tuple[Floats, str]:

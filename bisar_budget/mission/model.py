@@ -218,7 +218,7 @@ OF_PLATFORMS = (
     *("position", "velocity", "acceleration", "covariance", "vibration", "imu", "random", "oscillator"),
     *("time_tag", "lever_arm"),
 )
-OF_MISSION = ("timing", "synchronization", "propagation", "common", "other")
+OF_MISSION = ("timing", "synchronization", "propagation", "common", "other", "terrain")
 DECLARABLE = (*OF_PLATFORMS, *OF_MISSION)
 _OF_ONE_PLATFORM = tuple(f"{name}.{kind}" for name in Platforms._fields for kind in OF_PLATFORMS)
 
@@ -249,7 +249,7 @@ class Requirements(NamedTuple):
             "Errors that the file must declare, for both platforms or for one (receiver.imu); a missing error is "
             "not_evaluated. A zero declares; a still platform has to declare only its position. A covariance "
             "declares position and velocity; timing: any term of timing_error; propagation: the delays of each leg; "
-            "common: common_motion_error; other: other_errors.",
+            "common: common_motion_error; other: other_errors; terrain: scene.height_error.",
         ),
     ] = ()
 

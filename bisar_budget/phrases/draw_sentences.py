@@ -7,7 +7,10 @@ DRAW_SENTENCES: dict[str, str] = {
     "drawn-by-the-full-model": "drawn by the full model; the rows are judged by allocation.model, {model}",
     "drawn-all-at-once": "a draw is the sum of all errors; the rows are judged one by one (allocation.combine: each)",
     "drawn-as-bounds": "{row_ids:list}: drawn as plus or minus the declared value, which has no distribution",
-    "vibration-is-not-drawn": "the effects of vibrations and tones are not drawn: only check has them",
+    "vibration-is-not-drawn": (
+        "{row_ids:list}: not drawn, since the effects of vibrations and tones are in check alone"
+    ),
+    "stated-power-is-not-drawn": "{row_ids:list}: not drawn, since a stated power is in check alone",
     "unknown-drift-is-not-drawn": (
         "the file does not state {platforms:and platforms.*.oscillator}, by which the clocks drift: the location is "
         "not drawn"

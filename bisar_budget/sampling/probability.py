@@ -17,9 +17,10 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis, Model
+from bisar_budget.analysis.spread import stated_powers
 from bisar_budget.analysis.together import Together, cubics
 from bisar_budget.constants import MAX_DRAWS
-from bisar_budget.effects.effect import PLATFORMS, ErrorSource
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
 from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.sources import distribution_of
@@ -334,9 +335,14 @@ def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: b
     hidden = [error.id for error in analysis.random if error.declared and _hides_phase(error)]
     if hidden:
         yield phrases.note("hidden-phase-is-not-drawn", row_ids=hidden)
-    vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
-    if analysis.displacing_tones or any(vibration.wideband for vibration in vibrations):
-        yield phrases.note("vibration-is-not-drawn")
+    noisy = [name for name in PLATFORMS if getattr(mission.platforms, name).motion_error.vibration.wideband]
+    shaken = [tone.subject.id for tone in analysis.displacing_tones]
+    shaken += [subject(name, "vibration", "wideband").id for name in noisy]
+    if shaken:
+        yield phrases.note("vibration-is-not-drawn", row_ids=shaken)
+    powers = [power.subject.id for power in stated_powers(mission)]
+    if powers:
+        yield phrases.note("stated-power-is-not-drawn", row_ids=powers)
     if mission.requirements.location_error is not None and not is_placed:
         undriven = clocks_without_oscillator(mission)
         yield (

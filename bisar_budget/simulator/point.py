@@ -9,12 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.spread import mainlobe_energy, stated_powers
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.combined import correlated_errors, likely_error
 from bisar_budget.effects.effect import PLATFORMS, LinePiece, gradients_of, indicated_point
 from bisar_budget.effects.vibration import counted, lines_of, sight_of
 from bisar_budget.geometry import GroundVector, dot
-from bisar_budget.mission.model import Mission, Simulation
+from bisar_budget.mission.model import OTHER_EFFECTS, Mission, Simulation
 from bisar_budget.mission.platforms import MotionError as DeclaredError
 from bisar_budget.ranges.exact_ranges import ExactEffect
 from bisar_budget.simulator.autofocus import ALGORITHMS
@@ -32,6 +33,7 @@ from bisar_budget.simulator.impulse_response import (
 )
 from bisar_budget.simulator.phase_history import (
     Complexes,
+    Course,
     Errors,
     Flight,
     Floats,
@@ -43,7 +45,7 @@ from bisar_budget.simulator.phase_history import (
     look_sum,
     superposed,
 )
-from bisar_budget.simulator.realisations import drawn_errors, oscillator_sinusoids
+from bisar_budget.simulator.realisations import clock_seconds, drawn_errors, oscillator_sinusoids
 from bisar_budget.simulator.targets import Target, Targets
 from bisar_budget.workers import Progress, unseen
 
@@ -62,6 +64,7 @@ _MIN_WINDOW_CELLS = 6  # half width of a target's response in cross-range
 _BLUR_COLUMNS_PER_LINE = 6  # blur of a point outside a patch of finer pixels, per line of distance
 _MIN_HEIGHT_FRACTION = 0.5  # smallest peak at a target's position; with less, the patch does not contain the target
 _LINE_UPSAMPLING_FACTOR = 16  # interpolation after which the highest sample is accurate to 1e-3 dB
+_STATED_PHASE_SAMPLES = 4097  # of a phase that the file states by its size at the aperture edge
 _CLUTTER_STREAM_INDEX = 1  # used with the file's seed, so that clutter does not change the noise
 
 
@@ -402,6 +405,36 @@ def declared_errors(mission: Mission) -> Errors:
             wideband_rms=float(counted(mission, name, wideband.rms, "islr") if wideband else 0.0),
         )
         errors = errors.of(name, error)
+    return _with_stated_effects(mission, errors)
+
+
+def _with_stated_effects(mission: Mission, errors: Errors) -> Errors:
+    """Errors together with motions and phases that have the effects which `other_errors` states.
+
+    A quadratic and a cubic phase are a phase of the receiver over slow time. A displacement moves both measured paths
+    to the east, which moves the image to the east by the same distance. A stated ISLR is white noise of the receiver.
+    None of them has the coverage factor.
+    """
+    quadratic, cubic, shift = (
+        math.fsum(getattr(stated, effect) or 0.0 for stated in mission.other_errors) for effect in OTHER_EFFECTS[:3]
+    )
+    if quadratic or cubic:
+        T, times = mission.collection.aperture_time, np.linspace(-1.0, 1.0, _STATED_PHASE_SAMPLES)
+        course = errors.clock_course or Course(times * T / 2, np.zeros(times.size))
+        scaled_times = course.times / (T / 2)
+        phase = quadratic * scaled_times**2 + cubic * scaled_times**3
+        seconds = course.values + clock_seconds(phase, mission.radar.wavelength)
+        errors = errors._replace(clock_course=Course(course.times, seconds))
+    if shift:
+        for name in PLATFORMS:
+            error: PathError = getattr(errors, name)
+            east, north, up = error.position
+            errors = errors.of(name, error._replace(position=(east + shift, north, up)))
+    power = math.fsum(float(stated.rms("full", mainlobe_energy(mission))) ** 2 for stated in stated_powers(mission))
+    if power:
+        rms = math.sqrt(power) * mission.radar.wavelength / (2 * math.pi)
+        receiver = errors.receiver
+        errors = errors._replace(receiver=receiver._replace(wideband_rms=math.hypot(receiver.wideband_rms, rms)))
     return errors
 
 

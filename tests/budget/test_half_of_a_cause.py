@@ -243,6 +243,7 @@ OF_ALL: dict[str, Any] = {
     "propagation": {"propagation": {"zenith_delay": 0}},
     "common": {"common_motion_error": {"position": 0}},
     "other": {"other_errors": [{"name": "antenna", "location_error": 0}]},
+    "terrain": {"scene": {"height_error": 0}},
 }
 
 

@@ -38,6 +38,7 @@ OTHERS = (
     "lever_arm",
 )  # kinds that are no position, velocity or acceleration
 OF_MISSION_ZERO = {
+    "scene": {"height_error": 0},
     "synchronization": {"interval": "1 s", "error": 0},
     "propagation": {"zenith_delay": 0},
     "common_motion_error": {"position": 0},

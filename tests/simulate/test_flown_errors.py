@@ -1,24 +1,32 @@
 """Errors as they are flown once: a vibration by its spectrum, and what is known by its effect alone."""
 
+import math
+
 import numpy as np
 import pytest
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.spread import mainlobe_energy
 from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.simulator.collection import PointCollection
 from bisar_budget.simulator.phase_history import path
 from bisar_budget.simulator.point import declared_errors
 from tests.conftest import ROOT, mission_text
 
 
-@pytest.mark.parametrize("effect", [{"location_error": "1 m"}, {"cubic_phase_error": "1 deg"}, {"islr": "-40 dB"}])
-def test_what_is_known_by_its_effect_alone_is_in_no_image(effect: dict[str, str]) -> None:
-    """A displacement was looked for at a platform: a fault of the tool."""
-    without, flown = (
-        declared_errors(parse_mission(mission_text(other_errors=others)))
-        for others in ([], [{"name": "a", **effect}])
-    )
-    assert flown.clock_course is None is without.clock_course
-    assert [flown.transmitter, flown.receiver] == [without.transmitter, without.receiver]
+def test_errors_stated_by_their_effects_have_these_effects_in_the_images() -> None:
+    """They were in no image, and nothing said so. The coverage factor does not multiply them."""
+    effects = {"quadratic_phase_error": "20 deg", "cubic_phase_error": "10 deg", "location_error": "5 m"}
+    others = [{"name": "feed", "islr": "-30 dB"}, {"name": "antenna", "islr": "-30 dB", **effects}]
+    mission = parse_mission(mission_text(other_errors=others, allocation__coverage_factor=2))
+    flown = declared_errors(mission)
+    moved = PointCollection(mission, mission.geometry).effect(flown.still())
+    assert math.degrees(moved.quadratic) == pytest.approx(20, abs=0.02)
+    assert math.degrees(moved.cubic) == pytest.approx(10, abs=0.02)
+    assert moved.displacement == pytest.approx((5.0, 0.0), abs=0.02)
+    phase = 2 * math.pi * flown.receiver.wideband_rms / mission.radar.wavelength
+    energy = mainlobe_energy(mission)
+    assert 10 * math.log10(math.expm1(phase**2) / energy) == pytest.approx(10 * math.log10(2e-3), abs=0.01)
 
 
 def test_a_spectrum_is_flown_beside_errors_that_change_slowly() -> None:

@@ -13,8 +13,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.faults import SetValue, changes_words, printable
-from bisar_budget.mission.model import Mission, Simulation, has_instruments
+from bisar_budget.mission.model import OTHER_EFFECTS, Mission, Simulation, has_instruments
 from bisar_budget.report.drawing.evidence_drawings import FOCUSED, WITH_ERRORS, WITHOUT_ERROR, Curve, cut_panel
 from bisar_budget.report.drawing.figure import drawing_file, figure_file, new_figure, paint
 from bisar_budget.report.drawing.svg import Canvas
@@ -301,7 +302,8 @@ def archive(images: PointImages, changes: Sequence[SetValue] = ()) -> bytes:
     return file.getvalue()
 
 
-def _flown(mission: Mission) -> str:
+def flown_words(mission: Mission) -> str:
+    """Words about the errors in the images of a mission, and about those that no image has."""
     factor = mission.allocation.coverage_factor
     times = f", {factor:g} times the file's values" if factor != 1 else ""
     errors = (getattr(mission.platforms, name).motion_error for name in PLATFORMS)
@@ -312,14 +314,38 @@ def _flown(mission: Mission) -> str:
     realisation_words = f"; one time series of each sensor and clock, seed {seed}" if has_instruments(mission) else ""
     if mission.propagation is not None:
         realisation_words += f"; one draw of each delay in the air, seed {seed}, a time series of those that change"
-    if any(platform.oscillator and platform.oscillator.spurs for platform in mission.platforms):
-        realisation_words += "; without spurs, except those that exchanges fold below one cycle per aperture"
+    spur_ids = ", ".join(spur.subject.id for spur in spurs_of(mission))
+    if spur_ids:
+        realisation_words += (
+            f"; without spurs ({spur_ids}), except those that exchanges fold below one cycle per aperture"
+        )
+    if mission.other_errors:
+        realisation_words += f"; {_stated_effect_words(mission)}"
     if has_instruments(mission) and has_unset_clocks(mission):
         realisation_words += "; oscillators without mean and slope, since the file does not state how they were set"
     return (
         f"all declared errors, with the signs of the file{times}{covariance_words}{realisation_words}. "
         "They may cancel: check gives the worst case"
     )
+
+
+def _stated_effect_words(mission: Mission) -> str:
+    """Words about errors that the file states by their effects, each of which is flown in one way of many."""
+    ways = {
+        "as a phase of the receiver": ("quadratic_phase_error", "cubic_phase_error"),
+        "as a displacement to the east": ("location_error",),
+        "as white noise of the receiver": ("islr",),
+    }
+    row_ids = {effect: list[str]() for effect in OTHER_EFFECTS}
+    for stated in mission.other_errors:
+        for row_id in stated.stated:
+            effect = row_id.removeprefix(f"other.{stated.name}").lstrip(".")
+            row_ids[effect or OTHER_EFFECTS[0]].append(row_id)
+    flown = []
+    for way, effects in ways.items():
+        if flown_ids := [row_id for effect in effects for row_id in row_ids[effect]]:
+            flown.append(f"{', '.join(flown_ids)} {way}")
+    return "; ".join(flown)
 
 
 def summary(images: PointImages, mission: Mission) -> str:
@@ -331,7 +357,7 @@ def summary(images: PointImages, mission: Mission) -> str:
         mission.name,
         *(wrapped(f"  {changes_words(mission.changes)}", "    ") if mission.changes else ()),
         "",
-        *wrapped(f"errors         {_flown(mission)}", " " * 15),
+        *wrapped(f"errors         {flown_words(mission)}", " " * 15),
         f"displacement   {east + 0.0:.3f} m east, {north + 0.0:.3f} m north",
         f"phase          quadratic {abs(images.effect.quadratic):.2f} rad, cubic {abs(images.effect.cubic):.2f} rad",
     ]

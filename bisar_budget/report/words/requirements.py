@@ -10,6 +10,7 @@ from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.findings.requirement import DecidingShare, DeclaredKinds, JudgedRequirement
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.findings.status import BROKEN, STATUS
+from bisar_budget.phrases import Note
 from bisar_budget.report.words.sentences import (
     counted,
     requirement_limit,
@@ -271,6 +272,7 @@ def probabilities(drawn: MonteCarlo) -> list[str]:
     lines = [
         f"Monte Carlo: {drawn.draws:,} draws, seed {drawn.seed}, {drawn.model} model; "
         f"intervals of {100 * drawn.confidence:.0f} % by Wilson",
+        *(line for text in drawn.notes if _is_not_drawn(text) for line in wrapped(f"  note: {text}", "    ")),
         "",
     ]
     if drawn.probability is None or drawn.probability_low is None or drawn.probability_high is None:
@@ -282,8 +284,13 @@ def probabilities(drawn: MonteCarlo) -> list[str]:
         words = probability_words(drawn.probability, drawn.probability_low, drawn.probability_high)
         lines += ["all at once", f"  {words}"]
     texts = [f"warning: {judged.id}: {text}" for judged in drawn.requirements for text in judged.warnings]
-    texts += [f"note: {text}" for text in drawn.notes]
+    texts += [f"note: {text}" for text in drawn.notes if not _is_not_drawn(text)]
     return [*lines, *[line for text in texts for line in wrapped(f"  {text}", "    ")]]
+
+
+def _is_not_drawn(note: Note) -> bool:
+    """Whether a note names errors that are not drawn, which belongs into the first lines."""
+    return note.code in ("vibration-is-not-drawn", "stated-power-is-not-drawn")
 
 
 def _requirement(requirement: Requirement) -> Iterator[str]:
