@@ -13,24 +13,22 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis.allocation import Allocation, allocate, autofocus_gain_of
 from bisar_budget.analysis.peak_loss import peak_loss_db
-from bisar_budget.analysis.spread import SpreadPhase, Tone, rests, tones
+from bisar_budget.analysis.spread import SpreadPhase, rests, tones
 from bisar_budget.analysis.together import Together
-from bisar_budget.analysis.tone_displacement import ToneDisplacement, tone_displacements
+from bisar_budget.analysis.tone_displacement import tone_displacements
 from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
-from bisar_budget.effects.combined import Correlated, correlated_errors
-from bisar_budget.effects.declared import Declared, DeclaredErrors, Model
+from bisar_budget.effects.combined import correlated_errors
+from bisar_budget.effects.declared import MODELS, Declared, DeclaredErrors, Model
 from bisar_budget.effects.effect import ErrorSource, Subject, plain
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import in_one_case, random_errors
-from bisar_budget.effects.slow_tones import SlowTone, slow_phases, slow_tones
+from bisar_budget.effects.slow_tones import slow_phases, slow_tones
 from bisar_budget.effects.sources import exact_ranges
-from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission, has_random_errors
 from bisar_budget.mission.stacked import picked
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.ranges.resolution import Resolution, resolution
 
 __all__ = ["Analysis", "Case", "Model", "by_nodes"]
@@ -74,6 +72,34 @@ class Analysis:
         number of cases.
     is_of_sums : bool
         Compute only the sums of errors. An error that counts in a sum then needs no allowable of its own.
+
+    Attributes
+    ----------
+    exact : ExactRanges
+        Exact range histories of all cases at the nodes of the aperture.
+    errors : DeclaredErrors
+        Listed errors of the cases, with their effects: the declared errors and the errors in `shown`, or all errors
+        that the cases can have.
+    random : list of RandomError
+        Errors of sensors, clocks and the air that the mission names; empty if it names none.
+    tones : list of Tone
+        Tones that make paired echoes: declared vibrations from one cycle per aperture on, and spurs.
+    slow_tones : dict of str to SlowTone
+        Declared vibrations below three cycles per aperture; the keys are the ids of their rows.
+    slow : list of DeclaredPhase
+        Phases of the declared vibrations below one cycle per aperture.
+    displacing_tones : list of ToneDisplacement
+        Displacement of the image by each vibration and each tone of an oscillator, slow or fast.
+    groups : tuple of Correlated
+        Covariances that the mission declares for the errors of its platforms.
+    gates : list of str
+        Names of the gating models, which are those whose limits the mission must meet. There is one name, or both
+        names if the stricter model decides.
+    published, full : Model
+        The published model, Tables I and II and (25), which has no direct path; and the full model.
+    allocation : Allocation
+        Budgets of the cases, divided between the owners. A `balanced` division is in proportion to the phases in the
+        gating model, or under `strictest` to the larger of the phases in both models.
     """
 
     def __init__(
@@ -91,14 +117,42 @@ class Analysis:
         self.is_of_sums = is_of_sums and mission.allocation.combine != "each"
         self.is_by_itself, self.is_complete = geometry is None, is_complete
         self.geometry = mission.geometry if geometry is None else geometry
-        self._together: dict[str, Together] = {}
+        gain = autofocus_gain_of(mission)
+        with np.errstate(all="ignore"):
+            self.exact = exact_ranges(mission, self.geometry, nodes, cases)
+            self.errors = DeclaredErrors(
+                mission, cases, self.geometry, self.exact, shown, gain=gain, is_complete=is_complete
+            )
+            self.random = random_errors(mission, geometry, cases) if has_random_errors(mission) else []
+            self.tones = tones(mission, self.geometry)
+            self.slow_tones = slow_tones(mission, self.geometry, cases)
+            self.slow = slow_phases(mission, self.slow_tones, gain)
+            self.displacing_tones = tone_displacements(mission, self.geometry, self.exact)
+            self.groups = correlated_errors(mission)
+            self._together = {
+                model: Together(self.errors, model, self.slow, self.displacing_tones, self.random, self.groups)
+                for model in MODELS
+            }
+            self.gates = [model for model in MODELS if mission.gating_model in (model, "strictest")]
+            self.allocation = allocate(mission, (self._together[model] for model in self.gates))
+            self.published, self.full = Model(self.errors, "published"), Model(self.errors, "full")
         self._rests: dict[str, list[SpreadPhase]] = {}
 
-    @cached_property
-    def exact(self) -> ExactRanges:
-        """Exact range histories of all cases at the nodes of the aperture."""
-        return exact_ranges(self.mission, self.geometry, self.nodes, self.cases)
+    def together(self, model: str) -> Together:
+        """Declared errors combined in a model."""
+        return self._together[model]
 
+    def rests(self, model: str) -> list[SpreadPhase]:
+        """Phases beyond the cubic in a model; see `spread.rests`."""
+        if model not in self._rests:
+            self._rests[model] = rests(self, model)
+        return self._rests[model]
+
+    def models(self, gating: str) -> tuple[Model, Model]:
+        """The gating model and the other model, given the name of the gating model, `published` or `full`."""
+        return (self.full, self.published) if gating == "full" else (self.published, self.full)
+
+    # ---------------------------------------------------------------- what only some questions need
     @cached_property
     def resolution(self) -> Resolution:
         """Widths of the impulse response without errors, (cases,)."""
@@ -110,108 +164,14 @@ class Analysis:
         return peak_loss_db(self)
 
     @cached_property
-    def errors(self) -> DeclaredErrors:
-        """Listed errors of the cases, with their effects.
-
-        If `shown` is given, they are the declared errors and the errors in `shown`. Otherwise they are all errors
-        that the cases can have.
-        """
-        return DeclaredErrors(
-            self.mission,
-            self.cases,
-            self.geometry,
-            self.exact,
-            self.shown,
-            gain=autofocus_gain_of(self.mission),
-            is_complete=self.is_complete,
-        )
-
-    @cached_property
     def sources(self) -> list[ErrorSource]:
         """Errors of a single case in plain numbers, in the order that the contract defines."""
         return [error.in_one_case() for error in self.errors.listed]
 
     @cached_property
-    def random(self) -> list[RandomError]:
-        """Errors of sensors, clocks and the air that the mission names; empty if it names none."""
-        if not has_random_errors(self.mission):
-            return []
-        return random_errors(self.mission, None if self.is_by_itself else self.geometry, self.cases)
-
-    @cached_property
-    def tones(self) -> list[Tone]:
-        """Tones that make paired echoes: declared vibrations from one cycle per aperture on, and spurs."""
-        return tones(self.mission, self.geometry)
-
-    @cached_property
-    def slow_tones(self) -> dict[str, SlowTone]:
-        """Declared vibrations below three cycles per aperture; the keys are the ids of their rows."""
-        return slow_tones(self.mission, self.geometry, self.cases)
-
-    @cached_property
-    def slow(self) -> list[DeclaredPhase]:
-        """Phases of the declared vibrations below one cycle per aperture."""
-        return slow_phases(self.mission, self.slow_tones, autofocus_gain_of(self.mission))
-
-    @cached_property
-    def displacing_tones(self) -> list[ToneDisplacement]:
-        """Displacement of the image by each vibration and each tone of an oscillator, slow or fast."""
-        return tone_displacements(self.mission, self.geometry, self.exact)
-
-    def together(self, model: str) -> Together:
-        """Declared errors combined in a model."""
-        if model not in self._together:
-            self._together[model] = Together(
-                self.errors, model, self.slow, self.displacing_tones, self.random, self.groups
-            )
-        return self._together[model]
-
-    def rests(self, model: str) -> list[SpreadPhase]:
-        """Phases beyond the cubic in a model; see `spread.rests`."""
-        if model not in self._rests:
-            self._rests[model] = rests(self, model)
-        return self._rests[model]
-
-    @cached_property
     def stated(self) -> list[ErrorSource]:
         """Declared errors along the axes in which the file states them."""
         return [source for source in self.sources if source.declared is not None and source.is_independent]
-
-    @cached_property
-    def published(self) -> Model:
-        """The published model: Tables I and II, and (25). It does not include a direct path."""
-        return Model(self.errors, "published")
-
-    @cached_property
-    def full(self) -> Model:
-        """The full model."""
-        return Model(self.errors, "full")
-
-    @cached_property
-    def groups(self) -> tuple[Correlated, ...]:
-        """Covariances that the mission declares for the errors of its platforms."""
-        return correlated_errors(self.mission)
-
-    @property
-    def gates(self) -> list[str]:
-        """Names of the gating models, which are those whose limits the mission must meet.
-
-        There is one name, or both names if the stricter model decides.
-        """
-        return [name for name in ("published", "full") if self.mission.gating_model in (name, "strictest")]
-
-    def models(self, gating: str) -> tuple[Model, Model]:
-        """The gating model and the other model, given the name of the gating model, `published` or `full`."""
-        return (self.full, self.published) if gating == "full" else (self.published, self.full)
-
-    @cached_property
-    def allocation(self) -> Allocation:
-        """Budgets of the cases, divided between the owners.
-
-        A `balanced` division is in proportion to the phases in the gating model. Under `strictest` it is in
-        proportion to the larger of the phases in both models.
-        """
-        return allocate(self.mission, (self.together(model) for model in self.gates))
 
 
 class Case:

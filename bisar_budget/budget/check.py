@@ -61,16 +61,17 @@ def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_O
         Rows of declared and undeclared errors, in the order of the contract.
     """
     analysis = Analysis(mission, is_complete=True)
-    return _findings(judged_mission(analysis, today), Case(analysis), today, outside)
+    return _findings(judged_mission(analysis, today), Case(analysis), today, outside, analysis)
 
 
 def check_missions(
-    missions: Sequence[Mission], today: date, *, outside: Outside = NOTHING_OUTSIDE
+    missions: Sequence[Mission], today: date, *, outside: Outside = NOTHING_OUTSIDE, keeps_analysis: bool = True
 ) -> Iterator[tuple[int, MissionFindings]]:
     """Check missions, and yield the index and the findings of each mission, in any order.
 
     Missions of the same shape are checked together as arrays. The findings have the same statuses and sentences as
-    those of `check_mission`, but numbers may differ within the tolerance of the numerical search.
+    those of `check_mission`, but numbers may differ within the tolerance of the numerical search. With
+    `keeps_analysis` the findings of each mission have its analysis, for further computations.
     """
     if len(missions) == 1:
         yield 0, check_mission(missions[0], today, outside=outside)
@@ -90,16 +91,20 @@ def check_missions(
                 )
                 judged = judged_mission(analysis, today)
                 for case_index, index in enumerate(block[same_nodes].tolist()):
-                    yield index, _findings(judged, Case(analysis, missions[index], case_index), today, outside)
+                    alone = Analysis(missions[index], is_complete=True) if keeps_analysis else None
+                    case = Case(analysis, missions[index], case_index)
+                    yield index, _findings(judged, case, today, outside, alone)
 
 
-def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) -> MissionFindings:
+def _findings(
+    judged: JudgedMission, case: Case, today: date, outside: Outside, analysis: Analysis | None
+) -> MissionFindings:
     """Collect the findings of one judged case, with their texts."""
     mission, geometry = case.mission, case.geometry
     waived = apply_waivers(list(rows_in_words(judged, case)), mission, today)
     rows, requirements = waived.rows, requirements_in_words(judged, case, waived)
     return MissionFindings(
-        analysis=case.analysis if case.analysis.is_by_itself else Analysis(mission, is_complete=True),
+        analysis=analysis,
         file=mission.file,
         name=mission.name,
         model=mission.gating_model,
@@ -285,7 +290,10 @@ def _kept(
         except MissionError as error:
             kept[file_index] = keep(UnusableMission(file=file, faults=error.faults, data=error.data))
     indices = list(missions)
-    for index, findings in check_missions(list(missions.values()), today, outside=outside):
+    keeps_analysis = keep is not without_analysis or drawn is not None
+    for index, findings in check_missions(
+        list(missions.values()), today, outside=outside, keeps_analysis=keeps_analysis
+    ):
         if drawn is not None:
             from bisar_budget.sampling.probability import monte_carlo
 

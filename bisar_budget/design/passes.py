@@ -361,7 +361,7 @@ def _checked(
             except MissionError as error:
                 fault = error.faults[0]
                 block[position] = unjudged._replace(status="error", reason=f"{fault.key}: {fault.problem}")
-        for index, findings in check_missions(missions, today):
+        for index, findings in check_missions(missions, today, keeps_analysis=False):
             block[places[index]] = _judged(block[places[index]], findings, missions[index], platform)
         yield from block
         progress(first + len(block), len(found))

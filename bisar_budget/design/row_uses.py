@@ -24,6 +24,7 @@ from bisar_budget.design.specified import specified_errors
 from bisar_budget.design.table import Variation
 from bisar_budget.design.varied import is_held
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
+from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.mission.changes import ACCEPTED_ERRORS
 from bisar_budget.mission.model import MetricSplits, Mission
@@ -185,7 +186,7 @@ class SpecifiedMission:
     @cached_property
     def _nodes(self) -> int:
         """Number of times in the aperture at which exact ranges are computed for the polynomial fit."""
-        return int(Analysis(self.stated).exact.fit.shape[1])
+        return int(exact_ranges(self.stated, self.stated.geometry).fit.shape[1])
 
     def uses(self, sizes: Floats) -> RowUses:
         """Compute the utilizations of all rows that can fail, for sizes (sizes, cases) of the specified errors."""

@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import __version__
-from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.arrays import Records
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
@@ -36,6 +36,7 @@ from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.paths.accuracy import block_turned, with_rate
 from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import Instant, parse_instant
+from bisar_budget.ranges.resolution import resolution
 from bisar_budget.simulator.collection import PointCollection
 from bisar_budget.simulator.phase_history import Errors, Flight, ReceiverNoise
 from bisar_budget.simulator.point import SimulationError, declared_errors, pulses_for
@@ -167,8 +168,9 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
         raise SimulationError(f"the declared errors leave no image of a point: {fault}") from None
     shift = max(abs(component) for component in effect.displacement)
     reach = max(max(abs(target.east), abs(target.north)) for target in targets.points)
-    resolution = Case(Analysis(mission)).resolution
-    cell = float(resolution.range), float(resolution.cross_range)
+    exact, T = exact_ranges(mission, mission.geometry), mission.collection.aperture_time
+    widths = resolution(exact, mission.geometry, mission.radar, T)
+    cell = float(widths.range), float(widths.cross_range)
     half = float(math.ceil(reach + shift + _AREA_MARGIN_CELLS * max(cell)))
     times: Floats = np.linspace(-T / 2, T / 2, _EXTENT_SAMPLES)
     flown = collection.flight(errors.smooth(), times)
