@@ -589,7 +589,7 @@ class BistaticGeometry:
 
     @cached_property
     def gradient_angle(self) -> PerCase:
-        """Angle between the range gradient and the Doppler gradient on the ground, as lines, 0 to π/2. [rad]"""
+        """Acute angle between the range gradient and the Doppler gradient on the ground, 0 to π/2. [rad]"""
         return angle_between_lines(self.range_gradient, self.doppler_gradient)
 
     def range_resolution(self, bandwidth_hz: PerCase, speed_of_light: float) -> PerCase:

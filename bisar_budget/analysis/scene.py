@@ -666,7 +666,7 @@ def _evaluate(edges: SceneEdges, members: Sequence[Sequence[int]], of: Indices) 
 
 
 def _largest(phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> Heights:
-    """Largest differences on circles with their azimuths, for errors of any size. [rad]"""
+    """Largest phase difference from the centre on each circle, and its azimuth, for errors of any size. [rad]"""
     largest = Heights(rims.difference.copy(), rims.azimuth.copy())
     large_circles = np.flatnonzero(np.isfinite(rims.difference) & phases.is_large[:, of].any(axis=0))
     if large_circles.size:

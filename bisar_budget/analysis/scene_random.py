@@ -173,7 +173,7 @@ class _Delay(NamedTuple):
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phase due to each independent variation of the delay at places, (courses, places). [rad]"""
+        """Quadratic phase at scene places due to each independent variation of the delay, (courses, places). [rad]"""
         along = np.zeros(())
         for platform_index, middle in zip(self.platform_indices, self.middles, strict=True):
             x, y, z = (component[of] for component in middle)

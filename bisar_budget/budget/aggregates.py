@@ -148,7 +148,7 @@ class Aggregates:
         )
 
     def _of_owners(self, split: Shares, owner: str) -> Sequence[RandomError]:
-        """List the random errors (sensors, clocks, atmosphere) that use the share of an owner."""
+        """List the random errors (sensors, clocks, atmosphere) that count against the budget share of `owner`."""
         return [error for error in self.together("full").random if split.includes(error.owner, owner)]
 
     def _is_declared(self, members: Iterable[DeclaredPhase]) -> Booleans:

@@ -488,7 +488,7 @@ def missing_settings(mission: Mission) -> list[str]:
 
 
 def collection_notes(case: Case) -> Iterator[Note]:
-    """Yield notes on collections for which the published model may fail, and on effects that an image cannot show."""
+    """Yield notes on assumptions of the models that a collection may violate, and on images with several peaks."""
     mission = case.mission
     for name, state in zip(PLATFORMS, case.geometry.both, strict=True):
         if not state.is_straight:

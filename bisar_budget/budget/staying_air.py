@@ -4,7 +4,8 @@ In apertures of one minute or longer, the atmosphere differs between the two end
 is treated as constant: it displaces the image, and its phase changes only with the elevation. This is only part of
 the true effect. Therefore the delays are also computed with a correlation time of ten minutes. A requirement is not
 evaluated if such changing delays would use more than a tenth of it, or would exceed it together with the declared
-errors. Effects of changing delays that no requirement covers follow the rule of `UntakenEffect`.
+errors. If changing delays would cause an effect that no requirement covers and that is not negligible, the rows of
+these delays are not evaluated.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -106,9 +106,9 @@ def allocate(
 
 
 def _write_mission(sheet: "SpecificationSheet", output: str, model: str | None) -> None:
-    """Write the mission file with the specified sizes as its errors and specifications; nothing without any.
+    """Write the mission file with the specified sizes as its errors and specifications.
 
-    Before that, the text is read as if it were in its folder, with the files that it names.
+    Nothing is written if there are no specifications, or if the new text, read as the file `output`, is not valid.
     """
     from bisar_budget.faults import MissionError, SetValue
     from bisar_budget.mission.edited import in_folder, with_section, with_values

@@ -130,11 +130,11 @@ def sensitivity(
 ) -> None:
     """Rank the numbers of a mission by their effect on its worst utilization.
 
-    Each number that the file states, or takes from a part of the catalogue, is changed alone and the mission
-    checked again: by 1 % to both sides, directions by a quarter of a degree and levels by a quarter of a decibel,
-    reported per degree and decibel, positions on the Earth by 1 % of the smaller slant range. With balanced shares a
-    second table shows the cost of relaxing an error for the others. Exit code: 0, or 2 for wrong usage or an unusable
-    mission file.
+    Each number that the file states, or takes from a part of the catalogue, is increased and decreased alone, and
+    the mission is checked again. Most numbers change by 1 %. Directions change by a quarter of a degree and levels
+    by a quarter of a decibel; their effects are reported per degree and per decibel. Latitudes and longitudes change
+    by 1 % of the smaller slant range. With balanced shares, a second table shows how much the other errors lose if
+    one error is doubled. Exit code: 0, or 2 for wrong usage or an unusable mission file.
     """
     from bisar_budget.front import questions
     from bisar_budget.report.formats import answers

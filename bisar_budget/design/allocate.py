@@ -319,11 +319,11 @@ class _SizeSearch:
         return np.array([uses.get(row, 0.0) for row in near.found.ids])
 
     def _row_uses(self, near: Near, used: Floats, parts: Floats, multipliers: Floats) -> Iterator[RowUse]:
-        """Yield the rows that limit a size, with the largest multiplier first.
+        """Yield the rows that limit the sizes, the row with the largest multiplier first.
 
-        `used` are the utilizations (rows,). `parts` are the contributions of the errors (limiting rows, sizes), as
-        fractions of the allowed utilization raised to the power of the row. `multipliers` have the shape (limiting
-        rows,).
+        `used` (rows,) are the utilizations. In a row with the power p, the p-th powers of the contributions add:
+        `parts` (limiting rows, sizes) are these powers, divided by the p-th power of the allowed utilization.
+        `multipliers` (limiting rows,) tell how strongly each row limits the sizes, see `RowUse`.
         """
         row_indices = np.flatnonzero(near.is_limit)
         for limit in np.argsort(-multipliers, kind="stable").tolist():

@@ -126,7 +126,7 @@ class Slope(NamedTuple):
 
     @property
     def even_effect(self) -> float:
-        """Effect of an increase by 1 % in the measure that is common to all numbers; see `measure`."""
+        """Effect of an increase by 1 % in the sense of `measure`, to compare numbers of different kinds."""
         return self.effect * COMPARED_CHANGE_FRACTION / self.measure
 
     @property

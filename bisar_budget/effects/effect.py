@@ -1,4 +1,4 @@
-"""Effect of one unit of an error on the range history and the image in both models, and the error's subject.
+"""Owner, kind and axis of an error (`Subject`), and the effect of one unit of it in the published and full model.
 
 The published effects follow Rigling & Moses (Tables I and II). The full model includes the turn of the line of sight
 and the phase that the displacement of the image adds (`ranges.exact_ranges`).

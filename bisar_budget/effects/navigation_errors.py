@@ -76,7 +76,7 @@ def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
 
 
 def process_axes(mission: Mission, error: RandomError) -> dict[str, Floats]:
-    """Axes (3, 3) along which a process moves each platform, as a mapping from the platform's name."""
+    """Axes (3, 3) of the correlated position noise `error` for each platform that it moves, by platform name."""
     if error.subject.kind == "trajectory":
         return {error.owner: _log_process(mission, error.owner, error.subject.axis)[1]}
     common, names = mission.common_motion_error, [error.owner]
@@ -367,7 +367,7 @@ def _walks(first: int, second: int, count: int) -> _Walks:
     number = np.arange(count)
 
     def order_of(times: int) -> Floats:
-        """Legendre order n of the integral of a unit impulse at each start time, (n, starts)."""
+        """Legendre coefficients of a unit impulse at each start time, integrated `times` + 1 times, (n, starts)."""
         ahead = start[:, None] + (1 - start[:, None]) * start
         grown = ((ahead - start[:, None]) ** times / math.factorial(times)) * weight * (1 - start[:, None])
         return np.asarray((2 * number[:, None] + 1) / 2 * np.einsum("snp,sn->ps", _legendre(ahead, count), grown))

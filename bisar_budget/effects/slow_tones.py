@@ -67,7 +67,7 @@ class TonePhases:
 
     @cached_property
     def quadratic(self) -> Floats:
-        """Quadratic phase for the worst phase of each axis, (cases,). [rad]"""
+        """Sum of the quadratic phases of all axes, each at the worst phase ψ of its vibration, (cases,). [rad]"""
         return _worst(np.square(self.quadratics))
 
     @cached_property

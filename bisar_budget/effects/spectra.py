@@ -212,7 +212,7 @@ def left_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval:
 
 
 def _like(total: Floats, aperture_time: PerCase) -> Parts:
-    """Convert the array of parts to `Parts` of numbers or of arrays, as `aperture_time` is."""
+    """Convert the array of parts to `Parts`: of arrays if `aperture_time` is an array, otherwise of numbers."""
     return Parts(*total) if np.ndim(aperture_time) else Parts(*total[:, 0].tolist())
 
 

@@ -10,13 +10,13 @@ from typing import NamedTuple
 class Status(NamedTuple):
     """One status, with the fields that all formats need, so that no format has its own list of statuses.
 
-    `gates` tells whether a mission can have the status. `fails` and `fails_strict` tell whether the status breaks a
-    run, or a strict run. `is_judged` tells whether a number was to be compared with a requirement, even if that was
-    not possible. `is_met` tells whether the requirement is met. `is_explained` tells whether the reason for the
-    status is decisive. `sarif` and `github` are levels of findings; if one is empty, the status is no finding in that
-    format. `junit` is the outcome of a test case: failure, skipped, passed, or passed with a remark. `verdict` is the
-    verdict on a mission in a compliance report. `sgr` is the colour on a terminal (ECMA-48), `color` is the colour on
-    a page, and `symbol` is the mark before the status.
+    `gates` tells whether the status of a row can become the status of its mission. `fails` and `fails_strict` tell
+    whether the status makes a run, or a strict run, fail. `is_judged` tells whether a row counts as judged, even if
+    the comparison with a requirement was not possible. `is_met` tells whether the requirement is met. `is_explained`
+    tells whether reports give the reason for the status. `sarif` and `github` are levels of findings; if one is
+    empty, the status is no finding in that format. `junit` is the outcome of a test case: failure, skipped, passed,
+    or passed with a remark. `verdict` is the verdict on a mission in a compliance report. `sgr` is the colour on a
+    terminal (ECMA-48), `color` is the colour on a page, and `symbol` is the mark before the status.
     """
 
     name: str

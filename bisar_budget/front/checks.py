@@ -260,9 +260,9 @@ def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "I
 
 # ---------------------------------------------------------------------- images
 def with_images(missions: Sequence[CheckedMission], today: dt.date, *, is_illustrated: bool) -> list[CheckedMission]:
-    """Form images at the limits of usable missions, and return the missions with the verdicts of the images.
+    """Verify the limits of usable missions by images, and return all missions, with the verdicts of the images.
 
-    With `is_illustrated` they also have the images of the rows that decide.
+    With `is_illustrated` the usable missions also have images for their most important rows.
     """
     from bisar_budget.budget.verdicts import with_verdicts
     from bisar_budget.front import imaging

@@ -119,7 +119,7 @@ class Propagation(NamedTuple):
         return None if leg is None else leg.zenith_electron_content
 
     def source_of(self, platform: str) -> str | None:
-        """Source of the delays of the leg of a platform."""
+        """Source that the file cites for the delays on the leg of a platform; None if it cites none."""
         leg = self.leg(platform)
         return None if leg is None else leg.source
 

@@ -674,7 +674,7 @@ class Section(Reader[T_co]):
 
 
 class ListOf(Reader[tuple[T_co, ...]]):
-    """A list of sections, of one kind or of several forms."""
+    """A list of sections, which all have the same keys, or of which each has one of several forms."""
 
     def __init__(self, kind: "Callable[..., T_co] | Reader[T_co]") -> None:
         self.section: Reader[T_co] = kind if isinstance(kind, Reader) else Section(kind)

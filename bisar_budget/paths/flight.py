@@ -497,7 +497,10 @@ def _information(residuals: Floats, coefficients: int, independent: float) -> fl
 
 
 def _fit(times: Floats, log_positions: Floats, half_s: float, *, may_have_pieces: bool) -> _SmoothFit:
-    """Path through the fixes of a stretch with the smallest Bayesian information criterion (Schwarz 1978)."""
+    """Fit the path with the smallest Bayesian information criterion (Schwarz 1978) to the fixes of a stretch.
+
+    The path is a polynomial, or with `may_have_pieces` a spline if its criterion is smaller.
+    """
     inside = np.abs(times) <= half_s * (1 + 1e-9)
     times_inside, positions, count = times[inside], log_positions[inside], int(inside.sum())
     normalised_times = times_inside / half_s
@@ -797,7 +800,10 @@ def _hold_to_clock(log: Log, center: Instant | None, center_seconds: float | Non
 
 
 def dated(log: Log, center: Instant | None) -> Log:
-    """Give a log of times of day the date nearest to the middle of the aperture. Any other log is unchanged."""
+    """Add a date to a log that has only times of day: the date that brings it nearest to the middle of the aperture.
+
+    Any other log is returned unchanged, and so is every log if `center` is None.
+    """
     if log.clock != "day" or log.start is not None or center is None:
         return log
     middle_time = float(log.times[len(log.times) // 2])

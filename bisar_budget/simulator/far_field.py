@@ -78,8 +78,8 @@ def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: 
     """Sum of (7) by a non-uniform FFT; None if `bounded` and the grid of the FFT would be too large.
 
     The number of cells of the grid is the size of the box around the points times the size of the box around the
-    wavenumbers. Both boxes are along and across the look direction. With boxes along other axes, a patch with cells
-    that are kilometres long would need millions of grid cells.
+    wavenumbers. Both boxes have sides along and across the look direction. With other sides, a patch whose resolution
+    cells are kilometres long would need millions of grid cells.
     """
     import finufft
 

@@ -89,7 +89,7 @@ class ImagePanel(NamedTuple):
 
 
 class Sheet(NamedTuple):
-    """Numbers of all figures.
+    """Data of Figures 3 to 7.
 
     `segments` (3, 2, 2) are the end points, time [s] and range error [mm], of three straight lines, each of which
     approximates the range error over a third of the aperture. `points` (3, 2) are the image points of these thirds by

@@ -235,9 +235,10 @@ def _seen(points: Sequence[svg.Point]) -> list[svg.Point]:
 
 
 def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Floats]) -> float:
-    """Draw a bar for each word: its utilization or column value in the colour of its status, and dots for rows.
+    """Draw a sweep over a key whose values are words: one bar for each word, in the colour of its status.
 
-    Returns the bottom of the drawing. [px]
+    A bar shows the worst utilization, with a dot for each row, or the value of the column. Returns the bottom of the
+    drawing. [px]
     """
     (axis,) = trade.axes
     left = min(max(map(svg.text_width, axis.words)) + 34, _MAX_NAMES_PX)
@@ -478,9 +479,9 @@ def _names(
 
 # ---------------------------------------------------------------- from above
 def _from_above(around: Axis, radius: Axis, frame: svg.Box) -> _Plane:
-    """Mapping of a polar map: azimuth from east, counter-clockwise, and the other key as a radius from 0.
+    """Scales of a polar map: azimuth counter-clockwise from east, and the other key as the radius.
 
-    If the other key is an elevation, the middle is 90 deg, because a platform there is above the scene.
+    The middle is 0, or 90 deg if the other key is an elevation, because a platform there is above the scene.
     """
     first, last = float(around.values[0]), float(around.values[-1])
     is_elevation = radius.key.endswith(".elevation")

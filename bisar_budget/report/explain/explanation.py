@@ -255,9 +255,9 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
 def _vibration_in_its_unit(
     mission: Mission, allocation: Allocation, row: Row, tone: SlowTone | None
 ) -> Iterator[Step]:
-    """Yield the steps of a vibration in the unit of the file.
+    """Yield the steps that explain a vibration, with the results in the unit of the file.
 
-    For a spectral line that the file states in g, the steps are in metres, and the results are converted back.
+    A spectral line that is stated as an acceleration is explained in metres, and the results are converted back.
     """
     lines = lines_of(mission, row.owner)
     entry = row.subject.entry or 0

@@ -281,7 +281,7 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
 
 
 def _shown(imaged: Imaged) -> str:
-    """Text of the verdict from an image of the binding row."""
+    """Text of the verdict that an image gives on the binding row, or of the reason why there is no verdict."""
     row = f"{printable(imaged.row)} at {printable(imaged.at)}"
     verdict = imaged.verdict
     if verdict is None:

@@ -153,7 +153,7 @@ def as_text(passes: Passes, style: Style) -> str:
 
 
 def verdict(passes: Passes) -> str:
-    """Sentence with the numbers of complying passes and of all passes, the period and the least elevation.
+    """Sentence that tells how many of the passes comply, with the minimum elevation, the squint and the period.
 
     Waived passes are counted separately.
     """
