@@ -1,0 +1,93 @@
+"""The registry of kinds of error: ids of rows, names, and kinds that a package adds."""
+
+import numpy as np
+import pytest
+
+import bisar_budget as bb
+from bisar_budget import error_kinds, units
+from bisar_budget.error_kinds import kind_of, kinds
+from tests.conftest import ROOT
+
+# Ids that the contract lists, by kind, owner, axis and entry.
+IDS = {
+    ("velocity", "receiver", "x", None): "receiver.velocity.x",
+    ("position", "mission", "along", None): "common.position.along",
+    ("time_tag", "transmitter", "", None): "transmitter.time_tag",
+    ("time_tag", "mission", "", None): "common.time_tag",
+    ("random", "receiver", "GNSS", None): "receiver.random.GNSS",
+    ("random", "mission", "GNSS", None): "common.random.GNSS",
+    ("vibration", "receiver", "sinusoidal", 0): "receiver.vibration.sinusoidal.0",
+    ("vibration", "mission", "wideband", None): "mission.vibration.wideband",
+    ("imu", "receiver", "gyro_bias", None): "receiver.imu.gyro_bias",
+    ("lever_arm", "receiver", "uncertainty", None): "receiver.lever_arm.uncertainty",
+    ("oscillator", "transmitter", "", None): "transmitter.oscillator",
+    ("oscillator", "transmitter", "acceleration", None): "transmitter.oscillator.acceleration",
+    ("timing", "clock", "quadratic", None): "timing.quadratic",
+    ("time", "clock", "", None): "timing.time",
+    ("synchronization", "clock", "", None): "timing.synchronization",
+    ("propagation", "receiver", "zenith_delay", None): "propagation.receiver.zenith_delay",
+    ("propagation", "mission", "zenith_delay", None): "propagation.zenith_delay",
+    ("dispersion", "mission", "", None): "propagation.dispersion",
+    ("terrain", "mission", "", None): "mission.terrain",
+    ("other", "mission", "antenna", None): "other.antenna",
+    ("quadratic_phase_error", "clock", "", None): "timing.quadratic_phase_error",
+    ("quadratic_phase_error", "mission", "", None): "mission.quadratic_phase_error",
+    ("specification", "receiver", "receiver.velocity", None): "specification.receiver.velocity",
+}
+
+
+@pytest.fixture(autouse=True)
+def own_registry(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kinds that a test registers are gone after it."""
+    monkeypatch.setattr(error_kinds, "_KINDS", dict(error_kinds._KINDS))
+
+
+def still(path: object, times: np.ndarray) -> np.ndarray:
+    return np.zeros((3, *times.shape))
+
+
+def kind(name: str) -> bb.MotionKind:
+    return bb.MotionKind(name=name, dimension=units.LENGTH, description="An error that moves nothing.", motion=still)
+
+
+@pytest.mark.parametrize("key", IDS, ids=str)
+def test_the_ids_of_rows_are_those_of_the_contract(key: tuple[str, str, str, int | None]) -> None:
+    name, *parts = key
+    assert kind_of(name).row_id(*parts) == IDS[key]
+
+
+def test_a_kind_has_one_name() -> None:
+    assert len({each.name for each in kinds()}) == len(kinds())
+    with pytest.raises(ValueError, match="'velocity' is registered already"):
+        bb.register(kind("velocity"))
+
+
+@pytest.mark.parametrize("name", ["", "Drift", "phase centre", "2nd", "a.b"])
+def test_a_name_fits_into_a_row_id(name: str) -> None:
+    with pytest.raises(ValueError, match="is no name of a kind"):
+        kind(name)
+
+
+def test_a_kind_that_moves_nothing_passes_without_a_limit() -> None:
+    bb.register(kind("moves_nothing"))
+    mission = bb.load(str(ROOT / "specs/missions/tandem_x.yaml"))
+    row = bb.check(mission.replace({"platforms.receiver.motion_error.registered.moves_nothing": "1 m"}))[
+        "receiver.moves_nothing"
+    ]
+    assert (row.declared, row.allowable) == (1.0, None)
+    assert row.displacement_m == (0.0, 0.0)
+
+
+def test_both_platforms_may_have_it_and_its_sign_counts() -> None:
+    """The same rigid shift of both platforms as a registered kind and as `common_motion_error`."""
+
+    def north(path: object, times: np.ndarray) -> np.ndarray:
+        return np.stack([0 * times, 0 * times + 1, 0 * times])
+
+    bb.register(bb.MotionKind(name="shift_north", dimension=units.LENGTH, description="Shift.", motion=north))
+    mission = bb.load(str(ROOT / "specs/missions/tandem_x.yaml"))
+    key = "platforms.{}.motion_error.registered.shift_north"
+    shifted = bb.check(mission.replace({key.format("transmitter"): "1 m", key.format("receiver"): "-1 m"}))
+    moved = [np.array(shifted[f"{name}.shift_north"].displacement_m) for name in ("transmitter", "receiver")]
+    common = bb.check(mission.replace({"common_motion_error.position": ["0 m", "1 m", "0 m"]}))["common.position.y"]
+    assert moved[0] - moved[1] == pytest.approx(np.array(common.displacement_m), abs=1e-6)
