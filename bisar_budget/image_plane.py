@@ -266,11 +266,13 @@ def turn(determinant: Floats, orientation: Floats, centre: GroundMatrix, case: I
 def spans_ground(
     geometry: BistaticGeometry, radar: Band, aperture_time_s: PerCase, cases: int = 1
 ) -> tuple[Booleans, Floats]:
-    """Whether the lines of sight turn within the aperture, and the sine of `GroundMatrix.sine`, (cases,) each.
+    """Two criteria of whether a collection has an image plane, (cases,) each.
 
-    A full circle has an image plane. An aperture that contains a moment at which the range and Doppler gradients are
-    parallel also has one. If a collection has no image plane, the gradients are within a degree of parallel over the
-    whole aperture.
+    The first is whether the sum of the lines of sight turns within the aperture. The second is `GroundMatrix.sine`,
+    the sine of the angle between the directions that band and turn resolve. There is no image plane if the sum does
+    not turn, or if this angle is less than a degree. Both criteria refer to the whole aperture. A full circle
+    therefore has an image plane, and so has an aperture with a moment at which the range and Doppler gradients are
+    parallel.
     """
     half = np.array(np.broadcast_to(np.asarray(aperture_time_s, dtype=float) / 2, (cases,)))
     sampling = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_PATH_NODES)))

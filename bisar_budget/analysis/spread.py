@@ -83,7 +83,7 @@ def spread_phase(ratio: PerCase, model: str, energy: float) -> Any:
     ratio : float or array
         ISLR as a power ratio.
     model : str
-        `published` for the paper's rule; any other name for the ISLR of an image.
+        `published` takes the ISLR by the paper's rule, σ². Any other name takes the ISLR of an image.
     energy : float
         Share E, see `mainlobe_energy`.
     """
@@ -235,10 +235,10 @@ def stated_powers(mission: Mission) -> list[StatedPower]:
 def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str) -> list[list[SpreadPhase]]:
     """List, for each owner, the phases that count against its share of the ISLR.
 
-    All phases count against the requirement of the mission. The phases are noise, the phases of errors beyond the
+    For the owner `mission`, these are the phases of all owners. The phases are noise, the phases of errors beyond the
     cubic order, the tones if there is no requirement on PSLR, and the cubic phase if it has no requirement of its
-    own. The cubic phase of an owner is that at one sigma. It is left out where it is negligible, or where an error
-    has no image. A variance [rad²] is NaN in cases that do not have the phase.
+    own. The cubic phase combines the errors of the owner at one sigma. It is left out where it is negligible, or
+    where an error is too large for an image. A variance [rad²] is NaN in cases that do not have the phase.
     """
     mission, split, together = analysis.mission, analysis.allocation.islr, analysis.together(model)
     spreads = noise(analysis, model) + analysis.rests(model)

@@ -184,9 +184,10 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
 
 
 def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str, VibrationLimits]]:
-    """Name of the requirement that limits tones, and the limit of each platform; empty without a requirement.
+    """Name of the requirement that limits tones, and the largest amplitude of a tone of each platform. [m]
 
-    Without a PSLR requirement it is ISLR, where a tone of peak phase φ spreads φ²/2.
+    Tones are limited by the requirement on PSLR. If there is none, the requirement on ISLR limits them, with the
+    phase variance φ²/2 of a tone of peak phase φ. Without either requirement there are no limits.
     """
     needs = mission.requirements
     if needs.pslr is not None or needs.islr is None:

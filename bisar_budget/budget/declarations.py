@@ -48,9 +48,10 @@ def swings_nothing(platform: Platform) -> bool:
 
 
 def _lacks_an_attitude(mission: Mission, name: str) -> str:
-    """Describe the missing keys of a lever arm; empty if no key is missing.
+    """Describe the attitude errors that are missing beside a lever arm; empty if none are missing.
 
-    Attitude errors rotate the full arm. The uncertainty of the arm alone is not enough.
+    The arm itself has an effect only if an attitude error rotates it. If the file gives the arm, an attitude error is
+    required too, and a stated uncertainty of the arm does not replace it.
     """
     if not swings_nothing(getattr(mission.platforms, name)):
         return ""

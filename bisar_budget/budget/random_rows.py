@@ -632,6 +632,9 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
 
 
 def _levels(mission: Mission, model: str) -> Callable[[float], float]:
-    """Return a function that converts an rms phase [rad] to an ISLR [dB] with one model; 0 for a phase of 0."""
+    """Return a function that converts an rms phase [rad] to the ISLR [dB] that it adds by a model.
+
+    A phase of 0 adds no power, which has no level in dB. The function then returns 0.
+    """
     energy = mainlobe_energy(mission)
     return lambda rms: float(islr_db(rms**2, model, energy)) if rms else 0.0

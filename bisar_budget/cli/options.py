@@ -209,7 +209,10 @@ def wrong_usage() -> Iterator[None]:
 def ask_each(
     missions: "Sequence[Mission]", model: str | None, today: datetime | None, ask: Callable[..., Answer]
 ) -> Iterator[Answer]:
-    """Yield the result of `ask` for each mission in turn; ends the command if it is impossible for a mission."""
+    """Yield the result of `ask` for each mission in turn.
+
+    If a mission cannot answer the question, the command ends with an error message that names the file.
+    """
     from bisar_budget.mission.quantities import QuestionError
 
     judged_on, from_outside = day_and_outside(today)

@@ -114,10 +114,10 @@ def _verdict(
     """Make the columns of the verdict: the status of the mission or of one row, and the binding row, in each case.
 
     The binding row is the judged row with the highest utilization; among rows that differ only by rounding it is the
-    first one. A row that is not evaluated and has no number cannot be the binding row. If the mission does not
+    first one. A row that is not evaluated and has no utilization cannot be the binding row. If the mission does not
     comply, the binding row is one of the rows that break a limit, and a waived row only if no other row breaks one.
-    A case that is not evaluated has no utilization, because the utilization of a row would not belong to the
-    requirement that decides.
+    If the verdict of a case is `not_evaluated`, its utilization is NaN: a missing evaluation decides the verdict, and
+    not the utilization of a row.
     """
     rows = list(judged.rows) if row_id is None else [by_id[row_id]] if row_id in by_id else []
     if not rows:

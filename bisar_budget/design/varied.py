@@ -147,10 +147,10 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
 
 
 def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
-    """Whether the numbers with joint bounds are certainly valid in each case, (cases,).
+    """Whether the numbers whose bounds depend on other numbers are valid in each case, with a margin, (cases,).
 
-    Joint bounds exist for the shares, the bandwidth and the noise mask of an oscillator, the correlations, and the
-    age of a holdover.
+    These numbers are the shares of a budget, the bandwidth and the noise mask of an oscillator, the correlations of a
+    covariance, and the age of a holdover.
     """
     is_safe = np.ones(cases, dtype=bool)
     sync = mission.synchronization

@@ -131,7 +131,7 @@ def _parts(
 def combined_phase(phases: Phases, rule: str, groups: Sequence[Correlated] = ()) -> PerCase:
     """Combine the phases of errors by a rule. [rad]
 
-    Under `rss` the phases of a covariance are combined with their correlations.
+    Under `rss` the phases of the six errors of a covariance are combined with the correlations of these errors.
     """
     return combined([phase for _, phase in phase_parts(phases, rule, groups)], rule)
 

@@ -601,10 +601,10 @@ def _ends(piece: PowerLawPiece) -> Iterator[float]:
 
 
 def _panels(high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
-    """Pairs of neighbouring edges, from 0 Hz to `high`.
+    """Lower and upper ends of the frequency panels between 0 Hz and `high` that the edges separate. [Hz]
 
-    Two edges that differ only by rounding count as one. Between them, a tone would be folded onto 0 Hz, where a
-    spectrum has no value.
+    Edges that differ only by rounding count as one. A frequency in a panel between them could be folded onto 0 Hz,
+    where a spectrum has no value.
     """
     kept = [0.0]
     for edge in sorted(edges):

@@ -523,10 +523,10 @@ def _parts_of(
 def _with_sensors(
     error: MotionError, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]
 ) -> MotionError | Invalid:
-    """Add figures of parts to a motion error that lacks them; returns `INVALID` after a report.
+    """Complete a motion error with the figures of the parts that it names; `INVALID` if a problem is reported.
 
-    Figures that come from parts are appended to `taken`. A figure in the file overrides the same figure of a part,
-    and the motion error lists it as overridden.
+    Figures that come from parts are appended to `taken`. If the file states a figure that a part also states, the
+    figure of the file is kept, and the motion error lists that of the part as overridden.
     """
     path = (*path, "sensor")
     entries = _parts_of(error.sensor, path, ("imu", "gnss"), find, report)

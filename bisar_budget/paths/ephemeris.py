@@ -303,9 +303,11 @@ def velocity_error(samples: Sequence[Sample]) -> float:
 
 
 def _velocity_error_at(samples: Sequence[Sample], middle: int) -> float:
-    """Relative difference between stated velocities and the velocity of positions, in the interval before a sample.
+    """Relative difference between the stated velocities and the change of the positions, between two samples.
 
-    The interpolated velocities are integrated by Gauss-Legendre quadrature. Derived here.
+    The samples are `middle` and the one before it. The stated velocities are interpolated, and averaged over the
+    interval by Gauss-Legendre quadrature. Their mean is compared with the change of position divided by the time.
+    Derived here.
     """
     neighbours = samples[middle - _NEIGHBOUR_SAMPLES : middle + _NEIGHBOUR_SAMPLES]
     velocities = [Sample(sample.time, sample.velocity, sample.velocity) for sample in neighbours]

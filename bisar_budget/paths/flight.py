@@ -693,8 +693,8 @@ def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s:
 def around_aperture(times: Floats, aperture_time_s: float) -> slice:
     """Slice of the fixes in the aperture and of the fixes directly before and after it, from slow times (n,) [s].
 
-    The largest sigma of these fixes is used. With their mean, the declared error would be smaller than the error of
-    the log at some times of the aperture.
+    The accuracy of a log is the largest sigma of these fixes. The mean sigma would be smaller than the error of the
+    log at some times of the aperture.
     """
     half = aperture_time_s / 2
     first = max(int(np.searchsorted(times, -half, "right")) - 1, 0)

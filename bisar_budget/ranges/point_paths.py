@@ -264,10 +264,10 @@ class PointPaths:
 
     # ---------------------------------------------------------------- predictions
     def _distance_to_fold(self, index: Indices, lane: Indices, last: Floats) -> Floats:
-        """Increase in size up to the next fold, where gradients are parallel; infinite if no fold is ahead. [unit]
+        """Increase of an error's size from its last known point to the next fold; infinite if none is ahead. [unit]
 
-        The area is the root of the determinant of H. A parabola through the squares of the last three areas is
-        extrapolated to zero.
+        At a fold the range and Doppler gradients are parallel, and the determinant of H is zero. A parabola through
+        the determinants (squared areas) at the last three known points is extrapolated to zero.
         """
         before, earlier = (self._point(lane, np.maximum(index - back, 0)) for back in (1, 2))
         step, step_before = last[SIZE] - before[SIZE], before[SIZE] - earlier[SIZE]

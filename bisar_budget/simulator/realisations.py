@@ -572,7 +572,10 @@ def fast_steps(least: int) -> int:
 
 
 def tones_at(amplitudes: Complexes, count: int) -> Floats:
-    """Sum of harmonics 1, 2 … at `count` moments that divide their period evenly, from its start, (count,)."""
+    """Sum of harmonics 1, 2 … at `count` evenly spaced times of one period, (count,).
+
+    `amplitudes` are the complex amplitudes of the harmonics. The first time is the start of the period.
+    """
     sums: Floats = np.fft.ifft(_folded(amplitudes, count), norm="forward").real
     return sums
 

@@ -154,7 +154,10 @@ class SensorFigure(NamedTuple):
 
 @cache
 def inertial() -> tuple[SensorFigure, ...]:
-    """Figures of merit of an inertial sensor for one aperture, in the order of the mission file. [rad²/unit²]"""
+    """Figures of merit of an inertial sensor, in the order of the mission file.
+
+    The moments of each figure are those of the phase over one aperture. [rad²/unit²]
+    """
     k = one_way_phase(Integer(1))
 
     def figure(symbol: str, name: str, says: str, of_range: Moments, size: Expr, power: Expr) -> SensorFigure:

@@ -413,9 +413,10 @@ def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float
 
 # ---------------------------------------------------------------------- location
 def location(study: Study, requirement: float) -> Verdict:
-    """Verify the location limit: all declared errors are scaled until the gating model displaces the image by it.
+    """Verify the location limit with one image that contains all declared errors.
 
-    The limit is confirmed if the displacement of the image agrees with the gating model to 5 % of the requirement.
+    The errors are scaled by a common factor, so that the displacement by the gating model equals `requirement`. The
+    limit is confirmed if the displacement of the image agrees with the gating model to 5 % of the requirement.
     For the published model (25), the effect of each single error must also agree with exact ranges. A displacement
     that is only shorter than expected is conservative; a displacement in a different direction is not.
     """

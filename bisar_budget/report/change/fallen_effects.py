@@ -247,7 +247,11 @@ def _source(mission: Mission, row: Row) -> str:
 
 
 def _is_named(source: str, mission: Mission, row: Row) -> bool:
-    """Whether a mission names `source` for a row or its section, or overrides values of a part of that name."""
+    """Whether a mission already has `source` as the source of a row, or of the section that contains its value.
+
+    It also counts if `source` begins with the name of a part whose values the section overrides. An empty source is
+    not a new one, and gives True.
+    """
     if source in ("", _source(mission, row)):
         return True
     if row.owner not in PLATFORMS:

@@ -260,10 +260,11 @@ class Contribution:
 
 
 def phase_contributions(page: Page) -> list[Contribution]:
-    """Contributions of the declared errors to the quadratic phase (of equal peak loss), largest first.
+    """List the quadratic phase that each declared error causes by itself, largest first.
 
-    Each contribution has its share of the sum and its values by both models. An error without an image has an
-    infinite phase. It comes first, and no error then has a share of the sum.
+    The quadratic phase is that of equal peak loss, which includes the hidden phase. Each contribution has its share
+    of the sum of all phases, and its values by the published and the full model. An error that is too large for an
+    image has an infinite phase and comes first. The sum is then infinite, and no contribution has a share.
     """
     by_model: dict[str, dict[str, float]] = {}
     for model in ("published", "full"):

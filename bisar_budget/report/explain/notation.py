@@ -441,7 +441,7 @@ def catalogued(formula: str, language: Language) -> str:
 def _mathml_filled(formula: str, values: Mapping[str, float]) -> str:
     """Replace the MathML elements of symbols by numbers.
 
-    A negative number gets brackets, and so does a number with a power of ten that is the base of a power.
+    A negative number gets brackets. So does a number that is raised to a power, if it is written with a power of ten.
     """
 
     def filled_match(match: re.Match[str]) -> str:

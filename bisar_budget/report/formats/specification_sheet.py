@@ -34,7 +34,7 @@ Answer = tuple[SpecificationSheet, Offer | None]  # a sheet, and the offer that 
 
 # ---------------------------------------------------------------- for programs
 def as_json(answers: Sequence[Answer], style: Style) -> str:
-    """Write `allocate/1`. Values are in SI; a missing value is null."""
+    """Write the sheets as a JSON document in the format `allocate/1`. Values are in SI; a missing value is null."""
     return document_text("bisar-budget/allocate/1", {"missions": [_document(answer) for answer in answers]})
 
 
