@@ -9,10 +9,10 @@ when a mission file or an option uses a kind that is not known yet, because read
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from bisar_budget import units
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from bisar_budget.arrays import Floats
     from bisar_budget.geometry import PlatformState
 
+_Entry = TypeVar("_Entry")
 ENTRY_POINT_GROUP = "bisar_budget.kinds"
 _OWNER_WORDS = {"clock": "timing"}  # owners that ids name otherwise
 
@@ -37,11 +38,18 @@ class ErrorKind:
         The owner `clock` is written `timing`.
     common_id_form : str
         Form of the row ids of an error that both platforms share; empty if the kind has no such error.
+    is_computed : bool
+        Whether the tool computes the declared size of a row, so that a size of zero is a result.
+    spectrum_axis : str, optional
+        Axis of the row about a declared spectrum, whose levels in decibels are relative to that spectrum; None if the
+        kind has no such row.
     """
 
     name: str
     id_form: str = "{owner}.{kind}.{axis}.{entry}"
     common_id_form: str = ""
+    is_computed: bool = False
+    spectrum_axis: str | None = None
 
     def row_id(self, owner: str, axis: str = "", entry: int | None = None) -> str:
         """Id of the row of an error of this kind. The contract defines it."""
@@ -53,6 +61,19 @@ class ErrorKind:
             "entry": "" if entry is None else str(entry),
         }
         return ".".join(filter(None, (part.format_map(names) for part in form.split("."))))
+
+    @property
+    def has_numbers(self) -> bool:
+        """Whether a row id contains the index of the error in a list of the file."""
+        return "{entry}" in self.id_form
+
+    def find_in(self, table: Mapping[str, _Entry], axis: str = "") -> _Entry:
+        """Entry of a table by kind: the entry `KIND.AXIS` if the table has one, else the entry `KIND`.
+
+        Raises `KeyError` if the table has neither.
+        """
+        name = f"{self.name}.{axis}"
+        return table[name] if name in table else table[self.name]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,6 +95,14 @@ class SourceKind(ErrorKind):
         Whether the error is correlated noise of a position.
     has_names : bool
         Whether a file may state several errors of the kind, each with a name.
+    is_of_log : bool
+        Whether the error is the noise of a log of a flight, whose file is the source of the error.
+    owes_source : bool
+        Whether a report names a declared error of the kind that has no source.
+    is_largest_of_axes : bool
+        Whether the declared size is described as the largest of three axes.
+    direction : str
+        Word for the direction of the error, if its ids have no axis for it.
     """
 
     moves: str
@@ -82,6 +111,20 @@ class SourceKind(ErrorKind):
     is_random: bool = False
     is_correlated: bool = False
     has_names: bool = False
+    is_of_log: bool = False
+    owes_source: bool = True
+    is_largest_of_axes: bool = False
+    direction: str = ""
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether the paths of both platforms can share the error."""
+        return self.moves == "platform" and bool(self.common_id_form)
+
+    @property
+    def has_covariance(self) -> bool:
+        """Whether a covariance in the file can state the error."""
+        return False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,6 +138,11 @@ class StateKind(SourceKind):
     common_id_form: str = "common.{kind}.{axis}"
     order: int
     unit: str
+
+    @property
+    def has_covariance(self) -> bool:
+        """Whether a covariance in the file can state the error: that of position and velocity."""
+        return self.order < 2
 
 
 Motion = Callable[["PlatformState", "Floats"], "Floats"]
@@ -188,9 +236,11 @@ for _kind in (
     StateKind(name="velocity", order=1, unit="m/s"),
     StateKind(name="acceleration", order=2, unit="m/s^2"),
     SourceKind(name="time_tag", moves="platform", flown_as="time_tag", common_id_form="common.{kind}"),
-    SourceKind(name="terrain", moves="platform", flown_as="height", is_covered=False),
-    SourceKind(name="vibration", moves="platform", is_random=True),
-    SourceKind(name="imu", moves="platform", is_random=True),
+    SourceKind(
+        name="terrain", moves="platform", flown_as="height", is_covered=False, owes_source=False, direction="height"
+    ),
+    SourceKind(name="vibration", moves="platform", is_random=True, spectrum_axis="spectrum"),
+    SourceKind(name="imu", moves="platform", is_random=True, is_largest_of_axes=True),
     SourceKind(name="lever_arm", moves="platform", is_random=True),
     SourceKind(
         name="random",
@@ -199,13 +249,21 @@ for _kind in (
         is_random=True,
         is_correlated=True,
         has_names=True,
+        is_largest_of_axes=True,
     ),
-    SourceKind(name="trajectory", moves="platform", is_random=True, is_correlated=True),
-    SourceKind(name="timing", moves="clock", id_form="{kind}.{axis}"),
-    SourceKind(name="time", moves="clock"),
-    SourceKind(name="frequency", moves="clock"),
+    SourceKind(
+        name="trajectory",
+        moves="platform",
+        is_random=True,
+        is_correlated=True,
+        is_of_log=True,
+        is_largest_of_axes=True,
+    ),
+    SourceKind(name="timing", moves="clock", id_form="{kind}.{axis}", owes_source=False),
+    SourceKind(name="time", moves="clock", owes_source=False),
+    SourceKind(name="frequency", moves="clock", owes_source=False),
     SourceKind(name="synchronization", moves="clock", is_random=True),
-    SourceKind(name="oscillator", moves="clock", is_random=True),
+    SourceKind(name="oscillator", moves="clock", is_random=True, is_computed=True, spectrum_axis=""),
     SourceKind(
         name="propagation",
         moves="air",
@@ -220,8 +278,8 @@ for _kind in (
     SumKind(name="pslr", is_sum=True, is_level=True),
     SumKind(name="islr", is_sum=True, is_level=True),
     SumKind(name="autofocus_pull_in", is_sum=True, only_warns=True),
-    SumKind(name="spatial_variance", is_phase=True),
-    SumKind(name="dispersion", id_form="propagation.{kind}", is_phase=True),
+    SumKind(name="spatial_variance", is_phase=True, is_computed=True),
+    SumKind(name="dispersion", id_form="propagation.{kind}", is_phase=True, is_computed=True),
     SumKind(name="declare"),
     SumKind(name="specification", id_form="{kind}.{axis}"),
 ):
@@ -249,6 +307,11 @@ def kind_of(name: str) -> ErrorKind:
 def kinds() -> tuple[ErrorKind, ...]:
     """All kinds that are known, in the order in which they were registered."""
     return tuple(_KINDS.values())
+
+
+def names_of_named_kinds() -> frozenset[str]:
+    """Names of the kinds of which a file may state several errors, each with a name of its own."""
+    return frozenset(kind.name for kind in kinds() if isinstance(kind, SourceKind) and kind.has_names)
 
 
 def motion_kind(name: object) -> MotionKind | None:

@@ -63,6 +63,16 @@ class InputDoubt:
     is_stated: bool = False
     is_of_log: bool = False
 
+    @property
+    def is_phase(self) -> bool:
+        """Whether the doubt is about the phase that a smooth path leaves, and not about an error of the path."""
+        return self.unit == "rad"
+
+    @property
+    def unit(self) -> str:
+        """Unit of `doubt` and of `declared`."""
+        return MOTION_UNITS.get(self.kind, "rad")
+
 
 def input_doubts(mission: Mission) -> list[InputDoubt]:
     """List the doubts about the paths of the platforms, which may be less accurate than the file declares."""

@@ -57,17 +57,22 @@ def air_stays(
 
 @composed
 def air_stays_untaken(
-    aperture_time: float, correlation_time: float, kind: str, size: float, keys: Sequence[str], lines: Sequence[str]
+    aperture_time: float,
+    correlation_time: float,
+    effect_name: str,
+    size: float,
+    keys: Sequence[str],
+    lines: Sequence[str],
 ) -> str:
     """Sentence for constant delays in the air over a long aperture, whose possible change no requirement would limit.
 
     `aperture_time` and `correlation_time` are in s. `size` is the effect that changing delays would have, in the unit
-    of `kind`. `keys` are the keys, or `lines` the requirements, to add to the file.
+    of the effect. `keys` are the keys, or `lines` the requirements, to add to the file.
     """
     added = " or ".join(f"`{line}`" for line in lines)
     return (
-        f"{_air_that_stays(aperture_time, correlation_time)} have {effect_words(kind, size)}, which no requirement "
-        f"judges: {_add_correlation_time(keys)}, or {added} to requirements"
+        f"{_air_that_stays(aperture_time, correlation_time)} have {effect_words(effect_name, size)}, which no "
+        f"requirement judges: {_add_correlation_time(keys)}, or {added} to requirements"
     )
 
 

@@ -34,9 +34,9 @@ _NEEDED_DECLARATIONS = {
 }
 
 
-def effect_words(kind: str, size: float) -> str:
+def effect_words(effect_name: str, size: float) -> str:
     """Text with the size of an effect that no requirement judges."""
-    return _SHOWN_EFFECTS[kind].format(f"{size:.3g}")
+    return _SHOWN_EFFECTS[effect_name].format(f"{size:.3g}")
 
 
 @composed
@@ -52,19 +52,19 @@ def confidence(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> 
 
 
 @composed
-def effect_is_not_judged(kind: str, size: float, total: float, lines: Sequence[str]) -> str:
+def effect_is_not_judged(effect_name: str, size: float, total: float, lines: Sequence[str]) -> str:
     """Sentence for a row with an effect that no requirement limits."""
     alone = f", {total:.3g} rad with the others" if total > 1.005 * size else ""
     added = " or ".join(f"`{line}`" for line in lines)
-    return f"{effect_words(kind, size)}{alone}, which no requirement judges: add {added} to requirements"
+    return f"{effect_words(effect_name, size)}{alone}, which no requirement judges: add {added} to requirements"
 
 
 @composed
-def effect_is_negligible(kind: str, total: float, keys: Sequence[str]) -> str:
+def effect_is_negligible(effect_name: str, total: float, keys: Sequence[str]) -> str:
     """Sentence for a mission with a negligible effect that no requirement limits."""
     return (
-        f"negligible: {effect_words(kind, total)} in all, which no requirement judges ({' or '.join(keys)} would): "
-        "below a tenth of the quadratic requirement and below 0.08 rad"
+        f"negligible: {effect_words(effect_name, total)} in all, which no requirement judges "
+        f"({' or '.join(keys)} would): below a tenth of the quadratic requirement and below 0.08 rad"
     )
 
 

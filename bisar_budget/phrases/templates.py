@@ -108,10 +108,10 @@ class _Filler(string.Formatter):
 
     def format_field(self, value: object, format_spec: str) -> str:
         """Text of one quantity in the format that its field of the template gives."""
-        kind, _, options = format_spec.partition(" ")
-        if kind in _QUANTITY_FORMATS:
-            return _QUANTITY_FORMATS[kind](value, options)
-        return _quantity(value, kind, options) if kind in _UNITS else format(value, format_spec)
+        name, _, options = format_spec.partition(" ")
+        if name in _QUANTITY_FORMATS:
+            return _QUANTITY_FORMATS[name](value, options)
+        return _quantity(value, name, options) if name in _UNITS else format(value, format_spec)
 
 
 _FILLER = _Filler()

@@ -244,9 +244,9 @@ class _Variable:
         self.is_free = column.is_text and column.name.rpartition(".")[2] == "reason"
         meanings = list(STATUS) if column.name == "status" else [""]
         self.codes = {meaning: code for code, meaning in enumerate(meanings)}
-        kind = str if self.is_free else "i4" if column.is_text else "f8"
-        fill: Mapping[str, Any] = {"fill_value": np.nan} if kind == "f8" else {}
-        self.variable = file.createVariable(column.name, kind, names, **fill)
+        data_type = str if self.is_free else "i4" if column.is_text else "f8"
+        fill: Mapping[str, Any] = {"fill_value": np.nan} if data_type == "f8" else {}
+        self.variable = file.createVariable(column.name, data_type, names, **fill)
         self.variable.setncatts(_attributes(column))
 
     def put(self, values: Values, start: int, stop: int, shape: tuple[int, ...]) -> None:

@@ -7,7 +7,8 @@ from operator import attrgetter
 from typing import NamedTuple
 
 from bisar_budget.constants import GATING_MODELS, UTILIZATION_TOLERANCE_FRACTION
-from bisar_budget.effects.effect import MOTION, PLATFORMS
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.error_kinds import StateKind, SumKind, names_of_named_kinds
 from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
@@ -17,7 +18,7 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission, Requirements, Waiver
 from bisar_budget.mission.parts import figure_text
 from bisar_budget.mission.readers import SectionValue
-from bisar_budget.report.change.fallen_effects import SUMS, fallen_effects
+from bisar_budget.report.change.fallen_effects import fallen_effects
 from bisar_budget.report.change.lost_doubts import lost_doubts
 from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.settings import TABLE
@@ -49,8 +50,8 @@ def moved_inputs(before: Mission, after: Mission) -> Iterator[Moved]:
             contents = [file.sha256 and file.sha256[:12] for file in files]
             yield Moved(f"platforms.{name}: content of {files[1].file}", "", *contents)
         old_files, new_files = ({} if file is None else file.beside for file in files)
-        for kind in old_files.keys() & new_files.keys():
-            old_file, new_file = old_files[kind], new_files[kind]
+        for use in old_files.keys() & new_files.keys():
+            old_file, new_file = old_files[use], new_files[use]
             if old_file and new_file and old_file[0] == new_file[0] and old_file[1] != new_file[1]:
                 contents = [digest[:12] for _, digest in (old_file, new_file)]
                 yield Moved(f"platforms.{name}: content of {new_file[0]}", "", *contents)
@@ -118,16 +119,10 @@ def _numbers(findings: MissionFindings) -> Iterator[tuple[str, str, float | None
 
 
 # ---------------------------------------------------------------------- loosened rules
-_COMPUTED_KINDS = (
-    "oscillator",
-    "spatial_variance",
-    "dispersion",
-)  # kinds of rows with a computed size, so that a zero is a result
 # Rules in the order of their strictness, the strictest last.
 _RULES_BY_STRICTNESS = {"combine": ("each", "rss", "sum"), "model": GATING_MODELS}
 
 _WIDEST_FIRST = ("normal", "bound", "uniform")
-_NAMED_KINDS = ("other", "random")  # kinds of error that a file may state several times, each with a name
 _LIMITING_NUMBERS = (
     ("autofocus", "n_pull", 1),
     ("allocation", "coverage_factor", -1),
@@ -273,11 +268,17 @@ def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosene
     """Yield the errors that are no longer declared or now zero. A motion error with all its axes is one error."""
     old, new = _declared(before), _declared(after)
     stated = (row for row in before.rows if row.declared is not None and row.is_independent)
-    for name in dict.fromkeys(_error(row) for row in stated if row.subject.kind not in SUMS):
+    for name in dict.fromkeys(_error(row) for row in stated if not _is_sum(row)):
         if name not in new:
             yield Loosened(name, "declared", "not declared")
         elif old[name] and not new[name]:
             yield Loosened(name, "declared", "zero")
+
+
+def _is_sum(row: Row) -> bool:
+    """Whether a row sums the effects of errors, and is no error itself."""
+    kind = row.subject.facts
+    return isinstance(kind, SumKind) and kind.is_sum
 
 
 def _fallen(before: MissionFindings, after: MissionFindings, gone_errors: Sequence[str]) -> Iterator[Loosened]:
@@ -310,23 +311,23 @@ def _declared(findings: MissionFindings) -> dict[str, bool]:
     for row in findings.rows:
         if row.declared is not None:
             name = _error(row)
-            is_more = row.declared != 0 or row.unit == "dB" or row.subject.kind in _COMPUTED_KINDS
+            is_more = row.declared != 0 or row.unit == "dB" or row.subject.facts.is_computed
             is_declared[name] = is_declared.get(name, False) or is_more
     return is_declared
 
 
 def _error(row: Row) -> str:
     """Name of the error of a row, without its axis."""
-    return row.id.rpartition(".")[0] if row.subject.kind in MOTION else row.id
+    return row.id.rpartition(".")[0] if isinstance(row.subject.facts, StateKind) else row.id
 
 
 def _sources(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
     """Yield the kinds of error that lost their source. Named errors are listed one by one."""
     had_source = set(before.kinds.declared) - set(before.kinds.without_source)
     lost = [
-        kind
-        for kind in after.kinds.without_source
-        if kind in had_source and kind.rpartition(".")[2] not in _NAMED_KINDS
+        name
+        for name in after.kinds.without_source
+        if name in had_source and name.rpartition(".")[2] not in names_of_named_kinds()
     ]
     old, new = (_named_sources(findings.analysed().mission) for findings in (before, after))
     lost += [name for name, source in new.items() if old.get(name) and not source]

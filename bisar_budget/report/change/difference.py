@@ -55,14 +55,14 @@ def _refusals(change: MissionChange | ChangeSet, gate: Gate | None) -> list[Refu
 
 
 class _ChangeInWords(NamedTuple):
-    """A change as text: its kind, such as `input`, its name, and `before -> after` or the reason for a refusal."""
+    """A change as text: its label, such as `input`, its name, and `before -> after` or the reason for a refusal."""
 
-    kind: str
+    label: str
     name: str
     words: str
 
 
-_TITLE_OF_KIND = {
+_TITLE_OF_LABEL = {
     "input": "Inputs",
     "geometry": "Geometry",
     "requirement": "Requirements",
@@ -74,10 +74,10 @@ _TITLE_OF_KIND = {
 
 def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_ChangeInWords]:
     """Yield the changes of inputs, geometry and requirements; without a gate, also the loosened rules."""
-    for kind, moves in (("input", mission.inputs), ("geometry", mission.geometry)):
+    for label, moves in (("input", mission.inputs), ("geometry", mission.geometry)):
         for move in moves:
             values = f"{_value_text(move.before, move)} -> {_value_text(move.after, move)}"
-            yield _ChangeInWords(kind, move.name, values)
+            yield _ChangeInWords(label, move.name, values)
     for requirement in mission.requirements:
         statuses = (requirement.before, requirement.after)
         before, after = ("none" if status is None else STATUS[status].text for status in statuses)
@@ -88,17 +88,17 @@ def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_ChangeInWor
 
 def _refused(change: MissionChange | ChangeSet, gate: Gate | None) -> list[_ChangeInWords]:
     """Refusals of a gate, including the ones that `--allow` lets through."""
-    kinds = {False: "**refused**", True: "let through by --allow:"}
+    labels = {False: "**refused**", True: "let through by --allow:"}
     return [
-        _ChangeInWords(kinds[refusal.is_allowed], refusal.id, refusal.words) for refusal in _refusals(change, gate)
+        _ChangeInWords(labels[refusal.is_allowed], refusal.id, refusal.words) for refusal in _refusals(change, gate)
     ]
 
 
 def _blocks(changes: Iterable[_ChangeInWords]) -> Iterator[list[str]]:
-    """Yield a block of lines for each kind of change; the first line is a title."""
+    """Yield a block of lines for the changes of each label; the first line is a title."""
     changes = list(changes)
-    for kind, title in _TITLE_OF_KIND.items():
-        texts = [printable(f"  {change.name}: {change.words}") for change in changes if change.kind == kind]
+    for label, title in _TITLE_OF_LABEL.items():
+        texts = [printable(f"  {change.name}: {change.words}") for change in changes if change.label == label]
         if texts:
             yield [title, *(line for text in texts for line in wrapped(text, "    "))]
 
@@ -109,7 +109,7 @@ def _refused_lines(change: MissionChange | ChangeSet, gate: Gate | None) -> list
 
 def _items(changes: Iterable[_ChangeInWords]) -> list[str]:
     """Markdown list with an item for each change."""
-    return [f"- {change.kind} {markdown_text(change.name)}: {_arrows(change.words)}" for change in changes]
+    return [f"- {change.label} {markdown_text(change.name)}: {_arrows(change.words)}" for change in changes]
 
 
 def _arrows(words: str) -> str:

@@ -13,10 +13,10 @@ from itertools import zip_longest
 from typing import NamedTuple
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.effects.effect import MOTION, PLATFORMS
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.error_kinds import SourceKind, StateKind, SumKind
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.mission.model import MetricSplits, Mission
 from bisar_budget.mission.paths import with_radial
@@ -27,8 +27,6 @@ from bisar_budget.report.change.names import plain, plain_file
 from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.units import format_quantity
 
-SUMS = (*REQUIREMENT_NAMES, "autofocus_pull_in")  # kinds of rows that sum errors and are no error themselves
-_RESULTS = (*SUMS, "spatial_variance", "dispersion")  # kinds of rows that follow from other rows
 _SIZE_TOLERANCE_FRACTION = 1e-6  # decrease of a utilization that may come from the tolerance of a search
 _ANY_DAY = date(2000, 1, 1)  # waivers depend on the day, utilizations do not
 
@@ -161,18 +159,23 @@ def _errors(findings: MissionFindings, other: MissionFindings) -> list[Row]:
     elsewhere = {(row.owner, row.subject.kind) for row in findings.rows if row.is_independent and row.id not in ids}
     rows = []
     for row in findings.rows:
-        kind = row.subject.kind
-        if row.declared is None or row.metric == SPECIFICATION or kind in _RESULTS:
+        subject = row.subject
+        if row.declared is None or isinstance(subject.facts, SumKind):
             continue
-        is_of_platform = kind in MOTION and row.owner in PLATFORMS
-        if is_of_platform and row.is_independent == ((row.owner, kind) in elsewhere):
+        is_of_platform = isinstance(subject.facts, StateKind) and row.owner in PLATFORMS
+        if is_of_platform and row.is_independent == ((row.owner, subject.kind) in elsewhere):
             continue
         rows.append(row)
     return rows
 
 
 def _sums(findings: MissionFindings) -> list[Row]:
-    return [row for row in findings.rows if row.subject.kind in _RESULTS and row.declared is not None]
+    """Return the rows that follow from the rows of declared errors."""
+    return [
+        row
+        for row in findings.rows
+        if isinstance(row.subject.facts, SumKind) and row.metric != SPECIFICATION and row.declared is not None
+    ]
 
 
 def _falls(before: Sequence[Row], after: Sequence[Row]) -> Iterator[FallenEffect]:
@@ -214,7 +217,7 @@ def _is_less(before: Row, after: Row | None) -> bool:
 def _family(row: Row) -> tuple[str, ...]:
     """Key of the group of a row: owner, kind and axis for a numbered entry of a list, else the id of the row."""
     subject = row.subject
-    if subject.entry is None or subject.kind == "other":
+    if subject.entry is None or not subject.facts.has_numbers:
         return (row.id,)
     return subject.owner, subject.kind, subject.axis
 
@@ -240,7 +243,8 @@ def _named_anew(before: MissionFindings, after: MissionFindings) -> set[str]:
 
 def _source(mission: Mission, row: Row) -> str:
     """Plain name of the source of a row's values; for a row about the fixes of a log, the name of the log file."""
-    if row.subject.kind != "trajectory":
+    kind = row.subject.facts
+    if not (isinstance(kind, SourceKind) and kind.is_of_log):
         return plain(row.evidence)
     path: FlownPath | None = getattr(mission.platforms, row.owner).path
     return plain_file(path and path.file)
@@ -257,7 +261,9 @@ def _is_named(source: str, mission: Mission, row: Row) -> bool:
     if row.owner not in PLATFORMS:
         return False
     platform: Platform = getattr(mission.platforms, row.owner)
-    section = platform.oscillator if row.subject.kind == "oscillator" else platform.motion_error
+    kind = row.subject.facts
+    is_of_clock = isinstance(kind, SourceKind) and kind.moves == "clock"
+    section = platform.oscillator if is_of_clock else platform.motion_error
     if section is None:
         return False
     overridden = [plain(override.part) for override in section.overridden]

@@ -9,8 +9,7 @@ same name that now states a smaller error.
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bisar_budget.budget.doubts import RESIDUAL, InputDoubt, input_doubts
-from bisar_budget.effects.effect import MOTION_UNITS
+from bisar_budget.budget.doubts import InputDoubt, input_doubts
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import SMOOTHED, FlownPath, Platform
 from bisar_budget.report.change.names import plain, plain_file
@@ -50,9 +49,8 @@ def _name(doubt: InputDoubt) -> tuple[str, str, bool, bool]:
 
 
 def _words(doubt: InputDoubt) -> str:
-    is_phase = doubt.kind == RESIDUAL
-    size = format_quantity(doubt.doubt, "rad" if is_phase else MOTION_UNITS[doubt.kind])
-    return f"{'path' if is_phase else doubt.kind} in doubt by {size}"
+    name = "path" if doubt.is_phase else doubt.kind
+    return f"{name} in doubt by {format_quantity(doubt.doubt, doubt.unit)}"
 
 
 def _takes(doubt: InputDoubt, old: Platform, new: Platform) -> Iterator[tuple[str, str]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from bisar_budget.arrays import NumbersOrWords
 from bisar_budget.catalogue import EQUATIONS
-from bisar_budget.effects.effect import MOTION_UNITS
+from bisar_budget.error_kinds import SourceKind
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.images import ImageEvidence, PointImage
 from bisar_budget.findings.mission import MissionFindings
@@ -45,10 +45,6 @@ from bisar_budget.units import format_quantity
 
 _MAX_LISTED_LINES = 20  # of the table of a sweep
 _MAX_LISTED_WORDS = 6  # words of an axis that a sentence lists
-_SOURCED = (
-    *(*MOTION_UNITS, "time_tag", "lever_arm", "vibration", "other"),
-    *("imu", "random", "trajectory", "oscillator", "synchronization", "propagation"),
-)
 
 
 def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
@@ -370,7 +366,7 @@ def sources(findings: MissionFindings) -> tuple[dict[str, list[str]], list[str]]
             continue
         if row.evidence:
             by_source.setdefault(row.evidence, []).append(row.id)
-        elif row.subject.kind in _SOURCED:
+        elif isinstance(row.subject.facts, SourceKind) and row.subject.facts.owes_source:
             unsourced.append(row.id)
     return by_source, unsourced
 

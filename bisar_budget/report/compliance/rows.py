@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.effects.declared import END_OF_IMAGE
-from bisar_budget.effects.effect import MOTION_UNITS, Subject, plain
+from bisar_budget.effects.effect import Subject, plain
+from bisar_budget.error_kinds import SourceKind
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row, worst_first
 from bisar_budget.findings.status import STATUS
@@ -190,6 +191,15 @@ def _down(value: float) -> float:
     return math.floor(value * 10.0**step * (1 + math.copysign(1e-12, value))) / 10.0**step if step < 300 else value
 
 
+# Forms of the limits of sums that have no requirement of their own, by kind. Autofocus has one correction for the
+# whole scene, so that the limit of the difference over the scene contains no gain.
+LIMIT_FORMS = {
+    "autofocus_pull_in": "total QPE within the pull-in range of autofocus, π·N_pull",
+    "spatial_variance": "QPE differs over the scene by ≤ {}",
+    "dispersion": "quadratic phase at the edges of the band ≤ {}",
+}
+
+
 def source_of_limit(page: Page, row: Row) -> str:
     """Text about the requirement that sets the allowable of a row."""
     findings, requirements, allocation = page.findings, page.mission.requirements, page.findings.allocation
@@ -213,12 +223,8 @@ def source_of_limit(page: Page, row: Row) -> str:
         return "specified size of the error"
     if row.metric == DECLARE:
         return f"declared: {', '.join(requirements.declare)}"
-    if row.subject.kind == "autofocus_pull_in":
-        return "total QPE within the pull-in range of autofocus, π·N_pull"
-    if row.subject.kind == "spatial_variance":  # autofocus has one correction for the whole scene, so no gain here
-        return f"QPE differs over the scene by ≤ {phase_limit(allocation.qpe_total, findings)}"
-    if row.subject.kind == "dispersion":
-        return f"quadratic phase at the edges of the band ≤ {phase_limit(allocation.qpe_total, findings)}"
+    if (limit_form := LIMIT_FORMS.get(row.subject.kind)) is not None:
+        return limit_form.format(phase_limit(allocation.qpe_total, findings))
     limit = allocation.qpe_allowed(row.owner)
     share = "" if row.owner == "mission" else f", {allocation.qpe.of(row.owner):.3g} of the budget"
     return f"QPE ≤ {phase_limit(limit, findings)}{share}"
@@ -248,15 +254,22 @@ class Contribution:
     model_cells: tuple[str, ...] = ()
 
     @property
+    def kind(self) -> SourceKind:
+        """The kind of the error."""
+        kind = self.subject.facts
+        assert isinstance(kind, SourceKind)
+        return kind
+
+    @property
     def owner(self) -> str:
         """Owner of the error: a platform, both platforms, the clock or the mission."""
-        is_common = self.subject.kind in (*MOTION_UNITS, "time_tag", "random") and self.subject.owner == "mission"
+        is_common = self.kind.is_shared and self.subject.owner == "mission"
         return "both platforms" if is_common else self.subject.owner
 
     @property
     def axis(self) -> str:
         """Axis of the error, or term of a clock error."""
-        return "height" if self.subject.kind == "terrain" else self.subject[3].replace("_", " ")
+        return self.kind.direction or self.subject.axis.replace("_", " ")
 
 
 def phase_contributions(page: Page) -> list[Contribution]:

@@ -6,6 +6,7 @@ from hashlib import sha256
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.effect import MOTION_UNITS
+from bisar_budget.error_kinds import SourceKind
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
@@ -496,9 +497,9 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
         yield f"Path of the {name}", path_words(path)
         if path.sha256 is not None:
             yield f"File of the {name}’s path", f"{path.file or 'in the mission file'}, SHA-256 {path.sha256}"
-        for kind, file in path.beside.items():
+        for use, file in path.beside.items():
             if file is not None:
-                yield f"{_PATH_FILE_NAMES[kind]} of the {name}’s path", "{}, SHA-256 {}".format(*file)
+                yield f"{_PATH_FILE_NAMES[use]} of the {name}’s path", "{}, SHA-256 {}".format(*file)
     yield "Combination", _COMBINATION_SENTENCES[findings.combine]
     yield "Phases", f"at the centre frequency, c = {SPEED_OF_LIGHT_MPS / 1e3:.3f} km/s; at the aperture edge, ±T/2"
     factor = (
@@ -545,7 +546,7 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
             "the scene. Attitude errors swing the arm and turn the specific force: the row of the inertial sensor "
             "includes both",
         )
-    if any(row.subject.kind == "time_tag" for row in findings.rows):
+    if any(source.is_time_tag for source in page.analysis.sources):
         yield "Time tags", "measured positions belong to times later by the error"
     if any(platform.oscillator for platform in mission.platforms) or mission.synchronization:
         yield (
@@ -561,7 +562,9 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
             "there are no free electrons; above, the leg crosses spherical shells at 7 km and 350 km",
         )
     for row in findings.rows:
-        if row.subject.kind == "oscillator" and row.remarks:
+        kind = row.subject.facts
+        is_of_clock = isinstance(kind, SourceKind) and kind.moves == "clock"
+        if is_of_clock and row.owner in Platforms._fields and row.remarks:
             shaken = " under acceleration" if row.subject.axis == "acceleration" else ""
             yield f"Oscillator of the {row.owner}{shaken}", "; ".join(row.remarks)
 

@@ -30,23 +30,23 @@ def new_figure(**settings: Any) -> "Figure":
     return Figure(**{"layout": "constrained", **settings})
 
 
-def figure_file(figure: "Figure", kind: str, dpi: int = 110) -> bytes:
+def figure_file(figure: "Figure", file_type: str, dpi: int = 110) -> bytes:
     """Convert a figure to the bytes of a `png`, `svg` or `pdf` file. The same input gives the same bytes."""
     undated = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
     file = BytesIO()
-    figure.savefig(file, format=kind, dpi=dpi, metadata=undated[kind])
+    figure.savefig(file, format=file_type, dpi=dpi, metadata=undated[file_type])
     return file.getvalue()
 
 
-def drawing_file(svg: str, kind: str, dpi: int = 192) -> bytes:
+def drawing_file(svg: str, file_type: str, dpi: int = 192) -> bytes:
     """Convert an `svg.Canvas` drawing to a `png`, `svg` or `pdf` file. PNG and PDF have a white background."""
-    if kind == "svg":
+    if file_type == "svg":
         return svg.encode()
     drawing = ElementTree.fromstring(svg)
     width, height = (float(drawing.get(side, "")) / _PIXELS_PER_INCH for side in ("width", "height"))
     page = new_figure(figsize=(width, height), layout="none")
     paint(page.add_axes((0, 0, 1, 1)), drawing)
-    return figure_file(page, kind, dpi)
+    return figure_file(page, file_type, dpi)
 
 
 def paint(panel: "Axes", drawing: ElementTree.Element) -> None:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -10,8 +11,8 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS, ErrorSource, subject
-from bisar_budget.error_kinds import MotionKind
+from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS, ErrorSource, subject
+from bisar_budget.error_kinds import MotionKind, SourceKind, StateKind
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState, plain_vector
@@ -41,7 +42,7 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
         if error.frame != "scene" and axis in notation.AXIS_LETTERS:
             yield from _rotated_declaration(mission, source, axis)
             return
-        if error.covariance is not None and error.covariance.is_matrix and kind != "acceleration":
+        if error.covariance is not None and error.covariance.is_matrix and source.kind.has_covariance:
             yield step("One sigma is the root of the variance")
         value = values[FRAME_AXES[error.frame].index(axis)]
     elif source.is_common:
@@ -57,7 +58,7 @@ def _rotated_declaration(mission: Mission, source: ErrorSource, axis: str) -> It
     platform, kind = source.owner, source.subject.kind
     error = getattr(mission.platforms, platform).motion_error
     axes = getattr(mission.platforms, platform).state.frame(error.frame)
-    covariance = error.covariance if kind != "acceleration" else None
+    covariance = error.covariance if source.kind.has_covariance else None
     k = mission.allocation.coverage_factor
     products = [
         f"{number(k * value)}*{number(direction[notation.AXIS_LETTERS.index(axis)])}"
@@ -122,7 +123,7 @@ def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterat
         values = _motion_values(analysis, platform, kind, axis, signed)
         for order, formula in notation.motion_coefficients(kind, axis, platform).items():
             result = signed * _coefficient(analysis.mission, source, order)
-            title = f"{_table_i(kind, axis)}{each}"
+            title = f"{_table_i(source.kind, axis)}{each}"
             yield step(title, WorkedEquation(f"β̃_{order}", formula, values, result, RATES[order]))
         phase = notation.motion_phase(kind, axis, platform)
         if phase is not None:
@@ -162,41 +163,55 @@ def _motion_values(analysis: Analysis, platform: str, kind: str, axis: str, size
     }
 
 
-# Symbol of each error of a set clock, and its clock terms t̃₀, t̃₁, t̃₂; H is the time since the clock was set.
-_OF_SETTING = {
-    "time": ("x", ("x",)),
-    "frequency": ("y", ("y*H", "y")),
-    "oscillator": ("D", ("D*H^2/2", "D*H", "D/2")),
+@dataclass(frozen=True)
+class _SetClock:
+    """Symbol of an error of a set clock, and its clock terms t̃₀, t̃₁, t̃₂; H is the time since the clock was set.
+
+    `direct_title` is the title of its terms if the receiver uses a direct path; empty if they are the same.
+    """
+
+    symbol: str
+    formulas: tuple[str, ...]
+    direct_title: str = ""
+
+
+CLOCK_TERMS = {
+    "time": _SetClock("x", ("x",)),
+    "frequency": _SetClock(
+        "y",
+        ("y*H", "y"),
+        "Terms of the time y·Δt(τ) by which a wrong clock measures the echo behind the direct path wrong",
+    ),
+    "oscillator.aging": _SetClock("D", ("D*H^2/2", "D*H", "D/2")),
 }
 _TERM_UNITS = tuple(CLOCK_UNITS.values())
 
 
 def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    kind, sync = source.subject.kind, mission.synchronization
+    sync, axis = mission.synchronization, source.subject.axis
     values = {
         "c": SPEED_OF_LIGHT_MPS,
         "T": mission.collection.aperture_time,
         "f_0": mission.radar.center_frequency,
     }
-    if kind == "timing":
-        order = tuple(CLOCK_UNITS).index(source.subject.axis)
-        terms = {order: size}
+    if axis in CLOCK_UNITS:
+        terms = {tuple(CLOCK_UNITS).index(axis): size}
     else:
         terms = {order: size * float(term) for order, term in enumerate(source.clock or ()) if term}
         title = "Terms of the clock error t̃ at mid-aperture"
         lines: list[str | WorkedEquation] = []
-        if kind == "frequency" and mission.has_direct_path:
-            title = "Terms of the time y·Δt(τ) by which a wrong clock measures the echo behind the direct path wrong"
+        clock = source.kind.find_in(CLOCK_TERMS, axis)
+        if mission.has_direct_path and clock.direct_title:
+            title = clock.direct_title
             lines = [f"t̃_{order} = {with_unit(term, _TERM_UNITS[order])}" for order, term in terms.items()]
         else:
             age = 0.0 if sync is None or sync.age is None else sync.age
             if age:
                 title += f", H = {with_unit(age, 's')} after the clocks were set"
-            symbol, formulas = _OF_SETTING[kind]
+            values_of_terms = {clock.symbol: size, "H": age}
             for order, term in terms.items():
-                lines.append(
-                    WorkedEquation(f"t̃_{order}", formulas[order], {symbol: size, "H": age}, term, _TERM_UNITS[order])
-                )
+                formula = clock.formulas[order]
+                lines.append(WorkedEquation(f"t̃_{order}", formula, values_of_terms, term, _TERM_UNITS[order]))
         yield step(f"{title}{each}", *lines)
     for order, term in terms.items():
         known_values, result = {**values, f"t̃_{order}": term}, SPEED_OF_LIGHT_MPS * term
@@ -208,8 +223,10 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
             yield step(f"{title}{each}", WorkedEquation("QPE", notation.CLOCK_PHASE, known_values, qpe, "rad"))
 
 
-def _table_i(kind: str, axis: str) -> str:
-    return f"Table I row {2 + 3 * notation.AXIS_LETTERS.index(axis) + list(MOTION_UNITS).index(kind)}"
+def _table_i(kind: SourceKind, axis: str) -> str:
+    """Name of the row of Table I with an error of position, velocity or acceleration along an axis of the scene."""
+    assert isinstance(kind, StateKind)
+    return f"Table I row {2 + 3 * notation.AXIS_LETTERS.index(axis) + kind.order}"
 
 
 def _source_of(analysis: Analysis, platform: str, kind: str, axis: str) -> ErrorSource:
@@ -220,6 +237,7 @@ def _source_of(analysis: Analysis, platform: str, kind: str, axis: str) -> Error
 def _common_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """Yield the steps for an error that both platforms share; the phases of both legs add with their signs."""
     _, _, kind, axis, *_ = source.subject
+    has_phase = isinstance(source.kind, StateKind) and source.kind.order > 0
     values = {}
     for platform in PLATFORMS:
         leg, phase = _source_of(analysis, platform, kind, axis), f"φ_{platform[0]}"
@@ -227,12 +245,12 @@ def _common_effect(analysis: Analysis, source: ErrorSource, size: float, each: s
         leg_values = _motion_values(analysis, platform, kind, axis, size)
         for order, formula in notation.motion_coefficients(kind, axis, platform).items():
             leg_values[f"β̃_{order}"] = result = size * _coefficient(analysis.mission, leg, order)
-            title = f"{_table_i(kind, axis)}, {platform}{each}"
+            title = f"{_table_i(source.kind, axis)}, {platform}{each}"
             yield step(title, WorkedEquation(f"β̃_{order}", formula, leg_values, result, RATES[order]))
-        if kind != "position":
+        if has_phase:
             title = f"Its phase at the aperture edge, {platform}"
             yield step(title, WorkedEquation(phase, notation.EDGE_PHASE, leg_values, values[phase], "rad"))
-    if kind == "position":
+    if not has_phase:
         yield step(f"Table I: a position error moves the image, no quadratic term{each}")
         return
     qpe = abs(float(source.effect.qpe) * size)

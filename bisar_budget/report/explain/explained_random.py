@@ -1,7 +1,7 @@
 """Explanation steps of random errors: the phases of inertial sensors, clocks, air delays and vibrations."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from bisar_budget.effects.air_delays import (
 from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, plain
 from bisar_budget.effects.navigation_errors import (
-    CORRELATED,
     TILTS,
     arm_at,
     body_axes,
@@ -58,6 +57,7 @@ from bisar_budget.effects.vibration import (
     pieces_of_vibration,
     power_of,
 )
+from bisar_budget.error_kinds import SourceKind
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import PlatformState, plain_vector
 from bisar_budget.mission.instruments import Synchronization
@@ -92,32 +92,9 @@ _PHASE_WORDS = ("quadratic phase at the aperture edge", "cubic phase there", "re
 
 def explained_random(analysis: Analysis, allocation: Allocation, error: RandomError, row: Row) -> Iterator[Step]:
     """Yield the steps of a random error, from its line in the file to its allowable."""
-    mission, kind = analysis.mission, error.subject.kind
-    model = row.model or "published"
+    mission, model = analysis.mission, row.model or "published"
     yield from _declared(mission, error, row)
-    if kind == "imu":
-        yield from _imu(analysis, _without_arm(analysis, error))
-        yield from _with_arm(analysis, error)
-    elif kind == "lever_arm":
-        yield from _lever_arm(analysis, error)
-    elif kind in CORRELATED:
-        yield from _position(analysis, error)
-    elif kind == "vibration":
-        yield from _spectrum(mission, error)
-    elif error.subject.axis == "acceleration":
-        yield from _acceleration(mission, error)
-    elif kind == "oscillator":
-        yield from _oscillator(mission, error)
-    elif kind == "propagation":
-        for name in legs_of(error.owner):
-            yield from _delay_on_a_leg(analysis, error, name)
-        if error.owner not in PLATFORMS:
-            yield step("One air over both legs: their range errors add, with their signs, before anything is squared")
-        yield from _changing_delay(analysis, error)
-    elif kind == "other":
-        yield effect_from_elsewhere()
-    else:
-        yield from _link(mission, error)
+    yield from error.subject.facts.find_in(RANDOM_STEPS, error.subject.axis)(analysis, error)
     if model == "full":
         yield from _by_exact_ranges(mission, error)
     yield from _displacement(error, model)
@@ -136,21 +113,29 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
         worked = WorkedEquation(
             "declared", "k*|value|", {"k": k, "value": error.declared / k}, error.declared, error.unit
         )
-        axes_words = "; of three axes the largest value" if error.subject.kind in ("imu", *CORRELATED) else ""
+        kind = error.subject.facts
+        is_largest = isinstance(kind, SourceKind) and kind.is_largest_of_axes
+        axes_words = "; of three axes the largest value" if is_largest else ""
         yield step(f"Coverage factor allocation.coverage_factor{axes_words}", worked)
 
 
-def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+def _inertial(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    """Yield the steps for an inertial sensor, first without the lever arm of its platform and then with it."""
+    yield from _without_lever(analysis, _without_arm(analysis, error))
+    yield from _with_arm(analysis, error)
+
+
+def _without_lever(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     """Yield the steps for an inertial sensor by the published model, with the line of sight at mid-aperture."""
-    mission, kind = analysis.mission, error.subject.axis
-    symbol = _SYMBOLS[kind]
+    mission, figure = analysis.mission, error.subject.axis
+    symbol = _SYMBOLS[figure]
     formulas = inertial_phases(symbol)
     unit = error.published
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
     # The component along the line of sight follows from the published effect.
     values = {symbol: 1.0, "T": T, "λ": wavelength}
     order = next(index for index, formula in enumerate(formulas) if formula)
-    along = (unit.quadratic, unit.cubic)[order] / (_unit_effect(kind, order, wavelength, T))
+    along = (unit.quadratic, unit.cubic)[order] / (_unit_effect(figure, order, wavelength, T))
     component = next(name for name in ("f_u", "f_s", "u") if name in formulas[order])
     values[component] = along
     if component == "u":
@@ -305,12 +290,12 @@ def _per_unit(unit: str, error: RandomError) -> str:
     return unit if error.unit == "dB" else f"{unit} per {'unit' if error.unit == '1' else error.unit}"
 
 
-def _unit_effect(kind: str, order: int, wavelength: float, T: float) -> float:
+def _unit_effect(figure: str, order: int, wavelength: float, T: float) -> float:
     """Phase of one unit of an inertial sensor error along the line of sight. [rad]
 
     `order` selects the quadratic phase (0), the cubic phase (1) or the residual (2).
     """
-    row = evaluators.inertial_phases(1.0, 1.0, 1.0, wavelength, T)[list(_SYMBOLS).index(kind)]
+    row = evaluators.inertial_phases(1.0, 1.0, 1.0, wavelength, T)[list(_SYMBOLS).index(figure)]
     return row[order]
 
 
@@ -364,7 +349,8 @@ def _gauss_markov(
     yield step(title, worked)
 
 
-def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
+def _oscillator(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    mission = analysis.mission
     oscillator = getattr(mission.platforms, error.owner).oscillator
     sync = mission.synchronization
     pieces = () if error.noise is None else error.noise.pieces
@@ -493,8 +479,8 @@ def _integrals(
         yield step(f"∫ {density}·{transfer} df of each piece", Sum(f"{symbol} = {text} = {with_unit(total, unit)}"))
 
 
-def _link(mission: Mission, error: RandomError) -> Iterator[Step]:
-    sync = mission.synchronization
+def _link(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    mission, sync = analysis.mission, analysis.mission.synchronization
     if sync is None or sync.interval is None:
         yield step("Independent from pulse to pulse: all of it adds to the ISLR, no quadratic phase")
         return
@@ -519,8 +505,8 @@ def _spectrum_steps(vibration: Vibration | FeltVibration, spectrum: Spectrum) ->
         yield step("Shifted by spectrum_level, a factor of power", worked)
 
 
-def _spectrum(mission: Mission, error: RandomError) -> Iterator[Step]:
-    name = error.owner
+def _spectrum(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    mission, name = analysis.mission, error.owner
     vibration: Vibration = getattr(mission.platforms, name).motion_error.vibration
     spectrum = vibration.spectrum
     if spectrum is None:
@@ -552,9 +538,10 @@ def _spectrum(mission: Mission, error: RandomError) -> Iterator[Step]:
     yield from _integrals(pieces, mission, None)
 
 
-def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
+def _acceleration(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     """Yield the steps for an accelerated oscillator: random vibration, slow tones, and turn of the platform."""
-    name, f_0, sync = error.owner, mission.radar.center_frequency, mission.synchronization
+    mission, name = analysis.mission, error.owner
+    f_0, sync = mission.radar.center_frequency, mission.synchronization
     felt_vibration = felt(mission, name)
     if felt_vibration is None or not any(error.published[:3]):
         if not lacks_a_spectrum(mission, name):
@@ -588,6 +575,15 @@ def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
         "Together, by a unit of Γ: independent parts add as squares",
         *_by_unit((*error.published[:2], spread_per_unit), _PER_SENSITIVITY),
     )
+
+
+def _delays(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    """Yield the steps for a delay in the air: on each leg that it concerns, and for its change over the aperture."""
+    for name in legs_of(error.owner):
+        yield from _delay_on_a_leg(analysis, error, name)
+    if error.owner not in PLATFORMS:
+        yield step("One air over both legs: their range errors add, with their signs, before anything is squared")
+    yield from _changing_delay(analysis, error)
 
 
 def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterator[Step]:
@@ -627,6 +623,25 @@ def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterat
             "Range error in the image: its constant part is that of the group, ḡ; its slope and what bends are those "
             "of the phase, which has the other sign: 2·ḡ − g"
         )
+
+
+def _from_elsewhere(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    """Yield the step for an error of which the file states only the effect on the image."""
+    yield effect_from_elsewhere()
+
+
+RANDOM_STEPS: Mapping[str, Callable[[Analysis, RandomError], Iterator[Step]]] = {
+    "imu": _inertial,
+    "lever_arm": _lever_arm,
+    "random": _position,
+    "trajectory": _position,
+    "vibration": _spectrum,
+    "oscillator": _oscillator,
+    "oscillator.acceleration": _acceleration,
+    "propagation": _delays,
+    "synchronization": _link,
+    "other": _from_elsewhere,
+}
 
 
 def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:

@@ -1,7 +1,7 @@
 """Explain a row or a requirement by its line in the file, the equations with their numbers, and the verdict."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -9,14 +9,13 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import at, differences_at
 from bisar_budget.analysis.spread import mainlobe_energy
-from bisar_budget.analysis.together import Together, cubics, quadratics
+from bisar_budget.analysis.together import cubics, quadratics
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits, tone_limits
 from bisar_budget.arrays import Floats
 from bisar_budget.budget.aggregates import effect_parts, untaken_effects
 from bisar_budget.budget.declarations import missing_declarations
 from bisar_budget.budget.doubts import (
     MOST_GRID_SHARE,
-    RESIDUAL,
     InputDoubt,
     declared_position_error,
     input_doubts,
@@ -32,7 +31,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.air_delays import CONTENT, ELECTRON_DELAY_M3_PER_S2, dispersed_legs, leg_factor
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource, plain
+from bisar_budget.effects.effect import ErrorSource, plain
 from bisar_budget.effects.slow_tones import SlowTone
 from bisar_budget.effects.vibration import lines_of, near_lines, seen_of_axes, worst_phases
 from bisar_budget.faults import KeyPath, changes_words, printable
@@ -131,8 +130,7 @@ def chain(mission: Mission, findings: MissionFindings, row: Row) -> Iterator[Ste
 
 
 def _to_utilization(mission: Mission, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    analysis = findings.analysed()
-    together = analysis.together("full" if row.model == "full" else "published")
+    analysis, model = findings.analysed(), _model(row)
     source = next((source for source in analysis.sources if source.id == row.id), None)
     if source is not None:
         yield from declaration(mission, source)
@@ -140,44 +138,21 @@ def _to_utilization(mission: Mission, findings: MissionFindings, row: Row) -> It
         yield from _budget(analysis, source, row)
     elif (random_error := next((error for error in analysis.random if error.id == row.id), None)) is not None:
         yield from explained_random(analysis, findings.allocation, random_error, row)
-    elif row.subject.kind == "oscillator" and row.subject.axis == "acceleration":
-        yield from explained_tone(mission, findings.allocation, row)
-    elif row.subject.axis == "spur":
-        yield from explained_spur(mission, findings.allocation, row)
-    elif row.subject.kind == "other":
-        yield from explained_power(mission, findings.allocation, row)
-    elif row.subject.kind == "pslr":
-        yield from explained_pslr(mission, row)
-    elif row.subject.kind == "islr":
-        yield from explained_islr(analysis, findings.allocation, row)
-    elif row.subject.kind == "vibration":
-        yield from _vibration_in_its_unit(mission, findings.allocation, row, analysis.slow_tones.get(row.id))
-    elif row.subject.kind in (QUADRATIC, "autofocus_pull_in"):
-        yield from _phase_aggregate(together, findings, row)
-    elif row.subject.kind == CUBIC:
-        yield from _cubic_aggregate(together, findings, row)
-    elif row.subject.kind == "dispersion":
-        yield from _dispersion(analysis, findings, row)
-    elif row.subject.kind == "spatial_variance":
-        yield from _spatial_variance(analysis, findings, row)
-    elif row.subject.kind == LOCATION:
-        yield from _location_aggregate(mission, together, findings, row)
-    elif row.metric == SPECIFICATION:
-        key = next(key for key in mission.specifications if name_of_error(key) == row.subject.axis)
-        path = ("specifications", key)
-        yield step(f"Specified in {location(mission, path)}", as_written(mission, path))
-        if row.declared is not None:
-            yield step("Declared, of three axes the largest", f"{key} = {row_size(row.declared, row, findings)}")
-    elif row.metric == DECLARE:
-        yield from declarations(mission)
+    else:
+        yield from row.subject.facts.find_in(ROW_STEPS, row.subject.axis)(analysis, findings, row)
     for tone in analysis.displacing_tones:
         if tone.subject.id == row.id and row.displacement_m is not None:
-            yield from moved_by_tone(tone.parts(together.model), together.model, row.displacement_m)
+            yield from moved_by_tone(tone.parts(model), model, row.displacement_m)
     if row.subject.axis == "spur" and row.allowable is not None:
         yield from use_of_amplitudes(row)
     elif row.declared is not None and row.allowable is not None and row.utilization is not None and row.unit != "dB":
         values = {"declared": row.declared, "allowable": row.allowable}
         yield step("Utilization", WorkedEquation("utilization", "declared/allowable", values, row.utilization, ""))
+
+
+def _model(row: Row) -> str:
+    """Model whose numbers explain a row."""
+    return "full" if row.model == "full" else "published"
 
 
 def collection_chain(findings: MissionFindings) -> Iterator[Step]:
@@ -252,13 +227,12 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
     yield from smallest_size(row, sizes)
 
 
-def _vibration_in_its_unit(
-    mission: Mission, allocation: Allocation, row: Row, tone: SlowTone | None
-) -> Iterator[Step]:
+def _vibration_in_its_unit(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
     """Yield the steps that explain a vibration, with the results in the unit of the file.
 
     A spectral line that is stated as an acceleration is explained in metres, and the results are converted back.
     """
+    mission, allocation, tone = analysis.mission, findings.allocation, analysis.slow_tones.get(row.id)
     lines = lines_of(mission, row.owner)
     entry = row.subject.entry or 0
     if row.unit == "m" or row.declared is None:
@@ -484,16 +458,54 @@ def _near_lines(mission: Mission, platform: str, index: int, total: float) -> It
     yield step(title, f"declared = {sizes} = {total:.6g} m")
 
 
-def _phase_aggregate(together: Together, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    owner, is_pull_in, allocation = row.owner, row.subject.kind == "autofocus_pull_in", findings.allocation
+def _tone(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    yield from explained_tone(analysis.mission, findings.allocation, row)
+
+
+def _spur(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    yield from explained_spur(analysis.mission, findings.allocation, row)
+
+
+def _power(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    yield from explained_power(analysis.mission, findings.allocation, row)
+
+
+def _pslr(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    yield from explained_pslr(analysis.mission, row)
+
+
+def _islr(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    yield from explained_islr(analysis, findings.allocation, row)
+
+
+def _specification(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    """Yield the steps of a specification: its line in the file, and the largest declared error."""
+    mission = analysis.mission
+    key = next(key for key in mission.specifications if name_of_error(key) == row.subject.axis)
+    path = ("specifications", key)
+    yield step(f"Specified in {location(mission, path)}", as_written(mission, path))
+    if row.declared is not None:
+        yield step("Declared, of three axes the largest", f"{key} = {row_size(row.declared, row, findings)}")
+
+
+def _declarations(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    yield from declarations(analysis.mission)
+
+
+def _pull_in(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    """Yield the steps to the sum of the quadratic phases and to the pull-in range of autofocus."""
+    together, allocation = analysis.together(_model(row)), findings.allocation
+    sizes_by_name = together.phase_parts(quadratics(together.owed(allocation.qpe, row.owner)), "sum")
+    yield from combined("QPE of the declared errors", "sum", sizes_by_name, row.declared)
+    values = {"N_pull": allocation.n_pull or 0.0}
+    worked = WorkedEquation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
+    yield step("Pull-in range of autofocus, Section VI", worked)
+
+
+def _phase_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    """Yield the steps to the sum of the quadratic phases of an owner, and to its limit."""
+    together, owner, allocation = analysis.together(_model(row)), row.owner, findings.allocation
     members = together.owed(allocation.qpe, owner)
-    if is_pull_in:
-        sizes_by_name = together.phase_parts(quadratics(members), "sum")
-        yield from combined("QPE of the declared errors", "sum", sizes_by_name, row.declared)
-        values = {"N_pull": allocation.n_pull or 0.0}
-        worked = WorkedEquation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
-        yield step("Pull-in range of autofocus, Section VI", worked)
-        return
     rule, gain = findings.combine, allocation.autofocus_gain
     title = (
         "Quadratic phase of equal peak loss of the declared errors"
@@ -520,7 +532,8 @@ def _phase_aggregate(together: Together, findings: MissionFindings, row: Row) ->
         yield step("Allowable, as a phase of equal peak loss", worked)
 
 
-def _cubic_aggregate(together: Together, findings: MissionFindings, row: Row) -> Iterator[Step]:
+def _cubic_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    together = analysis.together(_model(row))
     sizes_by_name = together.phase_parts(cubics(together.phases))
     yield from combined("Cubic phase of the declared errors", findings.combine, sizes_by_name, row.declared)
     if row.allowable is not None:
@@ -570,7 +583,8 @@ def _spatial_variance(analysis: Analysis, findings: MissionFindings, row: Row) -
     yield step("Budget of what one autofocus correction leaves", f"total = {findings.allocation.qpe_total:.6g} rad")
 
 
-def _location_aggregate(mission: Mission, together: Together, findings: MissionFindings, row: Row) -> Iterator[Step]:
+def _location_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    mission, together = analysis.mission, analysis.together(_model(row))
     rule = (
         "the longest sum over all signs of the vectors" if findings.combine == "sum" else RULE_WORDS[findings.combine]
     )
@@ -593,6 +607,25 @@ def _location_aggregate(mission: Mission, together: Together, findings: MissionF
     if row.allowable is not None:
         key_location = location(mission, ("requirements", "location_error"))
         yield step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {key_location}")
+
+
+# Steps of the rows that are neither sources nor random errors, by kind.
+ROW_STEPS: Mapping[str, Callable[[Analysis, MissionFindings, Row], Iterator[Step]]] = {
+    "oscillator.acceleration": _tone,
+    "oscillator.spur": _spur,
+    "vibration": _vibration_in_its_unit,
+    "other": _power,
+    QUADRATIC: _phase_aggregate,
+    CUBIC: _cubic_aggregate,
+    LOCATION: _location_aggregate,
+    "pslr": _pslr,
+    "islr": _islr,
+    "autofocus_pull_in": _pull_in,
+    "spatial_variance": _spatial_variance,
+    "dispersion": _dispersion,
+    DECLARE: _declarations,
+    SPECIFICATION: _specification,
+}
 
 
 def _verdict(row: Row, findings: MissionFindings) -> Iterator[str]:
@@ -692,17 +725,17 @@ def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[S
 
     They give its size, the size that is negligible, and the contribution of the row.
     """
-    kind = untaken.kind
+    effect_name = untaken.kind
     totals = []
     for model in analysis.gates:
-        together, sizes_by_name = analysis.together(model), effect_parts(analysis, model)[kind]
+        together, sizes_by_name = analysis.together(model), effect_parts(analysis, model)[effect_name]
         rule = together.rule_of_all
         totals.append(
             (float(together.combined(sizes_by_name, rule)[0]), rule, together.phase_parts(sizes_by_name, rule))
         )
     total, rule, sizes_by_name = max(totals, key=lambda candidate: candidate[0])
     yield from combined(
-        f"{_EFFECT_TITLES[kind]}: no requirement judges it", rule, sizes_by_name, total, symbol="total"
+        f"{_EFFECT_TITLES[effect_name]}: no requirement judges it", rule, sizes_by_name, total, symbol="total"
     )
     required = analysis.mission.requirements.quadratic_phase_error
     values = {"required": required}
@@ -752,7 +785,7 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
 
 def _of_log(doubt: InputDoubt) -> Step:
     """Return the step with the residual of a log or the resolution of its fixes, and the largest negligible value."""
-    if doubt.kind == RESIDUAL:
+    if doubt.is_phase:
         title = f"Residual of the {doubt.owner}’s smoothed log along the line of sight, rms phase"
         return step(title, f"left = {with_unit(doubt.doubt, 'rad')}", f"most = {with_unit(doubt.declared, 'rad')}")
     title = f"Quantisation step of the {doubt.owner}’s log, compared with the declared position error"
@@ -762,9 +795,9 @@ def _of_log(doubt: InputDoubt) -> Step:
 
 def _stated_by_source(doubt: InputDoubt) -> Step:
     """Return the step with the error that the source of a path states, and the declared error along the same axis."""
-    unit = MOTION_UNITS[doubt.kind]
     title = f"The {doubt.kind} error that the source of the {doubt.owner}’s path states exceeds the declared one"
-    return step(title, f"stated = {with_unit(doubt.doubt, unit)}", f"declared = {with_unit(doubt.declared, unit)}")
+    sizes = {"stated": doubt.doubt, "declared": doubt.declared}
+    return step(title, *(f"{name} = {with_unit(size, doubt.unit)}" for name, size in sizes.items()))
 
 
 def _displacing(analysis: Analysis, row: Row) -> Iterator[Step]:

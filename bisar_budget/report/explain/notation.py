@@ -252,7 +252,7 @@ def _closed(tokens: tuple[str, ...], end: str) -> _ParsedPart:
 
 
 AXIS_LETTERS = "xyz"
-_KIND_LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
+STATE_LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
 EDGE_PHASE = TEXTS["edge phase"]
 CLOCK_PHASE = TEXTS["Table II t̃_2 0"]
 VIBRATION = {"pslr": TEXTS["Vibration A 1"], "islr": TEXTS["Vibration σ 1"]}
@@ -264,20 +264,20 @@ LOOK_AZIMUTH = TEXTS["look azimuth"]
 DETERMINANT = TEXTS["determinant"]
 
 
-def motion_symbol(kind: str, axis: str, platform: str) -> str:
-    """Symbol of one motion error, such as `ã_xt`."""
-    return f"{_KIND_LETTERS[kind]}_{axis}{platform[0]}"
+def motion_symbol(state: str, axis: str, platform: str) -> str:
+    """Symbol of an error of position, velocity or acceleration (`state`), such as `ã_xt`."""
+    return f"{STATE_LETTERS[state]}_{axis}{platform[0]}"
 
 
-def motion_coefficients(kind: str, axis: str, platform: str) -> dict[int, str]:
+def motion_coefficients(state: str, axis: str, platform: str) -> dict[int, str]:
     """Formulas in Table I for one motion error, by the order of the slow time."""
-    names = {order: f"Table I {motion_symbol(kind, axis, platform)} {order}" for order in range(4)}
+    names = {order: f"Table I {motion_symbol(state, axis, platform)} {order}" for order in range(4)}
     return {order: TEXTS[name] for order, name in names.items() if name in TEXTS}
 
 
-def motion_phase(kind: str, axis: str, platform: str) -> str | None:
+def motion_phase(state: str, axis: str, platform: str) -> str | None:
     """Formula in Table II for one motion error; None for a position error, which has no quadratic phase."""
-    return TEXTS.get(f"Table II {motion_symbol(kind, axis, platform)} 0")
+    return TEXTS.get(f"Table II {motion_symbol(state, axis, platform)} 0")
 
 
 def clock_coefficient(order: int) -> str:

@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from bisar_budget.error_kinds import SumKind
 from bisar_budget.faults import Fault, Place, Region, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.requirement import JudgedRequirement
@@ -284,7 +285,8 @@ def _artifact_location(file: str, style: Style) -> dict[str, str]:
 
 
 def _result(row: Row, mission: MissionFindings, artifact: _Object, identity: Identity) -> _Object:
-    rule = "autofocus_pull_in" if row.subject.kind == "autofocus_pull_in" else row.metric
+    kind = row.subject.facts
+    rule = kind.name if isinstance(kind, SumKind) and kind.only_warns else row.metric
     rule = rule if rule in ANNOTATION_RULES else "other"
     name = identity.of(row.id, row.requirement_id)
     result = _located(rule, STATUS[row.status].sarif, finding(row, mission), row.line, artifact, name)

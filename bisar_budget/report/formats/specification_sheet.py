@@ -420,7 +420,8 @@ def _parents(sheet: SpecificationSheet, spec: Specification) -> list[str]:
         return []
     limits = [row for row in sheet.rows if row.shares.get(spec.key, 0.0) >= _PARENT_SHARE_FRACTION]
     rows = [row.id for row in limits] + [f"mission.{row.requirement}" for row in limits]
-    owner, kind = (*parts_of(spec.key)[1:2], ""), parts_of(spec.key)[-1]
-    rows += [row.id for row in findings.rows if row.subject.owner == owner[0] and row.subject.kind == kind]
+    keys = parts_of(spec.key)
+    owner_and_kind = (keys[1] if len(keys) > 1 else "", keys[-1])
+    rows += [row.id for row in findings.rows if (row.owner, row.subject.kind) == owner_and_kind]
     ids = findings.mission.requirement_ids
     return list(dict.fromkeys(ids[row] for row in rows if row in ids))

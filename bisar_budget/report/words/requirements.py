@@ -205,9 +205,9 @@ def unjudged_effects(mission: MissionFindings) -> list[UnjudgedEffect]:
             continue
         for note in (row.reason, *(value for value in row.reason.values if isinstance(value, phrases.Note))):
             if note.code == "effect-is-not-judged":
-                kind, _, total, lines = note.values[:4]
-                text = phrases.effect_is_not_judged(str(kind), float(str(total)), float(str(total)), _texts(lines))
-                effects.setdefault(str(kind), (text, []))[1].append(row)
+                name, _, total, lines = note.values[:4]
+                text = phrases.effect_is_not_judged(str(name), float(str(total)), float(str(total)), _texts(lines))
+                effects.setdefault(str(name), (text, []))[1].append(row)
     return [UnjudgedEffect(text, tuple(rows)) for text, rows in effects.values()]
 
 

@@ -5,6 +5,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
+from bisar_budget.error_kinds import SumKind
 from bisar_budget.faults import KeyPath, Place, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
@@ -147,15 +148,12 @@ def dashed(text: str) -> str:
 
 _PHASE_UNIT = "deg"  # unit of a phase requirement that the file does not state
 AS_DECLARED = "as declared"  # a level of 0 dB relative to the declared noise
-_LEVEL_REQUIREMENTS = ("pslr", "islr")  # requirements in dB of the image, and the kinds of rows with their sums
-# Kinds of rows with sums of phases.
-_PHASE_KINDS = ("quadratic_phase_error", "cubic_phase_error", "spatial_variance", "dispersion")
+_LEVEL_REQUIREMENTS = ("pslr", "islr")  # requirements in dB of the image
 
 
 def is_noise_level(row: Row) -> bool:
     """Whether the numbers of a row are levels of a spectrum relative to the declared spectrum. [dB]"""
-    kind, axis = row.subject.kind, row.subject.axis
-    return row.unit == "dB" and ((kind == "oscillator" and not axis) or (kind == "vibration" and axis == "spectrum"))
+    return row.unit == "dB" and row.subject.axis == row.subject.facts.spectrum_axis
 
 
 def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: str = "nearest") -> str:
@@ -171,7 +169,8 @@ def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: 
         sign = "+" if level > 0 else ""
         return f"{sign}{format_quantity(level, 'dB', 3, rounding)}" if level else AS_DECLARED
     unit = _file_unit(row.line, row.unit)
-    if not unit and row.unit == "rad" and row.subject.kind in _PHASE_KINDS:
+    kind = row.subject.facts
+    if not unit and row.unit == "rad" and isinstance(kind, SumKind) and kind.is_phase:
         unit = phase_unit(mission)
     return format_in(_level(value, row.unit), row.unit, unit, 3, rounding)
 
@@ -181,7 +180,9 @@ def row_limit(row: Row, mission: MissionFindings) -> str:
 
     Levels of the image (rows of PSLR and ISLR) are rounded to the nearest value, because no file declares them.
     """
-    return row_size(row.allowable, row, mission, "nearest" if row.subject.kind in _LEVEL_REQUIREMENTS else "down")
+    kind = row.subject.facts
+    is_level = isinstance(kind, SumKind) and kind.is_level
+    return row_size(row.allowable, row, mission, "nearest" if is_level else "down")
 
 
 def allowable_words(row: Row, mission: MissionFindings) -> str:
