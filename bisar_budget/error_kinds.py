@@ -40,6 +40,12 @@ class ErrorKind:
         Form of the row ids of an error that both platforms share; empty if the kind has no such error.
     is_computed : bool
         Whether the tool computes the declared size of a row, so that a size of zero is a result.
+    only_warns : bool
+        Whether the row warns and never fails.
+    is_by_rule : bool
+        Whether the row combines errors by the rule `allocation.combine`.
+    is_vibration : bool
+        Whether the row judges a vibration.
     spectrum_axis : str, optional
         Axis of the row about a declared spectrum, whose levels in decibels are relative to that spectrum; None if the
         kind has no such row.
@@ -50,6 +56,9 @@ class ErrorKind:
     common_id_form: str = ""
     is_computed: bool = False
     spectrum_axis: str | None = None
+    only_warns: bool = False
+    is_by_rule: bool = False
+    is_vibration: bool = False
 
     def row_id(self, owner: str, axis: str = "", entry: int | None = None) -> str:
         """Id of the row of an error of this kind. The contract defines it."""
@@ -206,14 +215,11 @@ class SumKind(ErrorKind):
         Whether the row has a phase in radians.
     is_level : bool
         Whether the row has the power of sidelobes in decibels.
-    only_warns : bool
-        Whether the row warns and never fails.
     """
 
     is_sum: bool = False
     is_phase: bool = False
     is_level: bool = False
-    only_warns: bool = False
 
 
 _KINDS: dict[str, ErrorKind] = {}
@@ -231,15 +237,21 @@ def register(kind: ErrorKind) -> None:
         raise ValueError(f"a kind of error named {kind.name!r} is registered already")
 
 
+POSITION = StateKind(name="position", order=0, unit="m")
+VELOCITY = StateKind(name="velocity", order=1, unit="m/s")
+ACCELERATION = StateKind(name="acceleration", order=2, unit="m/s^2")
+SPREAD_POWER = SumKind(name="islr", is_sum=True, is_level=True)
+MEASURED_KINDS = (POSITION, VELOCITY)  # which sources of paths and covariances state
+
 for _kind in (
-    StateKind(name="position", order=0, unit="m"),
-    StateKind(name="velocity", order=1, unit="m/s"),
-    StateKind(name="acceleration", order=2, unit="m/s^2"),
+    POSITION,
+    VELOCITY,
+    ACCELERATION,
     SourceKind(name="time_tag", moves="platform", flown_as="time_tag", common_id_form="common.{kind}"),
     SourceKind(
         name="terrain", moves="platform", flown_as="height", is_covered=False, owes_source=False, direction="height"
     ),
-    SourceKind(name="vibration", moves="platform", is_random=True, spectrum_axis="spectrum"),
+    SourceKind(name="vibration", moves="platform", is_random=True, is_vibration=True, spectrum_axis="spectrum"),
     SourceKind(name="imu", moves="platform", is_random=True, is_largest_of_axes=True),
     SourceKind(name="lever_arm", moves="platform", is_random=True),
     SourceKind(
@@ -272,14 +284,14 @@ for _kind in (
         is_random=True,
     ),
     SourceKind(name="other", moves="image", id_form="{kind}.{axis}", is_covered=False, has_names=True),
-    SumKind(name="quadratic_phase_error", is_sum=True, is_phase=True),
-    SumKind(name="cubic_phase_error", is_sum=True, is_phase=True),
-    SumKind(name="location_error", is_sum=True),
+    SumKind(name="quadratic_phase_error", is_sum=True, is_phase=True, is_by_rule=True),
+    SumKind(name="cubic_phase_error", is_sum=True, is_phase=True, is_by_rule=True),
+    SumKind(name="location_error", is_sum=True, is_by_rule=True),
     SumKind(name="pslr", is_sum=True, is_level=True),
-    SumKind(name="islr", is_sum=True, is_level=True),
+    SPREAD_POWER,
     SumKind(name="autofocus_pull_in", is_sum=True, only_warns=True),
-    SumKind(name="spatial_variance", is_phase=True, is_computed=True),
-    SumKind(name="dispersion", id_form="propagation.{kind}", is_phase=True, is_computed=True),
+    SumKind(name="spatial_variance", is_phase=True, is_computed=True, is_by_rule=True),
+    SumKind(name="dispersion", id_form="propagation.{kind}", is_phase=True, is_computed=True, is_by_rule=True),
     SumKind(name="declare"),
     SumKind(name="specification", id_form="{kind}.{axis}"),
 ):

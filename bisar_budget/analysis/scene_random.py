@@ -51,8 +51,6 @@ from bisar_budget.geometry import VectorArrays
 from bisar_budget.image_plane import nodes
 from bisar_budget.ranges.exact_ranges import ExactRanges
 
-_CLOCKS = ("oscillator", "synchronization")  # kinds of errors that move nothing
-
 
 class RandomPhases:
     """Declared errors without a sign, for many cases, at arbitrary places of their scenes.
@@ -188,16 +186,16 @@ def _at_random(
     errors: DeclaredErrors, random: Sequence[RandomError]
 ) -> Iterator[tuple[Subject, _Moving | _Clock | _Delay]]:
     for error in random:
-        subject, kind = error.subject, error.subject.kind
-        if error.declared is None or error.counted_in or kind == "other":
+        subject, moves = error.subject, error.kind.moves
+        if error.declared is None or error.counted_in:
             continue
         size = errors.array(error.declared)
         if error.moves:
             yield subject, _Moving(_at_nodes_of(errors, error.moves), size)
-        elif kind in _CLOCKS:
+        elif moves == "clock":
             assert error.full.covariance is not None, "the full model has one"
             yield subject, _Clock.of(errors.exact, error.full.covariance, size)
-        elif kind == "propagation":
+        elif moves == "air":
             legs = tuple(map(PLATFORMS.index, legs_of(subject.owner)))
             middles = [errors.exact.positions[leg] for leg in legs]
             count = min(MOST_EFFECT_NODES, max(FEWEST_EFFECT_NODES, errors.exact.fit.shape[1]))

@@ -25,7 +25,7 @@ from bisar_budget.budget.judged_requirements import (
 )
 from bisar_budget.budget.judged_rows import CODE, LIMIT_RATIO, FamilyRow, Judging, worded
 from bisar_budget.effects.combined import Phases, correlation_notes
-from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, LOCATION, MODELS, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomError
@@ -189,7 +189,7 @@ class Aggregates:
         by_model: dict[str, Any] = {}
         if limit is not None:
             limit = self.array(limit)
-            models = ("published", "full") if row_subject.kind == QUADRATIC else ("published",)
+            models = MODELS if _wording_of(row_subject, "").is_quadratic else ("published",)
             by_model = {f"allowable_{model}": limit for model in models}
             is_over_by_other = self.errors.doubts(theirs.model, size_by_theirs > limit * LIMIT_RATIO)
             is_over_of_all = of_all > limit * LIMIT_RATIO
@@ -263,18 +263,18 @@ class Aggregate(FamilyRow):
         numbers = map(case.number, (self.judged.declared, self.judged.allowable))
         size, limit = (None if math.isnan(number) else number for number in numbers)
         wording, over, notes = _wording_of(row_subject, self.rule), NOTHING, tuple[Note, ...]()
-        if combine != "each" and row_subject.kind != PULL_IN:
+        if combine != "each" and not row_subject.facts.only_warns:
             notes = correlation_notes(combine, [group for group in groups if owner in (group.platform, "mission")])
         if size is None:
             over = phrases.note("no-ground-point")
         elif limit is not None and size > limit * LIMIT_RATIO:
             over = phrases.aggregate_over(wording.what, size, limit, wording.unit, *_largest(case, model, self))
-        if row_subject.kind == QUADRATIC:
+        if wording.is_quadratic:
             if over and size is not None and combine != "each":
                 over = over.then(self._passes_with(case, model))
-        elif over and size is not None and row_subject.kind != LOCATION:
-            over = over.then(phrases.note("no-gain") if row_subject.kind == CUBIC else phrases.note("one-total"))
-        doubt = over if row_subject.kind == PULL_IN else NOTHING
+        elif over and size is not None and wording.advice:
+            over = over.then(phrases.note(wording.advice))
+        doubt = over if row_subject.facts.only_warns else NOTHING
         doubted = NOTHING
         if case.number(self.is_in_doubt):
             owners = {error.owner for error in self.continued[1]}
@@ -337,14 +337,14 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
         for model in analysis.gates
     ]
     effects = []
-    for kind, keys in TAKEN_BY.items():
+    for effect_name, keys in TAKEN_BY.items():
         if any(getattr(needs, key) is not None for key in keys):
             continue
         sum_of_all: PerCase = 0.0
         sizes: dict[str, Floats] = {}
-        for together, of_kinds in by_model:
-            sum_of_all = np.fmax(sum_of_all, together.combined(of_kinds[kind], together.rule_of_all))
-            for row_id, size in of_kinds[kind]:
+        for together, parts in by_model:
+            sum_of_all = np.fmax(sum_of_all, together.combined(parts[effect_name], together.rule_of_all))
+            for row_id, size in parts[effect_name]:
                 sizes[row_id] = np.fmax(sizes.get(row_id, 0.0), np.abs(size))
         if not sizes:
             continue
@@ -356,17 +356,17 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
         count = np.sum([size > 0 for size in sizes.values()], axis=0)
         least = np.minimum(MAKER_FRACTION * largest, level / np.maximum(count, 1))
         makers = {row_id: is_above & (size >= least) & (size > 0) for row_id, size in sizes.items()}
-        effects.append(UntakenEffect(kind, total, (total > 0) & ~is_above, makers, least, sizes))
+        effects.append(UntakenEffect(effect_name, total, (total > 0) & ~is_above, makers, least, sizes))
     return effects
 
 
-def _exchanged(phases_by_kind: Mapping[str, Phases], errors: Sequence[RandomError], model: str) -> dict[str, Phases]:
+def _exchanged(parts: Mapping[str, Phases], errors: Sequence[RandomError], model: str) -> dict[str, Phases]:
     """Replace the cubic and spread phases [rad] of the given errors, which are matched by id."""
     ids = {error.id for error in errors}
-    exchanged = {kind: [phase for phase in phases if phase[0] not in ids] for kind, phases in phases_by_kind.items()}
+    exchanged = {name: [phase for phase in phases if phase[0] not in ids] for name, phases in parts.items()}
     for error in errors:
-        for kind in ("cubic", "spread"):
-            exchanged[kind].append((error.id, part_of(error.effect(model), kind) * np.asarray(error.declared)))
+        for name in ("cubic", "spread"):
+            exchanged[name].append((error.id, part_of(error.effect(model), name) * np.asarray(error.declared)))
     return dict(exchanged)
 
 
@@ -387,22 +387,28 @@ class _Words(NamedTuple):
     unit: str
     path: KeyPath
     equation: tuple[str, str]  # published model, full model
+    advice: str = ""  # code of the note on what autofocus does for a row that exceeds its limit
+    is_quadratic: bool = False
+    is_displacement: bool = False
 
 
 _ROW_SUM_WORDS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "each": "largest of the rows"}
 _PATHS: dict[str, KeyPath] = {"mission": ("platforms",), "clock": ("timing_error",)}
 _WORDINGS = {
-    CUBIC: _Words("cubic phase", "rad", ("requirements", CUBIC), ("Table I, cubic column", "full model")),
-    LOCATION: _Words("displacement of the image", "m", ("requirements", LOCATION), ("(25)", "full model")),
-    PULL_IN: _Words("QPE", "rad", ("autofocus", "n_pull"), ("Section VI", "Section VI")),
+    CUBIC: _Words(
+        "cubic phase", "rad", ("requirements", CUBIC), ("Table I, cubic column", "full model"), advice="no-gain"
+    ),
+    LOCATION: _Words(
+        "displacement of the image", "m", ("requirements", LOCATION), ("(25)", "full model"), is_displacement=True
+    ),
+    PULL_IN: _Words("QPE", "rad", ("autofocus", "n_pull"), ("Section VI", "Section VI"), advice="one-total"),
 }
 
 
 def _wording_of(row_subject: Subject, rule: str) -> _Words:
-    if row_subject.kind in _WORDINGS:
-        return _WORDINGS[row_subject.kind]
     path = _PATHS.get(row_subject.owner, ("platforms", row_subject.owner, "motion_error"))
-    return _Words("QPE", "rad", path, (_ROW_SUM_WORDS[rule], _ROW_SUM_WORDS[rule]))
+    of_rows = _ROW_SUM_WORDS.get(rule, "")
+    return _WORDINGS.get(row_subject.kind, _Words("QPE", "rad", path, (of_rows, of_rows), is_quadratic=True))
 
 
 def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, Note]:
@@ -411,19 +417,24 @@ def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, 
     The size is a phase [rad] or a displacement [m]. The note is empty unless the size relies on extrapolated noise or
     on a folded spur.
     """
-    together, kind = case.analysis.together(model), aggregate.judged.subject.kind
-    if kind == LOCATION:
+    together, row_subject = case.analysis.together(model), aggregate.judged.subject
+    wording = _wording_of(row_subject, aggregate.rule)
+    if wording.is_displacement:
         sizes = [(row_id, math.hypot(*move)) for row_id, move in together.displacement_parts(case.place)]
     else:
         sizes = together.phase_parts(aggregate.phases, aggregate.rule, case.place)
     row_id, largest = sizes[int(first_highest(np.abs([size for _, size in sizes])))]
-    if kind in (LOCATION, PULL_IN):
+    if wording.is_displacement or row_subject.facts.only_warns:
         return row_id, largest, NOTHING
     extrapolated = {error.id: error.extrapolated for error in case.random}
-    return row_id, largest, _folded_spur(case, row_id, largest, kind) or extrapolated.get(row_id, NOTHING)
+    return (
+        row_id,
+        largest,
+        _folded_spur(case, row_id, largest, is_cubic=not wording.is_quadratic) or extrapolated.get(row_id, NOTHING),
+    )
 
 
-def _folded_spur(case: Case, row_id: str, size: float, kind: str) -> Note:
+def _folded_spur(case: Case, row_id: str, size: float, *, is_cubic: bool) -> Note:
     """Name the folded spur that causes most of an oscillator's phase.
 
     Spurs fold to low frequencies if the platforms exchange pulses to synchronise. The note is empty if noise causes
@@ -432,7 +443,7 @@ def _folded_spur(case: Case, row_id: str, size: float, kind: str) -> Note:
     T, factor = case.mission.collection.aperture_time, case.mission.allocation.coverage_factor
     for spur in spurs_of(case.mission):
         slow = spur.slow_parts(T) if f"{spur.name}.oscillator" == row_id else None
-        if slow is not None and 2 * factor**2 * float(slow.cubic if kind == CUBIC else slow.quadratic) > size**2:
+        if slow is not None and 2 * factor**2 * float(slow.cubic if is_cubic else slow.quadratic) > size**2:
             return phrases.note("spur-is-folded", frequency=spur.frequency)
     return NOTHING
 
@@ -446,7 +457,7 @@ def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit:
     if limit is None:
         return NOTHING
     if case.number(aggregate.is_over_of_all):
-        effect_name = "displacement" if aggregate.judged.subject.kind == LOCATION else wording.what
+        effect_name = "displacement" if wording.is_displacement else wording.what
         return phrases.note(
             "all-together-over", what=effect_name, size=case.number(aggregate.of_all), limit=limit, unit=wording.unit
         )
@@ -457,7 +468,7 @@ def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit:
         of_case = [error for error in case.random if error.id in {each.id for each in errors}]
         return continuation_note(case, of_case, effect_kind, case.number(aggregate.judged.declared))
     by_other = case.number(aggregate.by_other)
-    if aggregate.judged.subject.kind == PULL_IN:
+    if aggregate.judged.subject.facts.only_warns:
         return phrases.note("other-model-is-beyond", model=other, phase=by_other, limit=limit, unit=wording.unit)
     return phrases.other_model_fails(other, by_other, limit, wording.unit)
 

@@ -399,8 +399,8 @@ def missing_declarations(mission: Mission, still: Container[str] | None = None) 
 def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
     for asked in mission.requirements.declare:
         owner, dot, kind = asked.rpartition(".")
-        if kind in _KINDS_OF_MISSION:
-            of_mission = _KINDS_OF_MISSION[kind]
+        of_mission = _KINDS_OF_MISSION.get(kind)
+        if of_mission is not None:
             if of_mission.has_halves or not of_mission.is_stated(mission):
                 yield from (Missing(of_mission.owner, kind, key) for key in of_mission.missing(mission))
             continue

@@ -22,11 +22,11 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.constants import ONE_PEAK_DB
-from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, Subject
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import residual_subject
+from bisar_budget.error_kinds import MEASURED_KINDS, POSITION, StateKind
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, norm, unit
-from bisar_budget.mission.covariance import MOTION_KINDS
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath, LogNoise, MotionError, Platform
 from bisar_budget.paths.accuracy import StatedAccuracy
@@ -38,7 +38,6 @@ NEGLIGIBLE_RAD = 0.08  # quadratic phase that is negligible in any image
 _TYPICAL_SHARE = 1 / 3  # a fix may be this factor better than the typical error of its quality class
 MOST_RESIDUAL_RAD = 0.2  # largest rms phase of the residual along the line of sight that needs no statement
 MOST_GRID_SHARE = 0.1  # largest step of a log, relative to the declared position error, that needs no statement
-RESIDUAL = "residual"  # kind of doubt: the residual of a smooth path
 _EQUAL_VARIANCE_FRACTION = 1e-6  # relative tolerance for rounding, when axes are rotated
 
 
@@ -49,7 +48,7 @@ class InputDoubt:
     `doubt` is the distance between the path and the possible true path, or the error that the source of the path
     states. `declared` is the declared error without the coverage factor; it is 0 if the file declares no error. Both
     are given along the axis on which `doubt` exceeds `declared` most, or as root-sum-squares if the doubt has no
-    direction. The unit is [m] or [m/s], depending on `kind`. `note` gives both values in words.
+    direction. The unit is that of `state`, the kind of the error. `note` gives both values in words.
 
     If `is_of_log` is set, the doubt comes from a log. `doubt` is then either the phase of the log's residual [rad],
     with the largest acceptable phase as `declared`, or the step to which the fixes are rounded [m].
@@ -59,19 +58,24 @@ class InputDoubt:
     doubt: float
     declared: float
     note: Note
-    kind: str = "position"
+    state: StateKind | None = POSITION
     is_stated: bool = False
     is_of_log: bool = False
 
     @property
     def is_phase(self) -> bool:
         """Whether the doubt is about the phase that a smooth path leaves, and not about an error of the path."""
-        return self.unit == "rad"
+        return self.state is None
+
+    @property
+    def kind(self) -> str:
+        """Name of the kind of error; `residual` for the phase that a smooth path leaves."""
+        return "residual" if self.state is None else self.state.name
 
     @property
     def unit(self) -> str:
         """Unit of `doubt` and of `declared`."""
-        return MOTION_UNITS.get(self.kind, "rad")
+        return "rad" if self.state is None else self.state.unit
 
 
 def input_doubts(mission: Mission) -> list[InputDoubt]:
@@ -86,35 +90,38 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
             key = f"platforms.{name}.motion_error.position"
             note = phrases.input_in_doubt(path.doubt_m, path.doubt_of, declared, key)
             doubts.append(InputDoubt(name, path.doubt_m, declared or 0.0, note))
-        for kind in MOTION_KINDS:
+        for state in MEASURED_KINDS:
             doubts += [
-                _stated_doubt(platform, name, kind, stated)
+                _stated_doubt(platform, name, state, stated)
                 for stated in path.stated
-                if np.any(states_more(mission, name, kind, stated))
+                if np.any(states_more(mission, name, state, stated))
             ]
         if np.any(is_coarse(mission, name)):
             doubts.append(_coarse_grid(platform, name))
         if np.any(leaves_unsaid(mission, name)):
             phase, key = float(residual_phase(mission, name)), f"platforms.{name}.trajectory.processed"
             note = phrases.note("log-leaves-too-much", phase=phase, most=MOST_RESIDUAL_RAD, key=key)
-            doubts.append(InputDoubt(name, phase, MOST_RESIDUAL_RAD, note, RESIDUAL, is_of_log=True))
+            doubts.append(InputDoubt(name, phase, MOST_RESIDUAL_RAD, note, None, is_of_log=True))
     return doubts
 
 
-def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Booleans]:
+def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, StateKind | None], Booleans]:
     """Find the cases in which a path may be less accurate than the file declares.
 
-    The result maps the name of the platform and the kind of error to a mask, (cases,).
+    The result maps the name of the platform and the kind of error to a mask, (cases,). The kind None stands for the
+    residual of a log.
     """
-    doubted = {}
+    doubted: dict[tuple[str, StateKind | None], Booleans] = {}
     for name in PLATFORMS:
         path: FlownPath | None = getattr(mission.platforms, name).path
         if path is not None:
-            for kind in MOTION_KINDS:
-                doubts = [strays(mission, name), is_coarse(mission, name)] if kind == "position" else []
-                doubts += [states_more(mission, name, kind, stated) for stated in path.stated]
-                doubted[name, kind] = np.any([np.broadcast_to(doubt, (cases,)) for doubt in (False, *doubts)], axis=0)
-            doubted[name, RESIDUAL] = np.array(np.broadcast_to(leaves_unsaid(mission, name), (cases,)))
+            for state in MEASURED_KINDS:
+                doubts = [] if state.order else [strays(mission, name), is_coarse(mission, name)]
+                doubts += [states_more(mission, name, state, stated) for stated in path.stated]
+                doubted[name, state] = np.any(
+                    [np.broadcast_to(doubt, (cases,)) for doubt in (False, *doubts)], axis=0
+                )
+            doubted[name, None] = np.array(np.broadcast_to(leaves_unsaid(mission, name), (cases,)))
     return doubted
 
 
@@ -136,7 +143,7 @@ def strays(mission: Mission, name: str) -> PerCaseFlag:
     if not is_large.any() or path.is_doubted:
         return is_large
     in_any_direction = np.multiply.outer(np.asarray(path.doubt_m, dtype=float) ** 2, np.eye(3))
-    return is_large & _matters(mission, name, "position", in_any_direction)
+    return is_large & _matters(mission, name, POSITION, in_any_direction)
 
 
 def declared_position_error(error: MotionError) -> Any:
@@ -149,23 +156,21 @@ def declared_position_error(error: MotionError) -> Any:
     return sum(size**2 for size in sizes) ** 0.5 if sizes else None
 
 
-def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, kind: str = "position") -> bool:
+def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, state: StateKind | None = POSITION) -> bool:
     """Whether a row judges a given kind of error of a platform, in the frame in which the file states the error.
 
-    The residual of a log spreads power. The kind `residual` therefore includes its own row, and the rows that sum
-    spread power for the platform and for the mission.
+    A `state` of None stands for the residual of a log, which spreads power. It therefore includes its own row, and
+    the rows that sum spread power for the platform and for the mission.
     """
-    if kind == RESIDUAL:
-        return row_subject == residual_subject(owner) or (
-            row_subject.kind == "islr" and row_subject.owner in (owner, "mission")
-        )
+    if state is None:
+        return row_subject in (residual_subject(owner), subject(owner, "islr"), subject("mission", "islr"))
     error: MotionError = getattr(mission.platforms, owner).motion_error
-    frame = "scene" if error.stated(kind) is None else error.frame
-    return row_subject.owner == owner and row_subject.kind == kind and row_subject.frame == frame
+    frame = "scene" if error.stated(state.name) is None else error.frame
+    return row_subject.owner == owner and row_subject.facts is state and row_subject.frame == frame
 
 
 # ---------------------------------------------------------------------- errors that the source of a path states
-def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) -> PerCaseFlag:
+def states_more(mission: Mission, name: str, state: StateKind, stated: StatedAccuracy) -> PerCaseFlag:
     """Whether the source of a path states a larger error than the file declares, as a Boolean or an array (cases,).
 
     An error is larger if its variance is larger in any direction. For a source without directions, the
@@ -175,40 +180,43 @@ def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) 
     source.
     """
     platform: Platform = getattr(mission.platforms, name)
-    stated_covariance = _stated_covariance(stated, kind, platform)
-    declared = _declared_covariance(platform, kind)
+    stated_covariance = _stated_covariance(stated, state, platform)
+    declared = _declared_covariance(platform, state)
     if stated.covariance is None:
-        is_more = kind == "position" and stated.total**2 > np.trace(declared, axis1=-2, axis2=-1) * (
+        is_more = not state.order and stated.total**2 > np.trace(declared, axis1=-2, axis2=-1) * (
             1 + _EQUAL_VARIANCE_FRACTION
         )
         return np.asarray(is_more) & (stated.total > LEAST_M)
     if stated_covariance is None:
         return False
     share = _TYPICAL_SHARE**2 if stated.is_typical else 1.0
-    seen = LEAST_M**2 if kind == "position" else 0.0
+    seen = 0.0 if state.order else LEAST_M**2
     excess = declared * (1 + _EQUAL_VARIANCE_FRACTION) + seen * np.eye(3) - share * stated_covariance
     scale = np.trace(stated_covariance, axis1=-2, axis2=-1)
     is_more = np.linalg.eigvalsh(excess)[..., 0] < -1e-9 * scale
-    is_open = stated.is_typical and platform.motion_error.stated(kind) is None and not platform.motion_error.random
-    if is_more.any() and (kind == "velocity" or is_open):
-        is_more = is_more & _matters(mission, name, kind, stated_covariance)
+    is_open = (
+        stated.is_typical and platform.motion_error.stated(state.name) is None and not platform.motion_error.random
+    )
+    if is_more.any() and (state.order or is_open):
+        is_more = is_more & _matters(mission, name, state, stated_covariance)
     return np.asarray(is_more)
 
 
-def _stated_covariance(stated: StatedAccuracy, kind: str, platform: Platform) -> Floats | None:
+def _stated_covariance(stated: StatedAccuracy, state: StateKind, platform: Platform) -> Floats | None:
     """Covariance (..., 3, 3) of the stated errors along the scene's axes; None if the source does not state it.
 
-    `kind` is position [m²] or velocity [m²/s²]. For a platform in free fall whose errors the file states in the
+    `state` is the kind of the errors, position [m²] or velocity [m²/s²]. For a platform in free fall whose errors the
+    file states in the
     orbital frame `ric`, the velocity is relative to the stars.
     """
-    covariance, row, fall = stated.covariance, 3 * MOTION_KINDS.index(kind), platform.state.fall
+    covariance, row, fall = stated.covariance, 3 * state.order, platform.state.fall
     if covariance is None or len(covariance) <= row:
         return None
 
     def block(first: int, second: int) -> Floats:
         return _stack([line[second : second + 3] for line in covariance[first : first + 3]])
 
-    if kind == "position" or fall is None or platform.motion_error.frame != "ric":
+    if not state.order or fall is None or platform.motion_error.frame != "ric":
         return block(row, row)
     x, y, z = fall.rotation
     turning = _stack(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
@@ -217,13 +225,13 @@ def _stated_covariance(stated: StatedAccuracy, kind: str, platform: Platform) ->
     return np.asarray(block(3, 3) + mixed + np.swapaxes(mixed, -1, -2) + turned)
 
 
-def _declared_covariance(platform: Platform, kind: str) -> Floats:
+def _declared_covariance(platform: Platform, state: StateKind) -> Floats:
     """Covariance (..., 3, 3) of the declared errors of one kind along the scene's axes. [m²] or [m²/s²]"""
     error = platform.motion_error
-    sizes = error.stated(kind) or (0.0, 0.0, 0.0)
-    correlation = np.eye(3).tolist() if error.covariance is None else error.covariance.block(kind)
+    sizes = error.stated(state.name) or (0.0, 0.0, 0.0)
+    correlation = np.eye(3).tolist() if error.covariance is None else error.covariance.block(state.name)
     along = [[sizes[i] * sizes[j] * correlation[i][j] for j in range(3)] for i in range(3)]
-    if kind == "position":
+    if not state.order:
         for process in error.random:
             for axis in range(3):
                 along[axis][axis] = along[axis][axis] + process.sigma[axis] ** 2
@@ -237,21 +245,20 @@ def _stack(rows: Sequence[Sequence[PerCase]]) -> Floats:
     return np.moveaxis(np.array(elements).reshape(3, 3, *elements[0].shape), (0, 1), (-2, -1))
 
 
-def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccuracy) -> InputDoubt:
+def _stated_doubt(platform: Platform, name: str, state: StateKind, stated: StatedAccuracy) -> InputDoubt:
     """Describe the doubt about a path whose source states a larger error than the file declares.
 
     The values are given along the axis with the largest difference.
     """
     error = platform.motion_error
-    key = f"platforms.{name}.motion_error.{kind if error.covariance is None else 'covariance'}"
-    stated_covariance, declared = _stated_covariance(stated, kind, platform), _declared_covariance(platform, kind)
-    unit_name = MOTION_UNITS[kind]
-    is_declared = error.stated(kind) is not None or (kind == "position" and bool(error.random))
+    key = f"platforms.{name}.motion_error.{state.name if error.covariance is None else 'covariance'}"
+    stated_covariance, declared = _stated_covariance(stated, state, platform), _declared_covariance(platform, state)
+    is_declared = error.stated(state.name) is not None or (not state.order and bool(error.random))
     if stated_covariance is None:
         total = float(np.trace(declared)) ** 0.5
-        both = phrases.StatedError(stated.words, kind, (stated.total,), (total,), unit_name, key, is_declared)
+        both = phrases.StatedError(stated.words, state.name, (stated.total,), (total,), state.unit, key, is_declared)
         note = phrases.input_states_more(both)
-        return InputDoubt(name, stated.total, total, note, kind, is_stated=True)
+        return InputDoubt(name, stated.total, total, note, state, is_stated=True)
     axes = _stack(platform.state.frame(error.frame))
     names: Sequence[str] = FRAME_AXES[error.frame]
     sizes = [np.sqrt(np.diag(axes @ covariance @ axes.T)).tolist() for covariance in (stated_covariance, declared)]
@@ -269,8 +276,10 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
         )
     worst_axis = max(range(len(sizes[0])), key=lambda axis: share * sizes[0][axis] - sizes[1][axis])
     phrase = phrases.input_usually_has_more if stated.is_typical else phrases.input_states_more
-    note = phrase(phrases.StatedError(stated.words, kind, sizes[0], sizes[1], unit_name, key, is_declared, names))
-    return InputDoubt(name, sizes[0][worst_axis], sizes[1][worst_axis], note, kind, is_stated=True)
+    note = phrase(
+        phrases.StatedError(stated.words, state.name, sizes[0], sizes[1], state.unit, key, is_declared, names)
+    )
+    return InputDoubt(name, sizes[0][worst_axis], sizes[1][worst_axis], note, state, is_stated=True)
 
 
 # ---------------------------------------------------------------------- the residual of a log
@@ -307,11 +316,11 @@ def is_coarse(mission: Mission, name: str) -> PerCaseFlag:
     platform: Platform = getattr(mission.platforms, name)
     grid = _stack(log.grid)
     squares = np.swapaxes(grid, -1, -2) @ grid
-    declared = _declared_covariance(platform, "position")
+    declared = _declared_covariance(platform, POSITION)
     excess = MOST_GRID_SHARE**2 * declared * (1 + _EQUAL_VARIANCE_FRACTION) + LEAST_M**2 * np.eye(3) - squares
     coarse = np.linalg.eigvalsh(excess)[..., 0] < 0
     if coarse.any() and platform.motion_error.stated("position") is None and not platform.motion_error.random:
-        coarse = coarse & _matters(mission, name, "position", squares / 12)
+        coarse = coarse & _matters(mission, name, POSITION, squares / 12)
     return coarse
 
 
@@ -335,7 +344,7 @@ def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
     assert platform.path.log_noise is not None
     error = platform.motion_error
     axes = np.array(platform.state.frame(error.frame), dtype=float)
-    grid, declared = np.array(platform.path.log_noise.grid), _declared_covariance(platform, "position")
+    grid, declared = np.array(platform.path.log_noise.grid), _declared_covariance(platform, POSITION)
     steps = np.sqrt(np.sum((grid @ axes.T) ** 2, axis=0))
     sigmas = np.sqrt(np.diag(axes @ declared @ axes.T))
     worst_axis = int(np.argmax(steps - MOST_GRID_SHARE * sigmas))
@@ -347,11 +356,11 @@ def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
 
 
 # ---------------------------------------------------------------------- the effect of a doubt
-def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Booleans:
+def _matters(mission: Mission, name: str, state: StateKind, covariance: Floats) -> Booleans:
     """Whether an error with the given covariance uses more than a negligible part of a requirement, (cases,)."""
     needs, half = mission.requirements, np.asarray(mission.collection.aperture_time) / 2
     with np.errstate(all="ignore"):
-        before, middle, after = _range_errors(mission, name, kind, half)
+        before, middle, after = _range_errors(mission, name, state, half)
         at_ends = np.asarray(half)[..., None]
         constant, linear, edge = middle, (after - before) / (2 * at_ends), (after + before) / 2 - middle
         at_edge = np.sqrt(np.einsum("...i,...ij,...j->...", edge, covariance, edge))
@@ -366,7 +375,7 @@ def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Bool
     return np.asarray(matters)
 
 
-def _range_errors(mission: Mission, name: str, kind: str, half: Floats) -> Sequence[Floats]:
+def _range_errors(mission: Mission, name: str, state: StateKind, half: Floats) -> Sequence[Floats]:
     """Range errors due to a unit error of a platform along each axis, at slow times −T/2, 0 and T/2.
 
     T is the aperture time. Each of the three arrays has the shape (..., 3). For a position error it is in [m/m], and
@@ -378,12 +387,12 @@ def _range_errors(mission: Mission, name: str, kind: str, half: Floats) -> Seque
     platform: Platform = getattr(mission.platforms, name)
     path = platform.state
     if path.fall is None:
-        powers = [1.0, 1.0, 1.0] if kind == "position" else [-half[..., None], 0.0, half[..., None]]
+        powers = [-half[..., None], 0.0, half[..., None]] if state.order else [1.0, 1.0, 1.0]
         return [sight * power for sight, power in zip(sights, powers, strict=True)]
     halves = np.atleast_1d(np.broadcast_to(half, np.broadcast_shapes(half.shape, sights[0].shape[:-1])))
     motions = path.fall.motions(path, halves, np.array((-1.0, 0.0, 1.0)))
-    units = motions[MOTION_KINDS.index(kind)]
-    if kind == "position" and platform.motion_error.frame == "ric":
+    units = motions[state.order]
+    if not state.order and platform.motion_error.frame == "ric":
         rates = [path.fall.rate_against_stars(axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
         turned = [sum(motions[1][i] * rate[i] for i in range(3)) for rate in rates]
         units = units + np.stack(turned)
@@ -437,7 +446,7 @@ def orbit_notes(case: Case, rows: Sequence[Row]) -> Iterator[Note]:
             continue
         rate = float(norm(state.fall.orbit_rate(state)))
         sizes = math.hypot(*position), math.hypot(*velocity)
-        uses = [row.utilization or 0.0 for row in rows if row.owner == name and row.subject.kind == "position"]
+        uses = [row.utilization or 0.0 for row in rows if row.owner == name and row.subject.facts is POSITION]
         if rate * sizes[0] > sizes[1] and max(uses, default=0.0) > NEGLIGIBLE_USE_FRACTION:
             yield phrases.orbit_errors_are_independent(name, sizes[0], rate, sizes[1])
 

@@ -209,7 +209,7 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
 
 def _cause(source: ErrorSource) -> Note:
     """Name the effect of an error that only the full model takes into account."""
-    if source.subject.kind == "terrain":
+    if source.kind.direction:  # terrain
         return phrases.note("wrong-height-defocuses")
     if source.unit == "m":
         return phrases.note("position-defocuses")

@@ -20,7 +20,7 @@ from bisar_budget.arrays import Booleans, Floats, PerCaseFlag
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations, swings_nothing
 from bisar_budget.budget.dispersion_row import dispersion_rows
-from bisar_budget.budget.doubts import RESIDUAL, doubted_platforms, is_in_doubt, strays
+from bisar_budget.budget.doubts import doubted_platforms, is_in_doubt, strays
 from bisar_budget.budget.error_rows import ErrorRows, specification_rows
 from bisar_budget.budget.file_warnings import calm_oscillators
 from bisar_budget.budget.half_causes import HalfCause, half_causes
@@ -42,6 +42,7 @@ from bisar_budget.budget.waivers import holding_place
 from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
+from bisar_budget.error_kinds import SPREAD_POWER, StateKind
 from bisar_budget.findings.row import DECLARE, SPECIFICATION
 from bisar_budget.findings.status import BROKEN, STATUS
 from bisar_budget.geometry import BistaticGeometry, norm
@@ -138,7 +139,7 @@ class _Judgement:
         untaken = untaken_effects(analysis)
         drifting = unplaced(analysis.together("full"))
         nowhere = np.zeros(self.cases, dtype=bool)
-        paths = [is_doubtful for (_, kind), is_doubtful in self._in_doubt.items() if kind != RESIDUAL]
+        paths = [is_doubtful for (_, state), is_doubtful in self._in_doubt.items() if state is not None]
         is_misplaced = np.any([nowhere, *drifting.values(), *paths], axis=0)
         has_noise = self._has_noise()
         air = staying_air(analysis, rows)
@@ -248,7 +249,7 @@ class _Judgement:
 
     @property
     def _shows_vibration(self) -> bool:
-        return self.shown is None or any(row_subject.kind == "vibration" for row_subject in self.shown.values())
+        return self.shown is None or any(row_subject.facts.is_vibration for row_subject in self.shown.values())
 
     @cached_property
     def _random(self) -> RandomRows:
@@ -266,20 +267,21 @@ class _Judgement:
 
     # ---------------------------------------------------------------- judgements beyond single rows
     @cached_property
-    def _in_doubt(self) -> dict[tuple[str, str], Booleans]:
+    def _in_doubt(self) -> dict[tuple[str, StateKind | None], Booleans]:
         """Masks of the cases with a path that may be less accurate than declared, by platform and kind of error."""
         return doubted_platforms(self.mission, self.cases)
 
     def _undeclared(self, judged_rows: Mapping[str, Judged]) -> Iterator[Judged]:
         """Yield rows for errors that no case declares: rows that are always shown, and rows of inaccurate paths."""
         subjects = dict(self.shown or {})
-        for (name, kind), is_doubtful in self._in_doubt.items():
-            is_shown = is_doubtful.any() and kind != RESIDUAL  # the residual of a log has its own rows
-            axes = (subject(name, kind, axis) for axis in "xyz") if is_shown else ()
+        for (name, state), is_doubtful in self._in_doubt.items():
+            if state is None or not is_doubtful.any():  # the residual of a log has its own rows
+                continue
+            axes = (subject(name, state.name, axis) for axis in "xyz")
             subjects |= {
                 axis_subject.id: axis_subject
                 for axis_subject in axes
-                if is_in_doubt(axis_subject, name, self.mission, kind)
+                if is_in_doubt(axis_subject, name, self.mission, state)
             }
         there = {*judged_rows, DECLARATIONS.id}
         return (
@@ -373,11 +375,11 @@ class RowStatuses:
             owed = [any(is_asked_for(row_subject, error) for error in missing) for row_subject in self.subjects]
             self._settle(owed, cases & (self.status == CODE["not_declared"]), Why.NOT_DECLARED_AS_REQUIRED)
 
-    def doubt_inputs(self, in_doubt: Mapping[tuple[str, str], Booleans]) -> None:
+    def doubt_inputs(self, in_doubt: Mapping[tuple[str, StateKind | None], Booleans]) -> None:
         """Set the rows of errors to `not_evaluated` if the path may be less accurate than the file declares."""
-        for (name, kind), is_doubtful in in_doubt.items():
+        for (name, state), is_doubtful in in_doubt.items():
             if is_doubtful.any():
-                owed = [is_in_doubt(row_subject, name, self.mission, kind) for row_subject in self.subjects]
+                owed = [is_in_doubt(row_subject, name, self.mission, state) for row_subject in self.subjects]
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
     def doubt_air(self, doubted: Mapping[str, Booleans]) -> None:
@@ -427,7 +429,7 @@ class RowStatuses:
     def judge_spread(self, has_noise: Booleans) -> None:
         """Set the ISLR rows to `not_evaluated` in the cases in which nothing but a cubic phase contributes."""
         if not has_noise.all():
-            rows = [row_subject.kind == "islr" for row_subject in self.subjects]
+            rows = [row_subject.facts is SPREAD_POWER for row_subject in self.subjects]
             is_new = ~np.isin(self.why, (Why.INPUT_IN_DOUBT, Why.AIR_STAYS))
             self._settle(rows, ~has_noise & self._is_open & is_new, Why.NOTHING_SPREADS)
 

@@ -54,7 +54,7 @@ class UntakenEffect(NamedTuple):
     effect in the cases with a large total. Each of these rows has an effect of at least `least` [rad].
     """
 
-    kind: str  # cubic, spread or tone
+    effect: str  # cubic, spread or tone
     total: Floats
     is_negligible: Booleans
     makers: Mapping[str, Booleans]

@@ -6,8 +6,9 @@ spread.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,7 +41,7 @@ from bisar_budget.budget.tone_rows import evidence, notes_of_acceleration
 from bisar_budget.effects.air_delays import CONTENT, legs_of
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
-from bisar_budget.effects.navigation_errors import CORRELATED, process_of
+from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillator_acceleration import lacks_a_spectrum
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.oscillators import POOR_FIT_FRACTION
@@ -464,37 +465,56 @@ def _displacement(error: RandomError, model: str) -> GroundVector | None:
     return effect.east * error.declared, effect.north * error.declared
 
 
-def _wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
+_Wording = tuple[str, str | None, tuple[Note, ...]]  # equation, source and notes
+
+
+def _wording(mission: Mission, error: RandomError) -> _Wording:
     """Return the equation, the source and the notes of the row of a random error."""
-    kind, figure, sync = error.subject.kind, error.subject.axis, mission.synchronization
-    if sync is not None and kind == "synchronization":
-        return "synchronisation", sync.source, () if sync.interval else (phrases.note("another-for-each-pulse"),)
-    if kind == "oscillator":
-        return _acceleration_wording(mission, error) if figure else _oscillator_wording(mission, error)
-    if kind == "propagation":
-        return _air_wording(mission, error)
-    if kind == "other":
-        return "as declared", mission.other_errors[error.subject.entry or 0].source, ()
-    if kind == "vibration":
-        motion_error: MotionError = getattr(mission.platforms, error.owner).motion_error
-        return "spectrum of vibration", motion_error.source, _spectrum_notes(mission, error.owner)
-    if kind == "trajectory":
-        path: FlownPath | None = getattr(mission.platforms, error.owner).path
-        return "Gauss-Markov", path and path.source, (phrases.log_is_flown_as_it_is(figure),)
-    if kind == "random":
-        source, figure, equation = process_of(mission, error).source, "random", "Gauss-Markov"
-        if error.owner not in PLATFORMS:
-            common = mission.common_motion_error
-            note = phrases.note("held-to-the-total", owners="both platforms")
-            return equation, source or (common and common.source), (note,)
+    return error.subject.facts.find_in(WORDINGS, error.subject.axis)(mission, error)
+
+
+def _link_wording(mission: Mission, error: RandomError) -> _Wording:
+    sync = mission.synchronization
+    notes = () if sync is not None and sync.interval else (phrases.note("another-for-each-pulse"),)
+    return "synchronisation", sync and sync.source, notes
+
+
+def _stated_wording(mission: Mission, error: RandomError) -> _Wording:
+    return "as declared", mission.other_errors[error.subject.entry or 0].source, ()
+
+
+def _vibration_wording(mission: Mission, error: RandomError) -> _Wording:
+    motion_error: MotionError = getattr(mission.platforms, error.owner).motion_error
+    return "spectrum of vibration", motion_error.source, _spectrum_notes(mission, error.owner)
+
+
+def _log_wording(mission: Mission, error: RandomError) -> _Wording:
+    path: FlownPath | None = getattr(mission.platforms, error.owner).path
+    return "Gauss-Markov", path and path.source, (phrases.log_is_flown_as_it_is(error.subject.axis),)
+
+
+def _process_wording(mission: Mission, error: RandomError) -> _Wording:
+    source = process_of(mission, error).source
+    if error.owner not in PLATFORMS:
+        common = mission.common_motion_error
+        note = phrases.note("held-to-the-total", owners="both platforms")
+        return "Gauss-Markov", source or (common and common.source), (note,)
     motion: MotionError = getattr(mission.platforms, error.owner).motion_error
-    if kind == "lever_arm" and figure == "uncertainty":
-        lever = motion.lever_arm
-        return "lever arm", (lever and lever.source) or motion.source, ()
-    if kind != "random":
-        is_of_imu = motion.imu is not None and motion.key_of(figure) == figure
-        source = motion.imu.source if motion.imu and is_of_imu else None
-        equation = "lever arm" if kind == "lever_arm" else "inertial sensor"
+    notes = override_notes(error.owner, motion.overridden, "random")
+    return "Gauss-Markov", source or motion.evidence("random"), notes
+
+
+def _uncertainty_wording(mission: Mission, error: RandomError) -> _Wording:
+    motion: MotionError = getattr(mission.platforms, error.owner).motion_error
+    lever = motion.lever_arm
+    return "lever arm", (lever and lever.source) or motion.source, ()
+
+
+def _sensor_wording(mission: Mission, error: RandomError, equation: str = "inertial sensor") -> _Wording:
+    figure = error.subject.axis
+    motion: MotionError = getattr(mission.platforms, error.owner).motion_error
+    is_of_imu = motion.imu is not None and motion.key_of(figure) == figure
+    source = motion.imu.source if motion.imu and is_of_imu else None
     notes = override_notes(error.owner, motion.overridden, figure)
     if error.counted_in and error.declared is None:  # otherwise this note is the reason of the row
         notes = (phrases.note("counted-in-another-row", row_id=error.counted_in), *notes)
@@ -569,16 +589,53 @@ def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> No
 
 def no_effect(mission: Mission, error: RandomError) -> Note:
     """Explain why an error has no effect on the image."""
-    if error.subject.kind in ("imu", *CORRELATED, "lever_arm", "vibration"):
-        return phrases.note("across-the-line-of-sight")
-    if error.subject.kind == "propagation":
-        is_content = error.subject.axis == CONTENT
-        return (phrases.below_the_ionosphere if is_content else phrases.runs_along_the_ground)(error.owner)
-    if error.subject.kind == "synchronization":
-        return phrases.note("nothing-spreads")
+    return error.subject.facts.find_in(REASONS_FOR_NO_EFFECT, error.subject.axis)(mission, error)
+
+
+def _across(mission: Mission, error: RandomError) -> Note:
+    return phrases.note("across-the-line-of-sight")
+
+
+def _outside_the_air(mission: Mission, error: RandomError) -> Note:
+    is_content = error.subject.axis == CONTENT
+    return (phrases.below_the_ionosphere if is_content else phrases.runs_along_the_ground)(error.owner)
+
+
+def _nothing_spreads(mission: Mission, error: RandomError) -> Note:
+    return phrases.note("nothing-spreads")
+
+
+def _quiet(mission: Mission, error: RandomError) -> Note:
     if mission.has_direct_path and error.owner == "transmitter":
         return phrases.note("oscillators-drop-out")
-    return phrases.note("no-acceleration") if error.subject.axis else phrases.note("no-phase-noise")
+    return phrases.note("no-acceleration" if error.subject.axis else "no-phase-noise")
+
+
+# By kind, or by kind and axis: the texts of a row, and the reason why an error has no effect.
+WORDINGS: Mapping[str, Callable[[Mission, RandomError], _Wording]] = {
+    "vibration": _vibration_wording,
+    "imu": _sensor_wording,
+    "lever_arm": partial(_sensor_wording, equation="lever arm"),
+    "lever_arm.uncertainty": _uncertainty_wording,
+    "random": _process_wording,
+    "trajectory": _log_wording,
+    "oscillator": _oscillator_wording,
+    "oscillator.acceleration": _acceleration_wording,
+    "synchronization": _link_wording,
+    "propagation": _air_wording,
+    "other": _stated_wording,
+}
+REASONS_FOR_NO_EFFECT: Mapping[str, Callable[[Mission, RandomError], Note]] = {
+    "vibration": _across,
+    "imu": _across,
+    "lever_arm": _across,
+    "random": _across,
+    "trajectory": _across,
+    "oscillator": _quiet,
+    "synchronization": _nothing_spreads,
+    "propagation": _outside_the_air,
+    "other": _quiet,
+}
 
 
 def _over(mission: Mission, error: RandomError, model: str, binding: str | None, allocation: Allocation) -> Note:

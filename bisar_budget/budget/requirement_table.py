@@ -18,7 +18,7 @@ from bisar_budget.budget.declarations import (
     missing_declarations,
     shifted_figures,
 )
-from bisar_budget.budget.doubts import RESIDUAL, input_doubts, is_in_doubt
+from bisar_budget.budget.doubts import input_doubts, is_in_doubt
 from bisar_budget.budget.half_causes import half_cause_of, half_causes
 from bisar_budget.budget.judged_mission import JudgedMission
 from bisar_budget.budget.judged_requirements import (
@@ -30,6 +30,7 @@ from bisar_budget.budget.judged_requirements import (
 from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why, statuses
 from bisar_budget.budget.waivers import Waived
 from bisar_budget.effects.declared import LOCATION, MODELS, QUADRATIC
+from bisar_budget.error_kinds import kind_of
 from bisar_budget.findings.requirement import DecidingShare, JudgedRequirement
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row, holding, in_order
 from bisar_budget.phrases import NOTHING, Note
@@ -107,7 +108,7 @@ def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Not
         return phrases.not_declared_as_required(first.key, first.lacks)
     if why is Why.INPUT_IN_DOUBT:
         doubts = input_doubts(mission)
-        reasons = [each.note for each in doubts if is_in_doubt(judged_row.subject, each.owner, mission, each.kind)]
+        reasons = [each.note for each in doubts if is_in_doubt(judged_row.subject, each.owner, mission, each.state)]
         return reasons[0].then(*reasons[1:])
     if why is Why.NO_PLACE:
         return unknown_place(judged, case)
@@ -121,9 +122,9 @@ def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Not
     reasons = [row.reason] if row.status == "fail" and row.reason else []  # fails, and an effect is not judged
     for each in judged.untaken:
         if row.id in each.makers and each.makers[row.id][case.place]:
-            lines = [f"{key}: {EXAMPLES[key]}" for key in TAKEN_BY[each.kind]]
+            lines = [f"{key}: {EXAMPLES[key]}" for key in TAKEN_BY[each.effect]]
             sizes = case.number(each.parts[row.id]), case.number(each.total)
-            reasons.append(phrases.effect_is_not_judged(each.kind, *sizes, lines))
+            reasons.append(phrases.effect_is_not_judged(each.effect, *sizes, lines))
     return reasons[0].then(*reasons[1:])
 
 
@@ -132,15 +133,20 @@ def unknown_place(judged: JudgedMission, case: Case) -> Note:
     clocks = [row_id for row_id, is_there in judged.unplaced.items() if is_there[case.place]]
     if clocks:
         return phrases.note("clocks-are-not-set", row_ids=clocks)
-    doubts = [doubt for doubt in input_doubts(case.mission) if doubt.kind != RESIDUAL]
+    doubts = [doubt for doubt in input_doubts(case.mission) if not doubt.is_phase]
     return doubts[0].note if doubts else NOTHING
+
+
+_OWNERS_OF_ROWS = {PULL_IN: "autofocus", "spatial_variance": "scene", "dispersion": "band"}  # by kind of row
 
 
 def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
     """Yield a note for each effect that no requirement limits and that is negligible."""
     for effect in judged.untaken:
         if effect.is_negligible[case.place]:
-            yield phrases.effect_is_negligible(effect.kind, case.number(effect.total), list(TAKEN_BY[effect.kind]))
+            yield phrases.effect_is_negligible(
+                effect.effect, case.number(effect.total), list(TAKEN_BY[effect.effect])
+            )
     yield from judged.air.note(case)
 
 
@@ -223,10 +229,10 @@ def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | Non
 
 def _share(row: Row, key: str, case: Case, utilization: float | None) -> DecidingShare | None:
     """Return the share of a requirement that limits a row; None if the row may use the full requirement."""
-    of_kinds = {PULL_IN: "autofocus", "spatial_variance": "scene", "dispersion": "band"}
-    if key == QUADRATIC and row.subject.kind in of_kinds:
+    owner = _OWNERS_OF_ROWS.get(row.subject.kind)
+    if key == QUADRATIC and owner is not None:
         return DecidingShare(
-            owner=of_kinds[row.subject.kind],
+            owner=owner,
             allowed=row.allowable,
             reached=row.declared,
             utilization=utilization,
@@ -250,7 +256,7 @@ def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
         if row.model == "full":
             qpe = row.qpe_full_rad if row.equal_loss_qpe_rad is None else row.equal_loss_qpe_rad
         return allocation.qpe_limit(row.owner), None if qpe is None else abs(qpe)
-    if row.unit == "dB" and (row.subject.kind == key or key == "pslr"):
+    if row.unit == "dB" and (row.subject.facts is kind_of(key) or key == "pslr"):
         return row.allowable, row.declared
     if key == "islr":
         model = row.model or "full"

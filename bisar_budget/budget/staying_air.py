@@ -138,10 +138,10 @@ class StayingAir:
             phrases.air_stays_untaken(
                 case.mission.collection.aperture_time,
                 AIR_CHANGES_IN_S,
-                effect.kind,
+                effect.effect,
                 case.number(effect.parts[row_id]),
                 _keys(case.mission),
-                [f"{key}: {EXAMPLES[key]}" for key in TAKEN_BY[effect.kind]],
+                [f"{key}: {EXAMPLES[key]}" for key in TAKEN_BY[effect.effect]],
             )
             for effect in self.untaken
             if row_id in effect.makers and effect.makers[row_id][case.place]

@@ -112,7 +112,7 @@ def _is_gate(row: Row) -> bool:
     return (
         bool(row.utilization)
         and row.status not in ("fail", "waived", "not_declared")
-        and row.subject.kind != "autofocus_pull_in"
+        and not row.subject.facts.only_warns
         and row.is_independent
     )
 

@@ -117,8 +117,8 @@ def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None,
     rows = check_mission(mission if model is None else Variation(mission, model).read(), today).rows
     limits_in_words = []
     for error in errors:
-        owner, *_, kind = [name for name in parts_of(error.key) if name != "platforms"]
-        limits = [row for row in rows if row.subject.owner == owner and row.subject.kind == kind and row.allowable]
+        owner, *_, name = [part for part in parts_of(error.key) if part != "platforms"]
+        limits = [row for row in rows if (row.owner, row.subject.kind) == (owner, name) and row.allowable]
         if limits:
             least = min(limits, key=lambda row: row.allowable or math.inf)
             limits_in_words.append(f"{error.key} {error.ordered(least.allowable or 0.0)[1]}")

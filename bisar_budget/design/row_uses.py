@@ -18,13 +18,13 @@ from bisar_budget.arrays import Booleans, Floats
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import NEGLIGIBLE_FRACTION, SMALL_RAD
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Why
-from bisar_budget.budget.random_rows import ISLR
 from bisar_budget.design.geometric_program import Rows
 from bisar_budget.design.specified import specified_errors
 from bisar_budget.design.table import Variation
 from bisar_budget.design.varied import is_held
-from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
+from bisar_budget.effects.declared import END_OF_IMAGE
 from bisar_budget.effects.sources import exact_ranges
+from bisar_budget.error_kinds import ErrorKind, kind_of
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.mission.changes import ACCEPTED_ERRORS
 from bisar_budget.mission.model import MetricSplits, Mission
@@ -37,15 +37,7 @@ _END_FRACTION = 0.995  # of the smallest size without an image, which is known t
 _ROW_ROUNDING_FRACTION = 1e-13  # of a row; a smaller part of an error is a rounding error
 # First words of the ids of rows without a requirement: effects that belong to no row, and largest sizes in a file.
 NEGLIGIBLE, LARGEST_ACCEPTED = "negligible", "accepted"
-_WARN_ONLY = ("autofocus_pull_in",)  # kinds of rows that warn and never fail
 _HAVE_THEIR_OWN_ROW = (Why.EFFECT_NOT_TAKEN, Why.AIR_STAYS)  # reasons of rows without a number; see `uses`
-_AS_COMBINED = (
-    QUADRATIC,
-    CUBIC,
-    LOCATION,
-    "spatial_variance",
-    "dispersion",
-)  # kinds of rows that combine errors by the rule
 
 
 class RowUses(NamedTuple):
@@ -200,20 +192,20 @@ class SpecifiedMission:
             is_lost &= ~np.isin(row.why, (Why.EFFECT_NOT_TAKEN, Why.AIR_STAYS)) & (
                 row.subject.id not in self.unjudged
             )
-            is_heeded = self.reserve > 0 or row.subject.kind not in _WARN_ONLY
+            is_heeded = self.reserve > 0 or not row.subject.facts.only_warns
             use = np.nan_to_num(row.utilization, nan=0.0, posinf=math.inf) * is_heeded
             use = np.where(is_lost, math.inf, use)
             binding = int(row.binding.max())
             requirement = row.metric if binding < 0 or binding >= len(REQUIREMENTS) - 1 else REQUIREMENTS[binding]
-            rows.append((row.subject.id, requirement, self._power(row.subject.kind), use))
+            rows.append((row.subject.id, requirement, self._power(row.subject.facts), use))
         level = min(NEGLIGIBLE_FRACTION * float(np.max(self.stated.requirements.quadratic_phase_error)), SMALL_RAD)
         for air in judged.air.uses.values():
-            power = self._power(air.key if air.key != ISLR else "")
+            power = self._power(kind_of(air.key))
             rows.append(
                 (f"{NEGLIGIBLE}.{air.row_id}", air.key, power, judged.air.is_long * air.use / NEGLIGIBLE_FRACTION)
             )
-        untaken = [(effect.kind, effect) for effect in judged.untaken]
-        untaken += [(f"air.{effect.kind}", effect) for effect in judged.air.untaken]
+        untaken = [(effect.effect, effect) for effect in judged.untaken]
+        untaken += [(f"air.{effect.effect}", effect) for effect in judged.air.untaken]
         for name, effect in untaken:
             use = np.broadcast_to(effect.total, sizes.shape[1:]) / level
             rows.append((f"{NEGLIGIBLE}.{name}", None, 1.0 if self.combine == "sum" else 2.0, use))
@@ -223,10 +215,10 @@ class SpecifiedMission:
         ids, requirements, powers, uses = zip(*rows, strict=True)
         return RowUses(ids, requirements, np.array(powers), np.array(uses))
 
-    def _power(self, kind: str) -> float:
+    def _power(self, kind: ErrorKind) -> float:
         """Exponent of rows of a kind: 1 if the errors add linearly, 2 if their squares add."""
-        is_summed = self.combine == "sum" and kind in _AS_COMBINED
-        return 1.0 if is_summed or kind in _WARN_ONLY else 2.0
+        is_summed = self.combine == "sum" and kind.is_by_rule
+        return 1.0 if is_summed or kind.only_warns else 2.0
 
     def allowed(self, ids: Sequence[str]) -> Floats:
         """Compute the allowed utilizations of rows, (rows,): 1 minus the reserve, less a small margin.

@@ -127,7 +127,7 @@ def _verdict(
     codes, uses = np.array([row.status for row in rows]), np.array([row.utilization for row in rows])  # (rows, cases)
     status = judged.status if row_id is None else codes[0]
     # Rows that only warn decide only if a warning breaks. A specification that is met decides nothing.
-    may_decide = np.array([["warn" in breaks or row.subject.kind != "autofocus_pull_in"] for row in rows])
+    may_decide = np.array([["warn" in breaks or not row.subject.facts.only_warns] for row in rows])
     may_decide = may_decide & (does_break[codes] | np.array([[row.metric != SPECIFICATION] for row in rows]))
     decides = may_decide & _IS_JUDGED[codes] & (does_break[codes] | ~does_break[status])
     decides &= (codes != RANK["waived"]) | (status == RANK["waived"])

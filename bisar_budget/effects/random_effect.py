@@ -27,6 +27,7 @@ from bisar_budget.effects.range_processes import (
 )
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.spectra import Parts
+from bisar_budget.error_kinds import SourceKind
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.image_plane import LEGENDRE_LEADING, nodes_for
@@ -155,6 +156,13 @@ class RandomError(NamedTuple):
     def owner(self) -> str:
         """Owner of the share that the error counts against: transmitter, receiver or clock."""
         return self.subject.owner
+
+    @property
+    def kind(self) -> SourceKind:
+        """The kind of the error, with the facts about it."""
+        facts = self.subject.facts
+        assert isinstance(facts, SourceKind)
+        return facts
 
     @property
     def is_covered(self) -> bool:

@@ -28,6 +28,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.sources import exact_ranges
+from bisar_budget.error_kinds import SourceKind, StateKind
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
@@ -59,10 +60,6 @@ _MAX_SCATTERERS_COUNT = 1 << 20
 _EXPORT_CLUTTER_STREAM_INDEX = 2  # beside the file's seed
 _CHANNEL = "1"
 # Kinds of rows that are no errors: sums, requirements, and effects of other rows.
-_KINDS_OF_SUMS = (
-    *("quadratic_phase_error", "cubic_phase_error", "pslr", "islr", "location_error", "autofocus_pull_in"),
-    *("spatial_variance", "dispersion", "specification", "declare"),
-)
 
 # Per vector parameters of the standard, each with its number of words of 8 bytes.
 _VECTOR_WORDS = (
@@ -467,10 +464,10 @@ def _rows_without_element(mission: Mission, added: Mapping[str, str]) -> dict[st
     alone = mission._replace(allocation=mission.allocation._replace(coverage_factor=1.0))
     sizes: dict[str, str] = {}
     for row in check_mission(alone, date.min).rows:
-        has_element = row.owner in PLATFORMS and row.subject.kind in ("position", "velocity", "acceleration")
-        has_element |= row.id in ("timing.constant", "timing.linear") or row.id in added
-        has_element |= row.owner == "mission" and row.subject.kind in ("position", "velocity")
-        if row.declared is not None and not has_element and row.subject.kind not in _KINDS_OF_SUMS:
+        kind = row.subject.facts
+        has_element = row.id in ("timing.constant", "timing.linear") or row.id in added
+        has_element |= isinstance(kind, StateKind) and (row.owner in PLATFORMS or kind.has_covariance)
+        if row.declared is not None and not has_element and isinstance(kind, SourceKind):
             sizes[row.id] = f"{row.declared:.12g} {row.unit}".rstrip()
     return sizes
 

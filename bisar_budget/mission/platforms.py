@@ -23,7 +23,7 @@ from bisar_budget.geometry import (
 )
 from bisar_budget.image_plane import degeneracy
 from bisar_budget.json_types import Definitions, JsonObject
-from bisar_budget.mission.covariance import COVARIANCE, Covariance, misplaced_axes
+from bisar_budget.mission.covariance import COVARIANCE, MOTION_KINDS, Covariance, misplaced_axes
 from bisar_budget.mission.instruments import (
     IMU,
     LEVER_ARM,
@@ -173,7 +173,7 @@ class MotionError(NamedTuple):
 
         `kind` is "position" [m], "velocity" [m/s] or "acceleration" [m/s²].
         """
-        if self.covariance is not None and kind != "acceleration":
+        if self.covariance is not None and kind in MOTION_KINDS:
             return self.covariance.of(kind)
         error: Vector | None = getattr(self, kind)
         return error

@@ -725,7 +725,7 @@ def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[S
 
     They give its size, the size that is negligible, and the contribution of the row.
     """
-    effect_name = untaken.kind
+    effect_name = untaken.effect
     totals = []
     for model in analysis.gates:
         together, sizes_by_name = analysis.together(model), effect_parts(analysis, model)[effect_name]
@@ -759,7 +759,7 @@ def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[S
 def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
     """Yield the steps for a path in doubt: its possible error, and the position errors that the file declares."""
     for doubt in input_doubts(mission):
-        if row.owner != "mission" and not is_in_doubt(row.subject, doubt.owner, mission, doubt.kind):
+        if row.owner != "mission" and not is_in_doubt(row.subject, doubt.owner, mission, doubt.state):
             continue
         if doubt.is_stated:
             yield _stated_by_source(doubt)
