@@ -1,11 +1,11 @@
-"""Kinds of error: one object for each kind of error that a mission can have, and for each sum of errors.
+"""Kinds of error: one object for each kind of error that a mission can have, and for each kind of sum of errors.
 
-The object of a kind has the facts about it that commands need. Commands ask the object, and none compares names of
-kinds. Where a room computes something else for each kind, such as the steps of an explanation or a random time
-series, it has one table of functions by kind, and a test holds that the table is complete.
+The object of a kind has the properties of the kind that commands need, so that no command compares names of kinds.
+Where a subpackage computes something different for each kind, such as the steps of an explanation or a random time
+series, it has one table of functions by kind. A test checks that the table is complete.
 
-A package adds a kind by `register`, or by an entry point of the group `bisar_budget.kinds`. Entry points are read
-when a mission file or an option uses a kind that is not known yet, because reading them takes longer than a check.
+A package adds a kind with `register`, or with an entry point in the group `bisar_budget.kinds`. Entry points are read
+only when a mission file or an option uses an unknown kind, because reading them takes longer than a check.
 """
 
 import re
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _Entry = TypeVar("_Entry")
 ENTRY_POINT_GROUP = "bisar_budget.kinds"
-_OWNER_WORDS = {"clock": "timing"}  # owners that ids name otherwise
+_OWNER_WORDS = {"clock": "timing"}  # owners that have another name in row ids
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,10 +32,10 @@ class ErrorKind:
     Attributes
     ----------
     name : str
-        Word for the kind in row ids, in the file, and in `requirements.declare`.
+        Word for the kind in row ids, in the mission file, and in the key `requirements.declare` of that file.
     id_form : str
         Form of the row ids, with the fields `{owner}`, `{kind}`, `{axis}` and `{entry}`. Empty parts are left out.
-        The owner `clock` is written `timing`.
+        The owner is what has the error, such as a platform. The owner `clock` is written `timing`.
     common_id_form : str
         Form of the row ids of an error that both platforms share; empty if the kind has no such error.
     is_computed : bool
@@ -61,7 +61,7 @@ class ErrorKind:
     is_vibration: bool = False
 
     def row_id(self, owner: str, axis: str = "", entry: int | None = None) -> str:
-        """Id of the row of an error of this kind. The contract defines it."""
+        """Id of the row of an error of this kind, in the form that the contract defines."""
         form = self.common_id_form if self.common_id_form and owner == "mission" else self.id_form
         names = {
             "owner": _OWNER_WORDS.get(owner, owner),
@@ -92,12 +92,12 @@ class SourceKind(ErrorKind):
     Attributes
     ----------
     moves : str
-        What the error makes wrong: the path of a `platform`, a `clock`, the delay in the `air`, or the `image` itself
-        if the file states only the effect of the error.
+        What the error affects: the path of a `platform`, a `clock`, the delay in the `air`, or the `image` itself if
+        the file states only the effect of the error.
     is_covered : bool
         Whether the coverage factor multiplies the declared size.
     flown_as : str
-        Field of the simulator's `PathError` that has the size of the error; empty if its motion is flown otherwise.
+        Field of the simulator's `PathError` that takes the size of the error; empty if the error has no such field.
     is_random : bool
         Whether the error is random: it has a sigma and no sign.
     is_correlated : bool
@@ -140,7 +140,7 @@ class SourceKind(ErrorKind):
 class StateKind(SourceKind):
     """A kind of error of a platform's state at mid-aperture: position, velocity or acceleration.
 
-    `order` is the power of slow time with which the position error grows; `unit` is the unit of the error.
+    `order` is the power of slow time to which the position error is proportional. `unit` is the unit of the error.
     """
 
     moves: str = "platform"
@@ -159,31 +159,32 @@ Motion = Callable[["PlatformState", "Floats"], "Floats"]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MotionKind(SourceKind):
-    """A kind of error that is described completely by the motion of the phase centre which it causes.
+    """A kind of error that is described completely by the motion error of the antenna's phase centre.
 
     A mission file states its size for each platform as `platforms.NAME.motion_error.registered.KIND`. The row id is
-    `NAME.KIND`. The error is judged, explained, simulated, verified and drawn like the errors that this package has.
+    `NAME.KIND`. The error is judged, explained, simulated, verified and drawn like the built-in kinds of error.
 
     Attributes
     ----------
     name : str
-        Name of the kind: small letters, digits and underscores.
+        Name of the kind, made of lower-case letters, digits and underscores. It begins with a letter.
     dimension : units.Dimension
         Dimension of the size, one of `bisar_budget.units`.
     description : str
         What the error is, in one sentence; for messages, the JSON Schema and the explanation.
     motion : callable
-        `motion(path, times)`: measured minus true position of the antenna's phase centre for an error of one unit,
-        (3, *times.shape): east, north, up. [m/unit] `path` is the true path, a `PlatformState`; `path.place(times)`
-        are its positions relative to the scene centre. [m] `times` are slow times from mid-aperture. [s] The motion
-        has to be proportional to the size of the error. It may vary by up to the twelfth power of time.
+        Function `motion(path, times)` that returns the measured minus the true position of the antenna's phase centre
+        for an error of one unit: east, north and up, (3, *times.shape). [m/unit] `path` is the true path, a
+        `PlatformState`; `path.place(times)` are its positions relative to the scene centre. [m] `times` are slow
+        times from mid-aperture. [s] The motion error must be proportional to the size of the error, and at most a
+        polynomial of degree 12 in time.
     equation : str
-        Where the motion comes from, such as an equation of a paper; for reports.
+        Source of the motion, such as an equation of a paper; for reports.
 
     Raises
     ------
     ValueError
-        The name is not made of small letters, digits and underscores.
+        The name does not begin with a lower-case letter, or has characters other than those, digits and underscores.
     """
 
     moves: str = "platform"
@@ -193,7 +194,7 @@ class MotionKind(SourceKind):
     equation: str = "full model"
 
     def __post_init__(self) -> None:
-        """Check the name."""
+        """Check that the name has the accepted form."""
         if not re.fullmatch("[a-z][a-z0-9_]*", self.name):
             raise ValueError(f"{self.name!r} is no name of a kind; accepted: small letters, digits, underscores")
 
@@ -205,7 +206,7 @@ class MotionKind(SourceKind):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SumKind(ErrorKind):
-    """A kind of row that other rows make: a sum of errors, or an effect of all of them on the image.
+    """A kind of row that is computed from other rows: a sum of errors, or an effect of all errors on the image.
 
     Attributes
     ----------
@@ -231,7 +232,7 @@ def register(kind: ErrorKind) -> None:
     Raises
     ------
     ValueError
-        Another kind has the name.
+        Another kind with the same name is registered.
     """
     if _KINDS.setdefault(kind.name, kind) is not kind:
         raise ValueError(f"a kind of error named {kind.name!r} is registered already")
@@ -300,7 +301,7 @@ for _kind in (
 
 @cache
 def _read_entry_points() -> None:
-    """Register the kinds of the installed packages that have entry points."""
+    """Register the kinds of error that installed packages provide as entry points; done once."""
     from importlib.metadata import entry_points
 
     for entry_point in entry_points(group=ENTRY_POINT_GROUP):
@@ -310,14 +311,20 @@ def _read_entry_points() -> None:
 
 
 def kind_of(name: str) -> ErrorKind:
-    """Kind with a name; raises `KeyError` if there is none."""
+    """Return the kind with the given name.
+
+    Raises
+    ------
+    KeyError
+        No kind has the name, in this package or in an installed one.
+    """
     if name not in _KINDS:
         _read_entry_points()
     return _KINDS[name]
 
 
 def kinds() -> tuple[ErrorKind, ...]:
-    """All kinds that are known, in the order in which they were registered."""
+    """All kinds registered so far, in the order of registration. Entry points are not read."""
     return tuple(_KINDS.values())
 
 
@@ -327,7 +334,7 @@ def names_of_named_kinds() -> frozenset[str]:
 
 
 def motion_kind(name: object) -> MotionKind | None:
-    """Kind of error with a name that a package registered; None if there is none."""
+    """Return the kind of error that a package registered under the given name; None if there is none."""
     if name not in _KINDS:
         _read_entry_points()
     kind = _KINDS.get(name) if isinstance(name, str) else None
@@ -340,6 +347,6 @@ def registered_names() -> tuple[str, ...]:
 
 
 def motion_kinds() -> dict[str, MotionKind]:
-    """Kinds of error that packages registered, by name."""
+    """All kinds of error that packages registered or provide as entry points, by name."""
     _read_entry_points()
     return {name: kind for name, kind in _KINDS.items() if isinstance(kind, MotionKind)}

@@ -9,7 +9,10 @@ ParserEvent = Any
 
 
 def upwards(path: KeyPath) -> Iterator[KeyPath]:
-    """Yield a path and the paths above it, the nearest first, but not the path of the file itself."""
+    """Yield the path of a key, then the paths of the mappings or lists that contain it, from the innermost outwards.
+
+    The empty path, which denotes the whole file, is not included.
+    """
     return (path[:length] for length in range(len(path), 0, -1))
 
 
@@ -28,7 +31,8 @@ class Region(NamedTuple):
 class Place(int):
     """Line of a value in a file, counted from 1, together with the region of the value.
 
-    The place is a number, for code that only needs the line. Reports for editors and pull requests use the region.
+    A place is itself the line number, for code that needs only that. Reports for editors and pull requests use the
+    region.
     `text` is the value as written in the file; it is empty for a mapping or a list.
     """
 
@@ -96,7 +100,7 @@ def closed(text: str) -> str:
 class SetValue(NamedTuple):
     """Value from an option that replaces the value of the mission file: `--set radar.bandwidth=150MHz`.
 
-    `text` is the value as written in a file.
+    `text` is the value in the form in which a mission file would state it.
     """
 
     key: str
@@ -114,8 +118,8 @@ _BY_UNIT = ("m/s^2", "(m/s^2)^2/Hz", "m^2/Hz")  # keys with these units have sev
 class SetNumber(SetValue):
     """Number in SI units, with its text, that replaces a value of the mission, for example in one case of a sweep.
 
-    Readers of the mission use `value`, and messages show the text. `value` is the number, or the text for a key with
-    several dimensions.
+    Code that reads the mission uses `value`, and messages show `text`. `value` is the number; for a key that accepts
+    quantities of several dimensions, it is the text.
     """
 
     value: float | str
@@ -150,7 +154,7 @@ def changes_words(changes: Sequence[SetValue]) -> str:
 
 
 class Problem(NamedTuple):
-    """Problem with a value, for use where the file of the value is not known yet.
+    """Problem with a value, reported by code that does not know the file and the key of the value.
 
     `at` is the path of the wrong value relative to the checked value. `names_value` is true if the text already
     contains the value. `is_of_key` is true if the key is wrong, whatever its value.
@@ -212,7 +216,7 @@ def file_fault(problem: str, hint: str = "") -> Fault:
 
 
 class ClusterError(Exception):
-    """Workers or a folder of parts cannot be used; the message gives the reason and a remedy."""
+    """The workers of a cluster, or a folder of partial results, cannot be used; the message has reason and remedy."""
 
 
 class WorkerLostError(Exception):

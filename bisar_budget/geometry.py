@@ -117,7 +117,7 @@ def without_rounding(a: Vector) -> Vector: ...
 @overload
 def without_rounding(a: Vectors) -> Vectors: ...
 def without_rounding(a: Vectors) -> Vectors:
-    """Set components of a vector to zero that are only rounding relative to its length: cos 90° is 6e-17."""
+    """Set to zero the components of a vector that are rounding errors relative to its length: cos 90° is 6e-17."""
     floor = VECTOR_ROUNDING_FRACTION * norm(a)
     return (_above(floor, a[0]), _above(floor, a[1]), _above(floor, a[2]))
 
@@ -129,7 +129,7 @@ def plain_vector(a: Vectors) -> Vector:
 
 
 def _of_cases(values: Floats, asked: PerCase) -> PerCase:
-    """Return values (cases,), or a float if there is one case and `asked` is a number."""
+    """Return `values` (cases,), but a float if there is one case and the argument `asked` was a number."""
     return values if np.ndim(asked) or values.size > 1 else values.item()
 
 
@@ -203,11 +203,11 @@ class Pieces:
     Attributes
     ----------
     starts : tuple
-        Times at which the pieces except the first begin, in rising order. [s]
+        Slow times at which the pieces begin, in rising order. The first piece has no start. [s]
     middles : tuple
-        Origin of the time of each piece. [s]
+        Slow time of the middle of each piece, from which its polynomial counts time. [s]
     powers : tuple
-        Coefficients of the powers 0, 1, … of time, for each piece. [m], [m/s], …
+        For each piece, the coefficients of the powers 0, 1, … of time. [m], [m/s], …
     """
 
     starts: tuple[PerCase, ...]
@@ -221,7 +221,10 @@ class Pieces:
 
     @cached_property
     def _arrays(self) -> tuple[Floats, Floats, Floats]:
-        """Starts (pieces - 1, …), middles (pieces, …) and powers (pieces, …, order + 1, 3); … is () or (cases,)."""
+        """The attributes as arrays: starts (pieces - 1, …), middles (pieces, …), powers (pieces, …, order + 1, 3).
+
+        The axis … is that of the cases; it is missing if all numbers are those of one case.
+        """
         numbers = [x for powers in self.powers for vector in powers for x in vector]
         every = np.array(np.broadcast_arrays(*self.starts, *self.middles, *numbers), dtype=float)
         starts, middles, powers = np.split(every, (len(self.starts), len(self.starts) + self.count))
@@ -387,7 +390,7 @@ class PlatformState:
         )
 
     def travelled(self, duration_s: PerCase) -> PerCase:
-        """Upper bound of the distance that the platform travels within a time before or after the midpoint. [m]"""
+        """Upper bound of the distance that the platform travels in `duration_s` before or after the midpoint. [m]"""
         if self.curve is not None:
             x, y, z = (np.diff(component, axis=0) for component in self._looks(duration_s))
             steps = norm((x, y, z))
@@ -397,7 +400,10 @@ class PlatformState:
         return way + sum((norm(bend) * duration_s**power for power, bend in enumerate(self.bends, 3)), 0.0)
 
     def sinks(self, duration_s: PerCase) -> PerCase:
-        """Upper bound of the descent of the platform below its midpoint height, within a time of the midpoint. [m]"""
+        """Upper bound of how far the platform descends below its height at the midpoint. [m]
+
+        The bound applies to slow times from `-duration_s` to `duration_s`.
+        """
         if self.curve is not None:
             return _of_cases(self.position[2] - self._looks(duration_s)[2].min(axis=0), duration_s)
         way = absolute(self.velocity[2]) * duration_s + absolute(self.acceleration[2]) * duration_s**2 / 2
@@ -409,7 +415,7 @@ class PlatformState:
         return self.place(np.linspace(-1.0, 1.0, 2 * count + 1)[:, None] * duration_s)
 
     def less(self, other: "PlatformState") -> "PlatformState":
-        """Subtract a second path at each time. The difference has no `ric` frame."""
+        """Path relative to a second path: the difference of the positions at each time. It has no `ric` frame."""
         return PlatformState(
             position=_minus(self.position, other.position),
             velocity=_minus(self.velocity, other.velocity),
@@ -566,13 +572,16 @@ class BistaticGeometry:
 
     @cached_property
     def range_gradient(self) -> tuple[PerCase, PerCase]:
-        """Sum s of the look vectors on the ground; the range to a ground point x changes by −s·x. [-]"""
+        """Horizontal components of s, the sum of the look vectors. [-]
+
+        The range to a ground point x is shorter by s·x than the range to the scene centre.
+        """
         t, r = self.transmitter.look, self.receiver.look
         return (t[0] + r[0], t[1] + r[1])
 
     @cached_property
     def doppler_gradient(self) -> tuple[PerCase, PerCase]:
-        """Rate ṡ of the range gradient s, on the ground. [1/s]"""
+        """Rate of change ṡ of the range gradient s over slow time. [1/s]"""
         t, r = self.transmitter.look_rate, self.receiver.look_rate
         return (t[0] + r[0], t[1] + r[1])
 

@@ -60,8 +60,8 @@ class Sampling:
     places : (samples,)
         Slow times from −1 to 1, in units of half the aperture time.
     fit : (4, samples)
-        Weights whose products with a history give its mean (P₀ part), its P₁ part at the edge, and its quadratic and
-        cubic part at the edge: 3/2 times the P₂ and 5/2 times the P₃ coefficient.
+        Weights whose products with a history give its mean (P₀ part), and its P₁, quadratic and cubic part at the
+        aperture edge. The quadratic part is 3/2 times the P₂ coefficient, the cubic part 5/2 times that of P₃.
     """
 
     places: Floats
@@ -84,7 +84,10 @@ class Sampling:
 
     @cached_property
     def to_finest(self) -> Floats:
-        """Weights (FINEST_NODES, samples) that interpolate a smooth history from the samples to the finest nodes."""
+        """Weights that interpolate a smooth history from the samples to the finest nodes, (FINEST_NODES, samples).
+
+        The finest nodes are those of `nodes(FINEST_NODES)`.
+        """
         return self._weights_at(nodes(FINEST_NODES).places)
 
     def _weights_at(self, slow_times: Floats) -> Floats:
@@ -198,11 +201,12 @@ class GroundMatrix:
 
     @property
     def sine(self) -> Floats:
-        """Sine of the angle θ between the directions that band and turn resolve.
+        """Sine of the angle θ between the ground direction that the band resolves and the one that the turn resolves.
 
-        The mean gradient, as a matrix, and the covariance of the gradient over the aperture are both scaled to a
-        trace of one. Their sum has the eigenvalues 1 ± cos θ, and the condition cot²(θ/2). For a short aperture θ is
-        the angle between the range gradient and the Doppler gradient.
+        The turn is that of the line of sight within the aperture. The mean gradient, as a matrix, and the covariance
+        of the gradient over the aperture are both scaled to a trace of one. Their sum has the eigenvalues 1 ± cos θ,
+        and the condition cot²(θ/2). For a short aperture θ is the angle between the range gradient and the Doppler
+        gradient.
         """
         x, y = self.range_gradient
         square = x * x + y * y
@@ -226,19 +230,19 @@ class GroundMatrix:
 
     @cached_property
     def orientation(self) -> Floats:
-        """Signed area between mean range gradient and mean Doppler gradient, from the function `orientation`."""
+        """Signed area that the mean range and Doppler gradients span, computed by the function `orientation`."""
         return orientation(self.slopes, self.fit, self.band, self.determinant)
 
     def turned_from(self, centre: "GroundMatrix", case: Indices) -> Floats:
-        """Area that the gradient spans, as a fraction of the area at the scene centre of the cases `case`.
+        """Area that the gradient spans, as a fraction of the area at the scene centre; negative beyond a fold.
 
-        It is computed by the function `turn`.
+        `case` are the cases of the points. The fraction is computed by the function `turn`.
         """
         return turn(self.determinant, self.orientation, centre, case)
 
 
 def orientation(slopes: Floats, fit: Floats, band: Floats, determinant: Floats) -> Floats:
-    """Signed area between the mean range gradient and the mean Doppler gradient.
+    """Signed area of the parallelogram that the mean range gradient and the mean Doppler gradient span.
 
     It is set to 0 if the aperture resolves much more than these two gradients, so that they contribute only a small
     part of the determinant of H. The first three parameters are fields of `GroundMatrix`, and the last is the

@@ -19,7 +19,7 @@ _MEMORY_ERRORS = ("failed to map segment", "annot allocate memory", "bad_alloc",
 
 
 def limit() -> int | None:
-    """Limit of the address space of this process; None if there is no limit. [B]"""
+    """Memory that this process may allocate, the smaller of `ulimit -v` and `ulimit -d`; None without a limit. [B]"""
     try:
         import resource
     except ImportError:  # Windows
@@ -29,16 +29,17 @@ def limit() -> int | None:
 
 
 def limit_words() -> str:
-    """Text about the limit for a message; empty without a limit."""
+    """Part of a message that states the limit; empty without a limit."""
     allowed = limit()
     return "" if allowed is None else f"the system allows {allowed >> 20} MB (ulimit -v, ulimit -d)"
 
 
 def spare_threads() -> None:
-    """Limit libraries that are not loaded yet to one thread, unless the environment sets more threads for OpenBLAS.
+    """Have OpenBLAS, if not loaded yet, use one thread, unless the environment sets another number.
 
-    A second thread makes a check an eighth slower and never faster, because products of matrices are small here. Each
-    thread takes tens of MB, which count towards a limit.
+    If the memory is limited, the number in the environment is replaced too. A second thread makes a check an eighth
+    slower and never faster, because products of matrices are small here. Each thread takes tens of MB, which count
+    towards the limit.
     """
     if limit() is not None:
         os.environ.update(OPENBLAS_NUM_THREADS="1", ARROW_DEFAULT_MEMORY_POOL="system")
@@ -47,14 +48,14 @@ def spare_threads() -> None:
 
 
 def hold_room(needed: int, purpose: str) -> None:
-    """Raise a `MemoryError` if the limit is below the memory `needed` [B] for a purpose, which the message names."""
+    """Raise a `MemoryError` if the memory limit is below `needed`. [B] The message names the purpose."""
     allowed = limit()
     if allowed is not None and allowed < needed:
         raise MemoryError(f"{purpose} needs at least {needed >> 20} MB of memory; {limit_words()}")
 
 
 def is_spacious() -> bool:
-    """Whether the limit leaves enough memory for LLVM."""
+    """Whether the memory limit is high enough for LLVM, the compiler behind Numba."""
     allowed = limit()
     return allowed is None or allowed >= _COMPILER_MEMORY_BYTES
 

@@ -29,18 +29,18 @@ _COLOURS = {
 
 
 def page(*elements: str) -> str:
-    """HTML of a result, from its parts."""
+    """HTML of a result, which consists of a style sheet and the given elements."""
     return f'{_NOTEBOOK_STYLE}<div class="bisar-budget">{"".join(elements)}</div>'
 
 
 def heading(status: str, title: str, remark: str = "") -> str:
-    """HTML of a heading: the verdict, the title of the result, and a remark beside it."""
+    """HTML of a heading: the verdict `status`, the title of the result, and a remark in paler text."""
     texts = f' <span class="muted">{escape(remark)}</span>' if remark else ""
     return f"<p>{badge(status)} <strong>{escape(title)}</strong>{texts}</p>"
 
 
 def badge(status: str) -> str:
-    """HTML of a status in its colour."""
+    """HTML of a status on a background in the colour of the status."""
     colour = _COLOURS.get(status, "#57606a")
     return f'<span class="status" style="background: {colour}">{escape(status.replace("_", " "))}</span>'
 

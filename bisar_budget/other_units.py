@@ -24,7 +24,7 @@ class UnitValue(NamedTuple):
     powers: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def times(self, other: "UnitValue", exponent: float = 1.0) -> "UnitValue":
-        """Product with a power of another unit."""
+        """Product of this unit and another unit that is raised to the power `exponent`."""
         a, b = self.powers, other.powers
         powers = (a[0] + exponent * b[0], a[1] + exponent * b[1], a[2] + exponent * b[2])
         return UnitValue(self.factor * other.factor**exponent, powers)
@@ -144,7 +144,7 @@ _SEXAGESIMAL = re.compile(
 
 
 def about_unit(digits: str, written: str, dimension: Dimension) -> tuple[str, str]:
-    """Problem and hint for a number with a unit that no dimension accepts."""
+    """Problem and hint of the message about a number whose unit is in no table of units."""
     unit = normal_unit(written)
     sexagesimal = _SEXAGESIMAL.fullmatch(digits + written) if dimension.si == "rad" else None
     if sexagesimal is not None:
@@ -201,7 +201,10 @@ def value_of_unit(unit: str) -> UnitValue | None:
 
 
 def _product(tokens: list[str]) -> UnitValue | None:
-    """Value of the factors up to the end or a closing bracket; removes their tokens from the list."""
+    """Value of a product of units up to the end or a closing bracket; removes its tokens from the list.
+
+    None if one of the units is unknown.
+    """
     value = UnitValue(1.0)
     sign = 1.0
     if tokens[0] == "/":
@@ -234,7 +237,7 @@ def _power(tokens: list[str]) -> UnitValue | None:
 
 
 def _atom(name: str) -> UnitValue | None:
-    """Value of a unit's name, with or without a prefix, or of a word for the unit."""
+    """Value of one unit, given as a symbol or as a word, with or without a prefix; None if it is unknown."""
     for prefix, factor in {"": 1.0, **_SI_PREFIXES}.items():
         of_name = _ATOMS.get(name.removeprefix(prefix)) if name.startswith(prefix) else None
         if of_name is not None and (not prefix or prefix in of_name[2]):
@@ -271,9 +274,9 @@ def _converted(digits: str, written: str, factor: float, dimension: Dimension) -
 
 
 def _respelt(unit: str, dimension: Dimension) -> str:
-    """Unit of a dimension whose spelling differs from `unit` only in upper and lower case, or in one slip.
+    """Unit of a dimension whose spelling differs from `unit` only in upper and lower case, or by one typing error.
 
-    Empty if a second unit of a different size is spelt as similarly.
+    The text is empty if there is no such unit, or if two of different size are equally similar to `unit`.
     """
     candidates = dict(_conceivable(dimension))
     spellings = {unit.lower(), normal_unit(unit.lower().replace("hz", "Hz")).lower()}
@@ -295,7 +298,10 @@ def _is_one_size(factors: list[float]) -> bool:
 
 
 def _conceivable(dimension: Dimension) -> Iterator[tuple[str, float]]:
-    """Units of a dimension with their factors, including units with further prefixes that may be meant."""
+    """Yield the units of a dimension with their factors, also those with prefixes that the dimension does not accept.
+
+    A user may have meant such a unit, so it must not be respelt as one of a different size.
+    """
     powers = _powers_of(dimension)
     for unit, factor in dimension.units.items():
         if not unit:

@@ -1,4 +1,4 @@
-"""Resources of a command: files of the package, files of the user, and processors."""
+"""What a command uses of its environment: files of the package, files of the user, and processors."""
 
 import os
 import stat
@@ -38,7 +38,10 @@ class FilesHeld:
         self.room = _MAX_HELD_BYTES
 
     def content(self, file: str, most: int, read: Callable[[], bytes]) -> bytes:
-        """Content of a file as first read, at most `most` + 1 bytes; `read` returns it if the file is new."""
+        """Content of a file as first read, at most `most` + 1 bytes.
+
+        `read` is called for a file that was not read before, or whose content is not kept.
+        """
         key = (file if file == "-" else os.path.normpath(file), most)
         held_content = self.known.get(key)
         if isinstance(held_content, bytes):
@@ -80,7 +83,10 @@ def release_files() -> None:
 
 
 def held(file: str, most: int, read: Callable[[], bytes]) -> bytes:
-    """Content of a file as this command first read it; outside a command, the content that `read` returns."""
+    """Content of a file as this command first read it, by `FilesHeld.content`.
+
+    Outside a command, the content that `read` returns.
+    """
     return read() if _held is None else _held.content(file, most, read)
 
 
@@ -97,7 +103,7 @@ _STREAMS = (
 
 
 def special_file(path: str) -> str:
-    """Kind of a file whose reading may wait or never end: a named pipe, a device, a socket; empty for other files.
+    """Kind of a file of which a read may wait or never end, such as `a named pipe`; empty for an ordinary file.
 
     Open streams of this process, such as those of a shell's `<(…)`, do not count as special files.
     """
@@ -189,7 +195,7 @@ DISK = Disk()
 def locked(folder: str) -> int | None:
     """Lock a folder for this process until the returned descriptor is closed or the process ends.
 
-    None if the system has no locks.
+    Returns None if the operating system or the file system has no locks.
 
     Raises
     ------

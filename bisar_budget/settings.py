@@ -46,7 +46,9 @@ class Settings:
 
 
 def project_settings(folder: str, files: Files = DISK) -> Settings | None:
-    """Read the table for a folder from `files`; None if no `pyproject.toml` in the folder or above has the table.
+    """Read the table that applies to a folder; None if no `pyproject.toml` in the folder or above has the table.
+
+    `files` is the source of the `pyproject.toml` files: the disk, or a git revision.
 
     Names of reports and folders of sensors are relative to the file that states them.
 
@@ -68,9 +70,9 @@ def project_settings(folder: str, files: Files = DISK) -> Settings | None:
 
 @lru_cache(maxsize=4)
 def _parsed(file: str, data: bytes) -> Settings | None:
-    """Read the table of a `pyproject.toml`; None if it has none.
+    """Read the table `[tool.bisar-budget]` from the content of a `pyproject.toml`; None if it has no such table.
 
-    The result is cached, because each mission that names a part reads the table.
+    The last results are cached, because the same table may be read for many missions.
     """
     try:
         text = data.decode("utf-8")
@@ -104,7 +106,7 @@ def _parsed(file: str, data: bytes) -> Settings | None:
 
 
 def _bytes_of(file: str, files: Files) -> bytes | None:
-    """Content of a file; None if the file does not exist."""
+    """Content of a `pyproject.toml`; None if the file does not exist."""
     try:
         data = files.content(file, _MAX_SETTINGS_BYTES, f"{file}:")
     except UnreadableError as error:

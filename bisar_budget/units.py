@@ -54,7 +54,7 @@ class Dimension:
 
 
 def _scale(factor: float) -> tuple[float, float]:
-    """Factor and divisor of a unit, one of which is 1."""
+    """Factor and divisor, one of which is 1, that convert a unit with the given factor to SI."""
     inverse = float(round(1 / factor))
     return (1.0, inverse) if inverse and abs(inverse * factor - 1) < 1e-12 else (factor, 1.0)
 
@@ -263,7 +263,7 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
 
 
 def _parse_closely(value: object, dimension: Dimension) -> float:
-    """Read all accepted forms of a quantity; an error explains why another form is wrong."""
+    """Read a quantity in any accepted form; the error for any other text explains what is wrong with it."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise _invalid(f"must be {dimension.name}", dimension)
     if not isinstance(value, str):
@@ -318,9 +318,10 @@ def unit_behind(text: str) -> str:
 
 
 def given_unit(text: str, unit: str) -> str:
-    """Unit of the number in a text, spelt as in the tables of units.
+    """Unit behind the number in a text, spelt as in the tables of units.
 
-    Empty if the text has no unit, or is not a quantity of the same dimension as `unit`, which is an SI unit.
+    `unit` is an SI unit. The result is empty if the text has no unit, or is not a quantity of the same dimension as
+    `unit`.
     """
     match = _NUMBER.match(text.strip()) if len(text) <= _MAX_QUANTITY_CHARACTERS else None
     dimension = _OF_SI.get(unit)
@@ -385,7 +386,10 @@ _SHEETS = {
 
 @cache
 def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
-    """Scale, smallest and largest size, and suffix, for each prefix of a unit. The unit without a prefix is last."""
+    """Forms in which a quantity of a unit is written, one for each prefix; the form without a prefix is last.
+
+    A form is its factor to SI, the sizes in SI from which and below which it applies, and the text after the number.
+    """
     if unit in _SHEETS:
         scale, suffix = _SHEETS[unit]
         return ((scale, 0.0, math.inf, suffix),)
@@ -398,7 +402,7 @@ def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
 
 
 def _stricter(level: float, digits: int) -> str:
-    """Write a negative level, rounded so that the text does not exceed the level."""
+    """Write a negative level in dB, rounded to a lower level, which is the stricter limit."""
     step = 10.0 ** (math.floor(math.log10(-level)) - digits + 1)
     return f"{math.floor(level / step * (1 - 1e-12)) * step:.{digits}g}"
 

@@ -1,4 +1,4 @@
-"""Tools for long computations: progress reports, distribution, and worker processes that end with the command."""
+"""Tools for long computations: reports of progress, and worker processes that end when the command ends."""
 
 import os
 import signal
@@ -23,9 +23,9 @@ Result = TypeVar("Result")
 
 
 class MapBlocks(Protocol):
-    """Function that applies another function to blocks of work, with common data, in worker processes.
+    """Type of functions that have worker processes apply a function to common data and to each of many blocks.
 
-    It yields each block with its result, in any order. `about` describes a block in messages.
+    Such a function yields each block with its result, in any order. `about` describes a block in messages.
     """
 
     def __call__(
@@ -73,9 +73,9 @@ def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExe
 
 
 def in_processes(count: int) -> MapBlocks:
-    """Return a function that maps blocks in `count` processes.
+    """Return a `MapBlocks` function that uses `count` worker processes of this machine.
 
-    Results are in the order of the blocks, and are computed only a few blocks in advance.
+    It yields results in the order of the blocks, and computes only a few blocks in advance.
     """
 
     def mapped(

@@ -1,4 +1,4 @@
-"""The `bisar-budget` command. Everything that costs time to import is imported where it is used."""
+"""Entry point of the `bisar-budget` command; modules that take long to import are imported only where used."""
 
 import errno
 import gc
@@ -42,7 +42,7 @@ _FRUGAL = ("init", "schema")  # commands that do not use NumPy
 class _Commands(click.Group):
     """A command group that imports each command at its first use, and exits with 3 if a command crashes.
 
-    Exit code 1, which Python gives for a crash, means a requirement that is broken or not judged.
+    Python would exit with 1 after a crash, but here 1 means that a requirement is broken or not judged.
     """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -104,7 +104,7 @@ class _Commands(click.Group):
 
 
 def _own_fault(error: BaseException) -> NoReturn:
-    """Report a crash of the tool, or exhausted memory, and exit.
+    """Report a crash of the program and exit with 3, or report exhausted memory and exit with 2.
 
     If the variable BISAR_BUDGET_DEBUG is set, the traceback is written too.
     """
@@ -136,9 +136,10 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Run the command-line program. SIGTERM and SIGHUP end it without leftover workers or temporary files.
+    """Run the command-line program.
 
-    Warnings of libraries are ignored: users cannot mend them, and PYTHONWARNINGS could turn them into errors.
+    After SIGTERM or SIGHUP the program exits without leaving worker processes or temporary files. Warnings of
+    libraries are ignored, because users cannot mend them, and PYTHONWARNINGS could turn them into errors.
     """
     warnings.simplefilter("ignore")
     # Workers start as `python -c`, which would import from the current folder, unlike an installed command.

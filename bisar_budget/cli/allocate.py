@@ -1,4 +1,4 @@
-"""`bisar-budget allocate`: one specification for every error, such that all together meet every requirement."""
+"""`bisar-budget allocate`: specifications for errors with which the mission meets every requirement."""
 
 import math
 import os
@@ -106,9 +106,9 @@ def allocate(
 
 
 def _write_mission(sheet: "SpecificationSheet", output: str, model: str | None) -> None:
-    """Write the mission file with the specified sizes as its errors and specifications.
+    """Write a mission file whose errors have the specified sizes, and which repeats them under `specifications`.
 
-    Nothing is written if there are no specifications, or if the new text, read as the file `output`, is not valid.
+    Nothing is written if there are no specifications, or if the new text would not be a valid mission file.
     """
     from bisar_budget.faults import MissionError, SetValue
     from bisar_budget.mission.edited import in_folder, with_section, with_values

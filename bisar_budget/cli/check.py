@@ -1,4 +1,4 @@
-"""`bisar-budget check`: the command that judges missions, its defaults from settings, and its reports."""
+"""`bisar-budget check`: the command that checks missions, its option defaults from settings, and its reports."""
 
 import os
 import sys
@@ -61,7 +61,10 @@ _OF_RUN = ("format", "color")  # settings of a whole run, if all its projects ag
 
 
 class _Gate(click.Command):
-    """A command whose options default to environment variables, else to the settings nearest to each mission."""
+    """Command class of `check`: options default to environment variables, or else to the settings of a mission.
+
+    The settings of a mission are in the `pyproject.toml` nearest to it.
+    """
 
     def make_context(self, info_name: str | None, args: list[str], *more: Any, **extra: Any) -> click.Context:
         first_context = self._context({}, info_name, list(args), *more, **extra)
@@ -87,7 +90,11 @@ class _Gate(click.Command):
         return context
 
     def _common_defaults(self, settings: "Sequence[Settings | None]") -> JsonObject:
-        """Defaults for a run of several projects: the options `_OF_RUN` that have one value in all settings."""
+        """Return option defaults for a run with several projects, from the settings of these projects.
+
+        Only the options in `_OF_RUN` that have the same value in all settings get a default. For the others a warning
+        is written.
+        """
         agreed = {}
         for key in _OF_RUN:
             values = {each.values.get(key) if each else None for each in settings}
@@ -140,7 +147,7 @@ class _Gate(click.Command):
 
 
 def _touched(changed: Sequence[str]) -> list[str]:
-    """List the missions that changed files affect; without such a mission, print a message and exit with code 0."""
+    """List the missions that the changed files affect; if there are none, write a message and exit with code 0."""
     from bisar_budget.cli.touched import touched_missions
 
     files = touched_missions(changed)
@@ -151,9 +158,9 @@ def _touched(changed: Sequence[str]) -> list[str]:
 
 
 def _hold_below(folder: str, report: str) -> None:
-    """Refuse a report that settings place outside the folder of the settings file.
+    """Raise `click.UsageError` if settings name a report file outside the folder of the settings file.
 
-    A check of missions from another author must not write to any other folder.
+    Otherwise a check of missions from another author could write to any folder of the user.
     """
     inside = os.path.join(os.path.realpath(folder), "")
     # A NUL in the name is reported when the report is written.
@@ -379,7 +386,7 @@ def check(
             found |= zip(project.files, results_of_project, strict=True)
 
         def report_of(of: Sequence[Project], its_files: Sequence[str]) -> Report:
-            """Make the report of the missions `its_files`, with the options of their projects `of`."""
+            """Make the report on the mission files `its_files`; `of` are their projects, whose options it states."""
             its_missions = tuple(found[file] for file in its_files)
             # The day is reported only if it was given or decides a waiver, so that other reports are reproducible.
             is_given = today is not None or os.environ.get("SOURCE_DATE_EPOCH")
@@ -404,7 +411,7 @@ def check(
 
 
 def _code_of(project: Project, statuses: "Sequence[frozenset[str]]") -> int:
-    """Exit code for the missions of a project, with the options `strict` and `exit_zero` of the project."""
+    """Exit code for the missions of a project, from their statuses and the project's `strict` and `exit_zero`."""
     from bisar_budget.findings.status import exit_code
 
     strict, exit_zero = (project.context.params[name] for name in ("strict", "exit_zero"))
@@ -413,7 +420,7 @@ def _code_of(project: Project, statuses: "Sequence[frozenset[str]]") -> int:
 
 
 def _reports_of(projects: Sequence[Project]) -> list[tuple[Project, str, str]]:
-    """Reports that the settings of projects request, each as project, file name and format.
+    """List the reports that the settings of projects request: project, file name and format of each report.
 
     Such a report contains only the missions of its project.
     """
@@ -428,9 +435,9 @@ def _reports_of(projects: Sequence[Project]) -> list[tuple[Project, str, str]]:
 def _asked(
     project: Project, is_among_others: bool, today: datetime | None, changes: "Sequence[SetValue]"
 ) -> tuple[date, Arguments]:
-    """Day on which waivers are judged, and arguments of the check, for the missions of a project.
+    """Return the day on which waivers are judged, and the arguments for the check of a project's missions.
 
-    With `is_among_others`, the arguments also record the settings file, because the run has several projects.
+    If `is_among_others`, the run has several projects, and the arguments also record the settings file of this one.
     """
     from bisar_budget.findings.requirement import Override
 
@@ -443,7 +450,7 @@ def _asked(
 
 
 def _options(project: Project, judged_on: date | None, today: datetime | None) -> "list[Override]":
-    """Options that influence the result of a project, each with its value and origin."""
+    """List the options that influence the verdicts on a project's missions, each with its value and origin."""
     with project.options() as context:
         return list(_options_in(context, judged_on, today))
 
@@ -478,7 +485,10 @@ def _options_in(context: click.Context, judged_on: date | None, today: datetime 
 
 
 def _check_draws(context: click.Context, scheduler: str | None) -> None:
-    """Refuse a seed or a scheduler without draws, and more draws than are possible without a scheduler."""
+    """Raise `click.UsageError` for `--seed` or `--scheduler` without `--monte-carlo`, or for too many draws.
+
+    More than `MAX_LOCAL_DRAWS` draws need a scheduler.
+    """
     draws, seed = context.params["draws"], context.params["seed"]
     if draws is None:
         if seed is not None and context.get_parameter_source("seed") is ParameterSource.COMMANDLINE:
@@ -493,7 +503,7 @@ def _check_draws(context: click.Context, scheduler: str | None) -> None:
 
 
 def _check_sweep(texts: Sequence[str], formats: Sequence[str]) -> None:
-    """Refuse a sweep if no requested report can show it, or if it has more than two keys."""
+    """Raise `click.UsageError` if `--sweep` is given but no requested report can show it, or for over two keys."""
     if not texts:
         return
     if not any(FORMATS[name].is_illustrated for name in formats):
@@ -512,7 +522,7 @@ def _explain(
     changes: "Sequence[SetValue]",
     today: datetime | None,
 ) -> None:
-    """Explain a row, or a requirement, in every mission that has it."""
+    """Write the explanation of the row or requirement with the id `row_id`, for every mission that has it."""
     from bisar_budget.findings.row import unknown_id
     from bisar_budget.front.checks import DAY_OF_RUN
     from bisar_budget.front.checks import check as ask
@@ -552,7 +562,7 @@ def _explain(
 
 
 def _format_of(name: str) -> str:
-    """Format of a report from the suffix of its file name; raises `click.UsageError` for an unknown suffix."""
+    """Name of the report format that belongs to the suffix of a file name; an unknown suffix is wrong usage."""
     from bisar_budget.report import format_of
 
     format_name = format_of(name)
@@ -563,12 +573,12 @@ def _format_of(name: str) -> str:
 
 
 def _step_summary(format_name: str) -> str | None:
-    """Path of the file that GitHub shows on the page of a run; None outside GitHub, and for other formats."""
+    """Path of the summary file of a GitHub Actions run; None outside GitHub, or if the format is not `github`."""
     return (os.environ.get("GITHUB_STEP_SUMMARY") or None) if format_name == "github" else None
 
 
 def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
-    """Append the summary to the file that GitHub shows on the page of a run. A failure is only a warning."""
+    """Append the summary of a report to the summary file of a GitHub Actions run; only warn if this fails."""
     from bisar_budget.report.formats.annotations import step_summary
 
     try:
@@ -589,7 +599,7 @@ def _say_faults(missions: "Iterable[MissionFindings | UnusableMission | None]") 
 
 
 def _write_report(path: str, format_name: str, report: "Report", style: "Style") -> None:
-    """Write a report to a file, after its pictures, so that a text never names a missing picture."""
+    """Write the pictures of a report and then its text, so that the text never names a missing picture."""
     from bisar_budget.report import pictures, render
 
     folder = _folder_of_pictures(path, format_name)
@@ -601,7 +611,10 @@ def _write_report(path: str, format_name: str, report: "Report", style: "Style")
 
 
 def _folder_of_pictures(path: str, format_name: str) -> str:
-    """Folder for the pictures of a report, beside it; empty if the format has none or the output is no file."""
+    """Folder for the pictures of the report `path`, next to it; empty if the format has no pictures.
+
+    Also empty if the report is not written to a regular file.
+    """
     if not FORMATS[format_name].has_pictures or path == "-" or (os.path.exists(path) and not os.path.isfile(path)):
         return ""
     return f"{os.path.splitext(path)[0]}.assets"

@@ -1,4 +1,4 @@
-"""`bisar-budget derive`: the derived tables of the paper, and the files that are generated from them."""
+"""`bisar-budget derive`: the tables of Rigling & Moses, derived from geometry, and files generated from them."""
 
 import sys
 

@@ -35,7 +35,7 @@ _Read = Callable[[], "Mission"]
 
 
 class _Part(ParamType[float]):
-    """Parameter type for a fraction, such as `10%` or 0.1."""
+    """Parameter type for a fraction from 0 to 1, written as `10%` or as 0.1."""
 
     name = "percent"
 
@@ -131,7 +131,7 @@ def diff(
 def _with_files(
     files: Sequence[str], changes: "tuple[SetValue, ...]", output: str | None, today: datetime | None
 ) -> "ChangeSet":
-    """Compare two mission files, or, with `changes`, each mission file with the same file after these changes."""
+    """Compare two mission files; if `changes` are given, compare each mission file with itself after the changes."""
     from bisar_budget.mission.load import load_mission
     from bisar_budget.report.change.comparison import ChangeSet, loosened_settings
 
@@ -153,7 +153,11 @@ def _with_files(
 
 
 def _with_revision(patterns: Sequence[str], base: str, output: str | None, today: datetime | None) -> "ChangeSet":
-    """Compare mission files with their versions in the Git revision `base`; patterns match files of both versions."""
+    """Compare mission files with their versions in the Git revision `base`.
+
+    The patterns are applied both to the files on disk and to those of the revision, so that new and removed mission
+    files are found too.
+    """
     from bisar_budget.mission.load import load_mission
     from bisar_budget.mission.revision import Revision, RevisionError, mission_at
     from bisar_budget.report.change.comparison import ChangeSet, loosened_settings
@@ -195,7 +199,10 @@ def _with_revision(patterns: Sequence[str], base: str, output: str | None, today
 
 
 def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime | None) -> "tuple[MissionChange, ...]":
-    """Compare missions pair by pair; if a mission cannot be used, write every fault of all missions and exit."""
+    """Compare each mission in `before` with its counterpart in `after`; both contain functions that read missions.
+
+    If a mission cannot be used, the faults of all missions are written, and the command ends.
+    """
     from bisar_budget.front.checks import check
     from bisar_budget.report.change.comparison import compare
 
@@ -206,7 +213,7 @@ def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime |
 
 
 def _settings(mission: str, files: Files = DISK) -> "SettingValues":
-    """Values of the settings nearest to a mission, on disk or in a revision; empty without settings."""
+    """Values of the settings nearest to a mission file, from disk or a Git revision; empty if there are none."""
     from bisar_budget.settings import TABLE
 
     settings = settings_here(files, None if mission == "-" else folder_of_file(mission))

@@ -1,4 +1,4 @@
-"""`bisar-budget verify` and `simulate`: images at the limits, and with the declared errors."""
+"""`bisar-budget verify` and `simulate`: images with errors at the limits, and with the declared errors."""
 
 import sys
 from collections.abc import Sequence
@@ -152,7 +152,7 @@ def simulate(
 
 
 def _export(mission: str, loaded: "Mission", output: str, standing: "Targets") -> None:
-    """Write the phase history, and a summary of its content."""
+    """Write the simulated phase history to the CPHD file `output`, and a summary of it to standard output."""
     from bisar_budget.formats.containers import MissingExtraError
     from bisar_budget.formats.exporting import export_phase_history
     from bisar_budget.front.imaging import SimulationError

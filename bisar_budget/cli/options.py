@@ -1,4 +1,4 @@
-"""Options that commands share, and the origins of their values: command line, environment, a project's settings."""
+"""Options that several commands have, and the origins of option values: command line, environment or settings."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 else:
 
     class ParamType(click.ParamType):
-        """Base of parameter types that can be written with a value type in brackets, also with Click before 8.4."""
+        """Base class of parameter types that allows `ParamType[int]` also with versions of Click before 8.4."""
 
         def __class_getitem__(cls, values: object) -> type:  # noqa: D105
             return cls
@@ -39,7 +39,7 @@ _BEARING = ("model", "strict", "exit_zero")  # options that influence the verdic
 
 
 class FileName(click.types.StringParamType):
-    """Parameter type for a file name, which the shell completes. The file is not opened to check the name."""
+    """Parameter type for a file name, which the shell can complete; whether the file exists is not checked."""
 
     name = "file"
 
@@ -56,17 +56,17 @@ MISSIONS_OR_NONE = click.argument("missions", type=FILE, nargs=-1, metavar="MISS
 
 
 def output_option(words: str = "Write to FILE instead of standard output.", metavar: str = "FILE") -> _Option:
-    """Make the option `--output`; `words` are its help."""
+    """Make the option `--output` with the help text `words`."""
     return click.option("-o", "--output", type=FILE, metavar=metavar, help=words)
 
 
 def plot_option(words: str) -> _Option:
-    """Make the option `--plot`; `words` are its help."""
+    """Make the option `--plot` with the help text `words`."""
     return click.option("--plot", type=FILE, metavar="FILE", help=words)
 
 
 def format_option(formats: Iterable[str], words: str, **overrides: Any) -> _Option:
-    """Make the option `--format` with the choices `formats`; its default is text."""
+    """Make the option `--format` with the choices `formats`, the default `text` and the help text `words`."""
     settings: dict[str, Any] = {"default": "text", "show_default": True, **overrides}
     return click.option("--format", "format_name", type=click.Choice([*formats]), help=words, **settings)
 
@@ -89,9 +89,10 @@ def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, 
 
 
 def set_option(effect: str) -> _Option:
-    """Make the option `--set`; `effect` is the beginning of its help.
+    """Make the option `--set`; `effect` is the beginning of its help text.
 
-    Settings and variables cannot set it, because a gate judges the file of the repository.
+    Settings and environment variables cannot give its value, because a check in CI has to judge the mission file as
+    it is in the repository.
     """
     return click.option(
         "--set",
@@ -110,13 +111,13 @@ GATING_MODEL = click.Choice(GATING_MODELS)
 
 
 def model_option(variable: str | None = None) -> _Option:
-    """Make the option `--model`; `variable` is an environment variable that may give its value instead."""
+    """Make the option `--model`; `variable` names an environment variable with its default value, if any."""
     words = "Model that decides, instead of that of the mission file."
     return click.option("--model", envvar=variable, type=GATING_MODEL, help=words)
 
 
 def date_option(more: str = "") -> _Option:
-    """Make the option `--date`; `more` is added to its help."""
+    """Make the option `--date`; `more` is added to its help text."""
     words = "Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC)." + more
     return click.option("--date", "today", type=click.DateTime(["%Y-%m-%d"]), help=words)
 
@@ -125,7 +126,10 @@ MODEL, DATE = model_option(), date_option()
 
 
 def scheduler_options(doing: str, more: str = "") -> _Option:
-    """Make the options `--scheduler` and `--scheduler-timeout`; the help begins with `doing` and ends with `more`."""
+    """Make the options `--scheduler` and `--scheduler-timeout`.
+
+    The help text of `--scheduler` begins with `doing`, which says what its workers do, and ends with `more`.
+    """
     named = click.option(
         "--scheduler",
         metavar="ADDRESS",
@@ -145,7 +149,7 @@ def scheduler_options(doing: str, more: str = "") -> _Option:
 
 
 def origin_of(parameter: click.Parameter) -> str:
-    """Text about the origin of the value of a parameter: command line, environment, default or a settings file."""
+    """Text that says where a parameter has its value from: command line, environment, a settings file or default."""
     source = click.get_current_context().get_parameter_source(str(parameter.name))
     if source is ParameterSource.COMMANDLINE:
         return COMMAND_LINE
@@ -158,9 +162,9 @@ def origin_of(parameter: click.Parameter) -> str:
 
 
 def settings_here(files: Files = DISK, folder: str | None = None) -> "Settings | None":
-    """Settings of the project that contains a folder, by default the current one; None without settings.
+    """Settings of the project that contains `folder`, by default the current folder; None if it has no settings.
 
-    `files` are those of the disk or of a revision.
+    `files` reads the files of the project from disk, or from a Git revision.
     """
     from bisar_budget.settings import SettingsError, project_settings
 
@@ -173,9 +177,9 @@ def settings_here(files: Files = DISK, folder: str | None = None) -> "Settings |
 
 
 def day_and_outside(today: datetime | None) -> "tuple[date, Outside]":
-    """Day on which waivers are judged, and the options of the current command that influence verdicts.
+    """Return the day on which waivers are judged, and the options of the current command that influence verdicts.
 
-    `today` is the value of --date. Without it the day is that of SOURCE_DATE_EPOCH, or else today, UTC.
+    `today` is the value of `--date`. If it is None, the day is that of SOURCE_DATE_EPOCH, or else today, UTC.
     """
     from bisar_budget.findings.requirement import Outside, Override
     from bisar_budget.front.checks import day_of, day_origin
@@ -197,7 +201,7 @@ def day_and_outside(today: datetime | None) -> "tuple[date, Outside]":
 
 @contextmanager
 def wrong_usage() -> Iterator[None]:
-    """Turn a `QuestionError` that does not depend on the mission into wrong usage of the command."""
+    """Context manager that reports a `QuestionError` as wrong usage of the command, without naming a mission."""
     from bisar_budget.mission.quantities import QuestionError
 
     try:
@@ -209,9 +213,9 @@ def wrong_usage() -> Iterator[None]:
 def ask_each(
     missions: "Sequence[Mission]", model: str | None, today: datetime | None, ask: Callable[..., Answer]
 ) -> Iterator[Answer]:
-    """Yield the result of `ask` for each mission in turn.
+    """Call `ask` with each mission in turn, and yield its results.
 
-    If a mission cannot answer the question, the command ends with an error message that names the file.
+    If `ask` raises `QuestionError`, the command ends with an error message that names the mission file.
     """
     from bisar_budget.mission.quantities import QuestionError
 

@@ -170,10 +170,10 @@ def passes(
 
 # ---------------------------------------------------------------- a mission file for each pass
 def _write_missions(result: "PassesResult", folder: str, today: date) -> None:
-    """Write a mission file for each pass that complies or is waived.
+    """Write a mission file to `folder` for each pass that complies or is waived.
 
-    Before that, each text is checked as if it were in the folder, with the files that it names. If a check fails or
-    gives another status than the pass, no file is written.
+    Before that, every mission is checked as if its file and the files that it names were in the folder. If a mission
+    cannot be used, or its status differs from the status of its pass, no file is written.
     """
     texts = {
         os.path.join(folder, _name(each, result.file)): result.mission_text(each, folder) for each in result.accepted
@@ -201,7 +201,7 @@ def _write_missions(result: "PassesResult", folder: str, today: date) -> None:
 
 
 def _name(satellite_pass: "SatellitePass", file: str) -> str:
-    """Name of the mission file of a pass: the name of the original file with the mid-time of the pass (UTC)."""
+    """Name of the mission file for a pass: the name of the original file, followed by the pass's mid-time (UTC)."""
     stem, suffix = os.path.splitext(os.path.basename(file) if file != "-" else "mission.yaml")
     stem, suffix = (stem, suffix) if suffix.lower() in MISSION_SUFFIXES else (stem + suffix, MISSION_SUFFIXES[0])
     time = (
@@ -213,9 +213,9 @@ def _name(satellite_pass: "SatellitePass", file: str) -> str:
 
 
 def _hold_to_statuses(passes: "Sequence[SatellitePass]", texts: dict[str, str], today: date) -> None:
-    """End the command if a mission text cannot be used in its folder, or has another status there than its pass.
+    """End the command with an error if a mission cannot be used in its folder, or its status is not that of its pass.
 
-    `texts` are the texts of the mission files by path, in the order of `passes`.
+    `texts` contains the texts of the mission files by path, in the order of `passes`.
     """
     from bisar_budget.faults import MissionError
     from bisar_budget.front.checks import check

@@ -1,4 +1,4 @@
-"""Missions of a run, grouped by settings. Each mission uses the settings file that is nearest to it."""
+"""Grouping of the missions of a run by their settings; a mission uses the `pyproject.toml` nearest to it."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Project:
-    """Missions with the same settings, and the options of the command with these settings as defaults."""
+    """Mission files that use the same settings, and a Click context whose option defaults are these settings."""
 
     settings: "Settings | None"
     files: tuple[str, ...]
@@ -24,26 +24,27 @@ class Project:
 
     @property
     def settings_file(self) -> str | None:
-        """Path of the settings relative to the current folder; None without settings."""
+        """Path of the settings file, relative to the current folder; None if there are no settings."""
         return None if self.settings is None else os.path.relpath(self.settings.file)
 
     @contextmanager
     def options(self) -> Iterator[click.Context]:
-        """Make a context in which the options of this project are those of the current command."""
+        """Context manager within which the current Click context is that of this project."""
         with self.context.scope(cleanup=False):
             yield self.context
 
 
 def folder_of_file(file: str) -> str | None:
-    """Absolute path of the folder of a mission file; None if the folder does not exist. The file may be missing."""
+    """Absolute path of the folder of a mission file, which may be missing; None if the folder does not exist."""
     folder = os.path.dirname(file) or os.curdir
     return os.path.abspath(folder) if "\0" not in file and os.path.isdir(folder) else None
 
 
 def by_settings(files: Sequence[str]) -> "list[tuple[Settings | None, tuple[str, ...]]]":
-    """Group mission files by the settings nearest to each, in the order of the files.
+    """Group mission files by the settings nearest to each of them, keeping the order of the files.
 
-    Standard input has the settings of the current folder.
+    Each group is returned with its settings, which are None if there are none. A mission from standard input uses the
+    settings of the current folder.
     """
     groups: dict[str, tuple[Settings | None, list[str]]] = {}
     for file in files:

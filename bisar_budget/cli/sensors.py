@@ -1,4 +1,4 @@
-"""`bisar-budget sensors`: the catalogue of parts whose figures a mission can use."""
+"""`bisar-budget sensors`: the catalogue of parts (sensors, oscillators) whose error figures a mission can use."""
 
 import json
 import os
@@ -56,7 +56,10 @@ def sensors(patterns: Sequence[str], kind: str | None, checking: bool, format_na
 
 
 def _listed(patterns: Sequence[str], kind: str | None) -> "list[Entry]":
-    """Parts of the catalogue whose names match a pattern; ends the command if a pattern matches none."""
+    """List the parts of the catalogue whose ids match a pattern, and whose kind is `kind` unless that is None.
+
+    If a pattern matches no part, the command ends with an error.
+    """
     from fnmatch import fnmatchcase
 
     from bisar_budget.mission.parts import PartError, entries, folders
@@ -86,7 +89,10 @@ def _listed(patterns: Sequence[str], kind: str | None) -> "list[Entry]":
 
 
 def _check(names: Sequence[str], format_name: str) -> None:
-    """Report for each file whether missions can use it as a part; exits with 2 if they cannot use all files."""
+    """Report for each part file whether missions can use it; exits with 2 if any file is unusable.
+
+    `names` are files, folders of files, glob patterns, or `-` for standard input.
+    """
     from bisar_budget.mission.parts import PartError, part_files, read_entry
 
     files: list[str] = []
@@ -122,7 +128,7 @@ def _check(names: Sequence[str], format_name: str) -> None:
 
 
 def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
-    """JSON document of checked files."""
+    """JSON document with the status of each checked part file, and with its faults or its figures."""
     from bisar_budget.mission.parts import PartError
     from bisar_budget.report.formats.json_document import fault_item
 
@@ -138,12 +144,12 @@ def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
 
 
 def _document(content: JsonObject) -> str:
-    """Text of a JSON document."""
+    """Write a dictionary as indented JSON text."""
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
 def _as_text(chosen: "list[Entry]") -> str:
-    """Text that lists parts by kind, with their figures and sources."""
+    """Text that lists parts of the catalogue by kind, with their error figures and the sources of the figures."""
     from bisar_budget.mission.parts import evidence
     from bisar_budget.report.words.sentences import wrapped
 
@@ -167,7 +173,7 @@ def _as_text(chosen: "list[Entry]") -> str:
 
 
 def _item(entry: "Entry") -> JsonObject:
-    """JSON item of a part."""
+    """Describe a part of the catalogue as a JSON object, with its figures and their sources."""
     from bisar_budget.mission.parts import evidence
 
     return {

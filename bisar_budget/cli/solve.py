@@ -1,7 +1,7 @@
-"""`bisar-budget solve` and `sensitivity`: the effect of the numbers of a mission on its verdict.
+"""`bisar-budget solve` and `sensitivity`: the effects that the numbers in a mission file have on the verdict.
 
-`solve` finds the values of a number at which the mission begins or ceases to comply. `sensitivity` ranks the numbers
-by their effect on the worst utilization.
+`solve` finds the values of one number at which the mission begins or ceases to comply. `sensitivity` ranks all
+numbers by their effects on the worst utilization.
 """
 
 import sys

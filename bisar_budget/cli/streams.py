@@ -1,4 +1,4 @@
-"""Input and output of the commands: names of files, standard streams, replacement of files, exit codes."""
+"""Input and output of the commands: file names, standard streams, safe replacement of files, and exit codes."""
 
 import io
 import os
@@ -28,9 +28,10 @@ BROKEN_EXIT_CODE, USAGE_EXIT_CODE, DEFECT_EXIT_CODE, INTERRUPTED_EXIT_CODE = 1, 
 
 
 def expand(patterns: Iterable[str]) -> list[str]:
-    """Expand glob patterns that the shell did not expand. A pattern without a match is kept, and fails to load.
+    """Expand glob patterns that the shell did not expand.
 
-    A file whose name is the pattern itself is added to the matches, so that a file named `*.yaml` is found too.
+    A pattern without a match is returned as it is, and causes an error when it is loaded as a file. A file whose name
+    is the pattern itself is added to the matches, so that a file named `*.yaml` is found too.
     """
     files: list[str] = []
     for pattern in patterns:
@@ -47,14 +48,14 @@ def expand(patterns: Iterable[str]) -> list[str]:
 
 
 def load_all(files: Sequence[str], model: str | None = None, changes: "Sequence[SetValue]" = ()) -> "list[Mission]":
-    """Load missions with changed values. If any is unusable, write all faults of all files and exit."""
+    """Load mission files, and replace values by `changes`; if any is unusable, write all faults and exit."""
     from bisar_budget.mission.load import load_mission
 
     return read_all(partial(load_mission, file, model, changes) for file in files)
 
 
 def read_all(reads: "Iterable[Callable[[], Mission]]") -> "list[Mission]":
-    """Read missions one after the other. If any is unusable, write all faults of all files and exit."""
+    """Call the functions `reads`, each of which reads a mission; if any is unusable, write all faults and exit."""
     found, is_usable = [], True
     for read in reads:
         try:
@@ -68,13 +69,16 @@ def read_all(reads: "Iterable[Callable[[], Mission]]") -> "list[Mission]":
 
 
 def say_faults(file: str, faults: "tuple[Fault, ...]") -> None:
-    """Write the faults of a file, a line for each fault."""
+    """Write the faults of a file to standard error, one line for each fault."""
     for line in MissionError(file, faults).lines():
         complain(line)
 
 
 def suffix_of(name: str | None, suffixes: Sequence[str]) -> str:
-    """Suffix of a file name in lower case; empty without a name. Raises `click.UsageError` if not in `suffixes`."""
+    """Suffix of a file name in lower case; empty if the name is None.
+
+    Raises `click.UsageError` if the suffix is not in `suffixes`.
+    """
     suffix = os.path.splitext(name or "")[1].lower()
     if name is not None and suffix not in suffixes:
         raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
@@ -84,8 +88,9 @@ def suffix_of(name: str | None, suffixes: Sequence[str]) -> str:
 def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable[str] = ()) -> None:
     """End the command if an output would replace an input file, or if two outputs would be the same file.
 
-    Files to which standard input and standard output are redirected are checked too. Also, no input or output may be
-    in one of `folders`, which are for the pictures of a report.
+    `files` are the input files, and `targets` the output files. Files to which standard input and standard output are
+    redirected are checked too. The command also ends if an input or output file is in one of `folders`, to which the
+    pictures of a report will be written.
     """
     written: dict[str, str] = {}
     for target in [*targets, *folders]:
@@ -109,7 +114,7 @@ def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable
 
 
 def _real_path(path: str) -> str:
-    """Resolve the links of a path; ends the command if that fails."""
+    """Return the absolute path without symbolic links; end the command with an error if that is impossible."""
     try:
         return os.path.realpath(path)
     except (OSError, ValueError) as error:  # the working folder was deleted, or the name has a NUL
@@ -117,7 +122,7 @@ def _real_path(path: str) -> str:
 
 
 def _is_open_as(file: str | int, path: str) -> bool:
-    """Whether `file`, a path or the number of an open stream, is the same regular file as `path`."""
+    """Whether `file`, which is a path or the descriptor of an open stream, is the same regular file as `path`."""
     try:
         return os.path.isfile(file) and os.path.samestat(os.stat(file), os.stat(path))
     except (OSError, ValueError):  # one of the files is missing
@@ -125,9 +130,10 @@ def _is_open_as(file: str | int, path: str) -> bool:
 
 
 def root_of_names() -> tuple[str, bool]:
-    """Folder to which reports give names of files outside any repository, and whether it is GitHub's checkout.
+    """Return the folder relative to which reports name files that are in no Git repository.
 
-    The folder is empty if the current folder was removed.
+    The folder is the checkout of a GitHub Actions run, or else the current folder. The second value says whether it
+    is the checkout. The name of the folder is empty if the current folder was removed.
     """
     try:
         here = os.getcwd()
@@ -143,7 +149,7 @@ def is_terminal() -> bool:
 
 
 def wants_color() -> bool:
-    """Whether standard output is a terminal with colours, and NO_COLOR is not set."""
+    """Whether standard output is a terminal that shows colours, and the variable NO_COLOR is not set."""
     return (
         sys.stdout is not None
         and sys.stdout.isatty()
@@ -156,7 +162,10 @@ _TABLE_WIDTHS = (80, 100)  # columns of the narrowest and of the widest table
 
 
 def table_width() -> int:
-    """Number of columns for a table on standard output, from 80 to 100, from COLUMNS or the terminal; else 80."""
+    """Width of a table on standard output, in characters: that of the terminal, but at least 80 and at most 100.
+
+    The variable COLUMNS replaces the width of the terminal. The default is 80.
+    """
     least, most = _TABLE_WIDTHS
     return min(max(shutil.get_terminal_size((least, 24)).columns, least), most)
 
@@ -178,8 +187,8 @@ _LINE_ENDS = {"ics": "\r\n"}  # RFC 5545; lines of other formats end with a line
 def harmless(text: str, format_name: str = "") -> str:
     """Escape the characters of a text that would act on a terminal, or on a CI runner that reads the log.
 
-    The format `github` keeps its workflow commands, and `text` keeps the colours of a report. Messages, without a
-    format name, keep neither.
+    In the format `github`, workflow commands remain; in the format `text`, the colours of a report remain. In
+    messages, which have no format name, neither remains.
     """
 
     def escaped(match: re.Match[str]) -> str:
@@ -198,8 +207,9 @@ def harmless(text: str, format_name: str = "") -> str:
 def deliver_parts(texts: Iterable[str], format_name: str) -> None:
     """Write texts to standard output one after the other.
 
-    If the reader has closed the pipe, the remaining texts are dropped without an error. In the format `text`,
-    characters that the encoding of the terminal lacks are escaped. Other formats are always written in UTF-8.
+    If the program that reads the output has closed the pipe, the remaining texts are dropped without an error. In the
+    format `text`, characters that the encoding of the terminal lacks are escaped. Other formats are always written in
+    UTF-8.
     """
     if sys.stdout is None:
         fail("cannot write: standard output is closed")
@@ -220,13 +230,13 @@ def deliver_parts(texts: Iterable[str], format_name: str) -> None:
 
 
 def drop_output() -> None:
-    """Discard the remaining standard output. Otherwise Python would report the failed write again at exit."""
+    """Discard the remaining standard output, because Python would report a failed write again at its exit."""
     with suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def complain(message: str) -> None:
-    """Write a message to standard error. A failure to write it is ignored."""
+    """Write a message to standard error; a failure of this is ignored."""
     with suppress(OSError):
         click.echo(harmless(message), err=True)
 
@@ -246,7 +256,7 @@ def deliver(text: str, output: str | None = None, format_name: str = "text") -> 
 
 
 def deliver_found(form: "ModuleType", results: object, format_name: str, output: str | None) -> None:
-    """Write results in a format; `form` is the module with a function `as_NAME` for each format."""
+    """Write results to `output` in the format NAME, with the function `as_NAME` of the module `form`."""
     from bisar_budget.report import Style
 
     root, is_checkout = root_of_names()
@@ -257,7 +267,7 @@ def deliver_found(form: "ModuleType", results: object, format_name: str, output:
 
 
 def write_file(path: str, content: str | bytes) -> None:
-    """Write content to a file through a temporary file, as in `replacing`."""
+    """Write content to a file, which it replaces only when it is complete, as described in `replacing`."""
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     with replacing(path) as name, open(name, "wb") as file:
         file.write(data)
@@ -265,11 +275,12 @@ def write_file(path: str, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: str) -> Iterator[str]:
-    """Yield the name of a temporary file that replaces the file `path` at the end.
+    """Context manager that yields the name of a temporary file, which replaces the file `path` at the end.
 
-    It is in a temporary folder beside `path`. A symbolic link remains a link, and its target is replaced. After an
-    error or an interrupt the old file remains. Named pipes, sockets and devices are refused, except open streams of
-    this process, which are written to directly. Temporary folders of killed commands are removed.
+    The temporary file is in a temporary folder beside `path`. If `path` is a symbolic link, its target is replaced
+    and the link remains. After an error or an interrupt the old file remains. Named pipes, sockets and devices are
+    refused, except open streams of this process, which are written to directly. Temporary folders that killed
+    commands left are removed.
     """
     temporary = lock = None
     try:
@@ -309,9 +320,10 @@ def replacing(path: str) -> Iterator[str]:
 
 
 def _own_folder(folder: str) -> tuple[str, int | None]:
-    """Make a temporary folder below `folder`, and lock it, so that no other command removes it.
+    """Make a temporary folder in `folder`, and lock it, so that no other command removes it.
 
-    Returns its path and the descriptor of the lock, None where locks are impossible. The lock ends with the process.
+    Returns the path of the temporary folder and the file descriptor of the lock. The descriptor is None if the system
+    has no locks. The lock is released when the process ends.
     """
     import tempfile
 
@@ -328,7 +340,7 @@ def _own_folder(folder: str) -> tuple[str, int | None]:
 
 
 def _remove_abandoned(folder: str) -> None:
-    """Remove the temporary folders below `folder` that ended commands left. Their locks are released."""
+    """Remove the temporary folders in `folder` that ended commands left, which are no longer locked."""
     import shutil
 
     prefix, suffix = _TEMPORARY

@@ -1,4 +1,4 @@
-"""`bisar-budget sweep`: a table of checks of a mission for many values of its keys."""
+"""`bisar-budget sweep`: a table with the results of checking a mission for many values of its keys."""
 
 import os
 import sys
@@ -159,7 +159,7 @@ def sweep(
 
 
 def _foresee(run: "SweepResult", force: bool) -> None:
-    """Announce the expected time if it is long; refuse more than `MAX_UNFORCED_CASES` cases without --force."""
+    """Tell the user the expected time of a long sweep; refuse over `MAX_UNFORCED_CASES` cases without `--force`."""
     from bisar_budget.front.progress import foretell, lasting
 
     count, seconds = run.cases.count, run.foreseen()
@@ -172,7 +172,7 @@ def _foresee(run: "SweepResult", force: bool) -> None:
 
 
 def _write(run: "SweepResult", output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
-    """Write the table while the cases are checked, then the plot, and a summary to standard error."""
+    """Check the cases and write the table part by part; then write the plot, and a summary to standard error."""
     from bisar_budget.report.drawing.figure import drawing_file
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.report.tables import texts, writer_of

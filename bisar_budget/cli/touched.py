@@ -1,4 +1,4 @@
-"""Find the missions that a change of files affects: changed missions, and missions that read a changed file."""
+"""Search for the missions that changed files affect: changed missions, and missions that read a changed file."""
 
 import os
 import re
@@ -20,13 +20,13 @@ _SETTINGS_FILE = "pyproject.toml"
 
 
 class _ReadFiles:
-    """Access to the files on disk that records the real paths of the files that were read."""
+    """Reader of files on disk that records, in `read`, the real path of each file that it has read."""
 
     def __init__(self) -> None:
         self.read: set[str] = set()
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
-        """Content of a file; arguments and `UnreadableError` are as in `resources.Files`."""
+        """Return the content of a file; arguments and exceptions are those of `resources.Files.content`."""
         self.read.add(os.path.realpath(file))
         return DISK.content(file, most, called)
 
@@ -36,11 +36,12 @@ class _ReadFiles:
 
 
 def touched_missions(changed: Sequence[str]) -> list[str]:
-    """List the missions below the current folder that a change of files affects, sorted.
+    """Return the sorted paths of the missions that are among the files `changed`, or are affected by them.
 
-    A mission is a YAML file with the sections of a mission, or any YAML file below a folder `missions` except parts.
-    A changed `pyproject.toml` affects every mission below its folder. A mission that names files and is unusable is
-    always listed, because a deleted file is in no list of changes.
+    All missions below the current folder are examined. A mission is a YAML file with the sections of a mission, or
+    any YAML file below a folder `missions` that does not describe a part. A changed `pyproject.toml` affects every
+    mission below its folder. A mission that names other files and cannot be used is always listed, because it may
+    name a deleted file, and a list of changed files may not contain deleted files.
     """
     paths = {os.path.realpath(file) for file in changed}
     tops = [os.path.join(os.path.dirname(path), "") for path in paths if os.path.basename(path) == _SETTINGS_FILE]
@@ -54,14 +55,14 @@ def touched_missions(changed: Sequence[str]) -> list[str]:
 
 
 def _missions_below(top: str) -> Iterator[str]:
-    """Yield the mission files below a folder. Hidden folders are skipped."""
+    """Yield the mission files in a folder and its subfolders, except in hidden ones."""
     for folder, folders, names in os.walk(top):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         yield from (file for name in names if _is_mission(file := os.path.join(folder, name)))
 
 
 def _is_mission(file: str) -> bool:
-    """Whether a file is a mission by its content or its folder."""
+    """Whether a YAML file is a mission, judged by its sections or its folder; true if it cannot be read."""
     if not file.endswith(_SUFFIXES):
         return False
     try:
@@ -73,9 +74,9 @@ def _is_mission(file: str) -> bool:
 
 
 def _reads_any(file: str, paths: set[str]) -> bool:
-    """Whether a mission reads one of `paths`.
+    """Whether reading the mission `file` also reads one of the files `paths`.
 
-    Also true for a mission that cannot be used but names other files: a change of one of these may be the cause.
+    Also true for a mission that cannot be used but names other files, because their change may be the cause.
     """
     folder, files = folder_of(file), _ReadFiles()
     try:

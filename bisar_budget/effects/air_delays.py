@@ -1,17 +1,17 @@
 """Random delays in the air: after correction, each leg is longer than the processor assumes.
 
-The delay of a leg is the zenith delay times a factor that depends on the leg's elevation, seen from the scene. The
-elevation changes over the aperture, and the delay with it. Orders 0 and 1 of the delay displace the image; orders
-from 2 on defocus it.
+The delay of a leg is the zenith delay times a factor. The factor depends on the elevation of the platform above the
+scene. The elevation changes over the aperture, and so does the delay. Orders 0 and 1 of the delay displace the image;
+orders 2 and higher defocus it.
 
-The troposphere delays all frequencies by the same amount. Free electrons delay the group of frequencies by g =
-40.3·TEC/f², and advance the phase at the centre frequency by the same amount. In the image, the constant part of the
-range follows from the group delay across the band, and everything else follows from the phase. The range error in the
-image is therefore that of the phase, −g, except that its constant part is that of the group, +ḡ. The displacement is
-Q⁻¹[ḡ, −g₁], and the phases are those of −g together with the phases that the displacement adds. Derived here.
+The troposphere delays all frequencies by the same amount. Free electrons cause the group delay g = 40.3·TEC/f² [m],
+where TEC is the electron content along the leg [1/m²], and advance the phase at the centre frequency by the same
+amount. In the image, the constant part of the range error is that of the group delay, +ḡ, where ḡ is the mean of g
+over the aperture. All other parts follow from the phase, −g. The displacement is Q⁻¹[ḡ, −g₁], where g₁ is the linear
+part of g. The phases are those of −g together with the phases that the displacement adds. Derived here.
 
-With a correlation time the zenith delay changes within the aperture (`range_processes`). The published model takes
-the parts of such a process along the line of sight of mid-aperture. The full model follows the leg.
+With a correlation time the zenith delay changes within the aperture (`range_processes`). The published model computes
+the effects of such a process for the line of sight at mid-aperture. The full model follows the turn of the leg.
 """
 
 import math
@@ -36,7 +36,7 @@ from bisar_budget.mission.propagation import (
     height_of,
 )
 
-ELECTRON_DELAY_M3_PER_S2 = 40.308  # m³/s²: e²/(8π²ε₀mₑ); the group delay of 1/m² is this over f² (CODATA 2018)
+ELECTRON_DELAY_M3_PER_S2 = 40.308  # m³/s², e²/(8π²ε₀mₑ) (CODATA 2018); times content/f² it is the group delay
 TROPOSPHERE_HEIGHT_M = 7e3  # m, height of a thin shell in place of a spherical troposphere
 IONOSPHERE_HEIGHT_M = 350e3  # m, height of the shell of free electrons, unless the platform is lower
 DELAY, CONTENT = DELAYS
@@ -51,7 +51,7 @@ def obliquity(position: Vectors, shell: PerCase) -> PerCase:
     Parameters
     ----------
     position : Vectors
-        Position of the platform, east, north and up of the scene, (…). [m]
+        Position of the platform relative to the scene: east, north and up, each (…). [m]
     shell : float or (…)
         Height of the shell. Height 0 gives a flat Earth: 1/sin of the elevation. [m]
     """
@@ -63,10 +63,10 @@ def obliquity(position: Vectors, shell: PerCase) -> PerCase:
 def leg_factor(delay: str, position: Vectors, middle: Vectors) -> PerCase:
     """Ratio of the delay on a platform's leg to the delay at the zenith, for positions (…) of the platform.
 
-    `middle` is the platform's position at mid-aperture. For a platform below `AIR_TOP_M`, the ratio of the neutral
-    air is that of a flat Earth. The ratio of free electrons is then 0, because all of them are above the leg. The
-    ratio of the neutral air is also 0 at an elevation below `LEAST_ELEVATION_DEG`, for which a mission file must not
-    state a delay.
+    `middle` is the platform's position at mid-aperture. For a platform below `AIR_TOP_M`, the neutral air is treated
+    as on a flat Earth, and the ratio for free electrons is 0, because all of them are above the leg. The ratio for
+    the neutral air is also 0 at an elevation below `LEAST_ELEVATION_DEG`, because a mission file must not state a
+    delay there.
     """
     height = np.asarray(height_of(middle))
     is_above = height >= AIR_TOP_M
@@ -83,14 +83,16 @@ def metres_per_unit(mission: Mission, delay: str) -> PerCase:
 
 
 def group_delay(mission: Mission, path: PlatformState, delay: str, times: PerCase) -> PerCase:
-    """Group delay of a platform's leg at slow times, per unit of a declared delay. [m/unit]"""
+    """Group delay of a platform's leg at the slow times `times` [s], per unit of a declared delay. [m/unit]"""
     return metres_per_unit(mission, delay) * leg_factor(delay, path.place(times), path.position)
 
 
 def seen_course(group: Floats, mean: Floats, delay: str) -> Floats:
     """Range error in the image that a group delay causes. [m]
 
-    `group` is the group delay over the aperture, and `mean` is its constant part.
+    `group` is the group delay over the aperture, and `mean` is its constant part. [m] A tropospheric delay is itself
+    the range error. For free electrons, only the constant part has the sign of the group delay; everything else has
+    the opposite sign, as the phase is advanced.
     """
     return group if delay == DELAY else 2 * mean - group
 
@@ -107,7 +109,7 @@ def group_at_nodes(delay: str, track: Vectors, middle: Vectors, scale: PerCase) 
     middle : Vectors
         Position of the platform at mid-aperture, relative to the scene centre. [m]
     scale : (cases,)
-        `metres_per_unit`.
+        Result of `metres_per_unit`. [m/unit]
     """
     return np.asarray(scale * leg_factor(delay, track, middle) + np.zeros_like(track[0]))
 
@@ -115,7 +117,8 @@ def group_at_nodes(delay: str, track: Vectors, middle: Vectors, scale: PerCase) 
 def dispersion_per_unit(mission: Mission, path: PlatformState) -> PerCase:
     """Quadratic phase at the edges of the band per unit of electron content at the zenith. [rad/unit]
 
-    The phase exp(2πi·K/(c·f)), with K = g·f₀², has the second order (2π/λ)·g·(B/2f₀)² in f − f₀.
+    The phase due to the electrons is 2πK/(c·f) with K = g·f₀², where g is the group delay [m]. At the edges of the
+    band, f − f₀ = ±B/2, its term of second order in f − f₀ is (2π/λ)·g·(B/2f₀)².
     """
     radar = mission.radar
     g = metres_per_unit(mission, CONTENT) * leg_factor(CONTENT, path.position, path.position)
@@ -125,7 +128,8 @@ def dispersion_per_unit(mission: Mission, path: PlatformState) -> PerCase:
 def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, PerCase]:
     """Quadratic phase at the edges of the band due to the declared electron content of each leg. [rad]
 
-    The phases include the coverage factor. Legs without a declared content are left out.
+    The result maps the name of a platform to the phase of its leg. The phases include the coverage factor. Legs
+    without a declared content are left out.
     """
     propagation, factor = mission.propagation, mission.allocation.coverage_factor
     phases: dict[str, PerCase] = {}
@@ -137,9 +141,10 @@ def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, Pe
 
 
 def dispersed(mission: Mission, geometry: BistaticGeometry) -> PerCase:
-    """Quadratic phase at the edges of the band by both legs. [rad]
+    """Quadratic phase at the edges of the band due to the electron content of both legs. [rad]
 
-    If one air covers both legs, the phases add. For two independent airs, the mission's rule combines them.
+    If the file states one content for both legs, the phases add. Otherwise the contents are independent, and the
+    mission's rule combines the phases.
     """
     legs = list(dispersed_legs(mission, geometry).values())
     is_one_air = mission.propagation is not None and mission.propagation.is_one_air
@@ -147,16 +152,16 @@ def dispersed(mission: Mission, geometry: BistaticGeometry) -> PerCase:
 
 
 def legs_of(owner: str) -> tuple[str, ...]:
-    """Platforms whose legs have a delay of the given owner. A delay of the mission is on both legs."""
+    """Platforms whose legs a delay of the given owner affects. A delay of the mission affects both legs."""
     return PLATFORMS if owner == "mission" else (owner,)
 
 
 def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
-    """Delays of the air, declared or not; empty if the file states nothing about the air.
+    """Yield the delays of the air, declared or not; nothing if the file states nothing about the air.
 
-    A delay that the file states once for the whole mission is one random number over the scene. Both legs have this
-    delay, each at its own elevation, and the effects of both legs add with their signs before they are squared. In
-    this case each leg also has a row of its own, which counts only in the row of the air.
+    A delay that the file states once for the whole mission is one random number. It delays both legs, each by the
+    factor of its own elevation, and the effects on both legs add with their signs before they are squared. Each leg
+    then also has a row of its own. That row only informs: its effect is already part of the row of the mission.
     """
     propagation = seen.mission.propagation
     if propagation is None:
@@ -175,9 +180,10 @@ def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
 
 
 def _groups_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Floats]:
-    """Group delay of a leg at the nodes per unit at the zenith, turning and fixed. [m/unit]
+    """Group delay of a leg at the nodes per unit of a zenith delay, for the turning and for the fixed leg. [m/unit]
 
-    The first result follows the leg as it turns. The second holds the leg at mid-aperture.
+    Both results are (nodes, cases). The first follows the leg over the aperture. The second has the value at
+    mid-aperture at all nodes.
     """
     exact, middle = seen.exact, getattr(seen.geometry, name).position
     scale = metres_per_unit(seen.mission, delay)
@@ -188,7 +194,11 @@ def _groups_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Fl
 def _delay_error(
     seen: SensorCases, owner: str, delay: str, groups: Sequence[tuple[Floats, Floats]], counted_in: str = ""
 ) -> RandomError:
-    """Error of the delay of one leg, or of one air that covers both legs."""
+    """Create the error of a delay of one leg, or of a delay that both legs share.
+
+    `groups` has the results of `_groups_of_leg` for these legs. `counted_in` is the id of the row that already
+    includes the effect; empty if there is none.
+    """
     propagation = seen.mission.propagation
     name = legs_of(owner)[0]
     leg = None if propagation is None else propagation.leg(name)
@@ -213,7 +223,7 @@ def _delay_error(
 
 
 def correlation_time_of(mission: Mission, owner: str) -> PerCase | None:
-    """Correlation time of the delay of a leg, or of one air over both legs. [s]
+    """Correlation time of the delay of one leg, or of a delay that both legs share. [s]
 
     None if the delay is constant.
     """
@@ -232,7 +242,7 @@ def _changing(
     k, half = seen.exact.k, seen.exact.half
     along = gauss_markov(2 * half, np.broadcast_to(correlation_time, half.shape)).times(np.square(at_mid_aperture))
     quadratic, cubic, spread = (k * np.sqrt(power) for power in along[:3])
-    # The spread is a mean power, which has no coverage factor.
+    # The declared size includes the coverage factor, which does not apply to the spread, a mean power.
     published = RandomEffect(quadratic, cubic, spread / seen.factor, *seen.moved(along.constant, along.linear))
     full = seen.of_gauss_markov(group[None], correlation_time, is_phase_advanced=delay == CONTENT)
     return published, full
@@ -241,9 +251,9 @@ def _changing(
 def changing_air(
     mission: Mission, geometry: BistaticGeometry, cases: int, correlation_time: float
 ) -> list[RandomError]:
-    """Declared delays that are constant within the aperture, recomputed with a correlation time [s].
+    """List the declared delays that are constant within the aperture, as if they had a given correlation time [s].
 
-    Each delay is listed once. One air over both legs is a single delay. `geometry` is the geometry of the cases.
+    A delay that both legs share is one error in the list. `geometry` is the geometry of the cases.
     """
     propagation = mission.propagation
     staying = [name for name in PLATFORMS if correlation_time_of(mission, name) is None]
@@ -259,9 +269,10 @@ def changing_air(
 
 
 def zenith_courses(mission: Mission, owner: str, aperture_time: Floats, count: int) -> Floats:
-    """Independent variations of the zenith delay at `count` nodes, (courses, nodes, cases).
+    """Independent components of the zenith delay at `count` nodes, (courses, nodes, cases).
 
-    Together they make up a delay of variance 1.
+    The sum of the components, each times an independent random number of variance 1, is a delay of variance 1. A
+    delay without a correlation time has one component, which is constant.
     """
     correlation_time = correlation_time_of(mission, owner)
     if correlation_time is None:

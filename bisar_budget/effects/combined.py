@@ -1,8 +1,8 @@
 """Combination of several errors by worst case or root-sum-square, for phases and displacements on the ground.
 
-Under root-sum-square the errors of one covariance C count as one error, √(gᵀCg). With gᵢ the effect of one unit of
-error i and φᵢ = gᵢσᵢ, gᵀCg is Σ ρᵢⱼφᵢφⱼ. The result does not depend on the frame: the covariance stays in its own
-frame, and the effects are taken along the axes of that frame.
+Under root-sum-square the errors of one covariance C count as one error with the effect √(gᵀCg), where gᵢ is the
+effect of one unit of error i. In terms of the effects φᵢ = gᵢσᵢ and the correlations ρᵢⱼ, gᵀCg = Σ ρᵢⱼφᵢφⱼ. The
+result does not depend on the frame, because the effects are computed along the axes of the covariance's own frame.
 
 Phases and displacements are arrays over cases, (cases,). For one case they may be numbers.
 """
@@ -21,11 +21,11 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import Note
 
-Phases = Sequence[tuple[str, PerCase]]  # by row id, signed [rad]
-Moves = Sequence[tuple[str, tuple[PerCase, PerCase]]]  # by row id, east and north [m]
+Phases = Sequence[tuple[str, PerCase]]  # pairs of row id and signed phase [rad]
+Moves = Sequence[tuple[str, tuple[PerCase, PerCase]]]  # pairs of row id and displacement, east and north [m]
 
 
-Size = TypeVar("Size")  # of an error: a phase, or a displacement
+Size = TypeVar("Size")  # effect of an error: a phase or a displacement
 
 
 class Correlated(NamedTuple):
@@ -41,7 +41,7 @@ class Correlated(NamedTuple):
         return f"{self.platform}.covariance"
 
     def of(self, cases: Indices) -> "Correlated":
-        """Return the covariance of some of the cases."""
+        """Return the covariance of the cases with the given indices."""
         rows = [
             [rho[cases] if isinstance(rho, np.ndarray) and rho.ndim else rho for rho in row]
             for row in self.correlation
@@ -68,7 +68,7 @@ class Correlated(NamedTuple):
 
 
 def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
-    """List the covariances of a mission. Nearly every mission has none."""
+    """List the covariances that a mission file states for its platforms; empty for most missions."""
     groups = []
     for name in PLATFORMS:
         error: MotionError = getattr(mission.platforms, name).motion_error
@@ -83,7 +83,10 @@ def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
 
 
 def squared(correlation: Sequence[Sequence[PerCase]], parts: Sequence[PerCase] | Floats) -> PerCase:
-    """Square of a sum of correlated parts, Σ ρᵢⱼvᵢvⱼ. A result below zero, due to rounding, is set to zero."""
+    """Variance of the sum of correlated parts with the sigmas vᵢ: Σ ρᵢⱼvᵢvⱼ, in the squared unit of the parts.
+
+    A negative result, due to rounding, is set to zero.
+    """
     values = np.array(np.broadcast_arrays(*parts))
     if any(np.ndim(rho) for row in correlation for rho in row):  # the correlations differ between cases
         of_cases = np.array([np.broadcast_arrays(*row, values[0])[:-1] for row in correlation])
@@ -129,7 +132,7 @@ def _parts(
 
 # ---------------------------------------------------------------------- combined sizes
 def combined_phase(phases: Phases, rule: str, groups: Sequence[Correlated] = ()) -> PerCase:
-    """Combine the phases of errors by a rule. [rad]
+    """Combined phase of several errors under a rule. [rad]
 
     Under `rss` the phases of the six errors of a covariance are combined with the correlations of these errors.
     """
@@ -137,9 +140,10 @@ def combined_phase(phases: Phases, rule: str, groups: Sequence[Correlated] = ())
 
 
 def combined_displacement(moves: Moves, rule: str, groups: Sequence[Correlated] = ()) -> PerCase:
-    """Combine displacements by a rule. [m]
+    """Length of the combined displacement of several errors under a rule. [m]
 
-    `sum` takes the longest vector sum over all signs of the displacements. `rss` uses the rms length of a covariance.
+    Under `sum` it is the longest vector sum for any signs of the displacements. Under `rss` the errors of a
+    covariance contribute the rms length of their combined displacement.
     """
     vectors = np.array([move for _, move in displacement_parts(moves, rule, groups)])
     if not vectors.size:
@@ -148,7 +152,7 @@ def combined_displacement(moves: Moves, rule: str, groups: Sequence[Correlated] 
 
 
 def combined(sizes: Sequence[PerCase] | Floats, rule: str) -> PerCase:
-    """Combine phases or lengths (n, ...) by a rule.
+    """Combined magnitude (...) of phases or lengths (n, ...) under a rule, in their unit.
 
     `each` takes the largest magnitude, `sum` the sum of the magnitudes, and `rss` the root-sum-square.
     """
@@ -169,8 +173,9 @@ def largest_signed_sum(vectors: Floats) -> PerCase:
     """Length of the longest of all sums ±v₁ ± v₂ … of plane vectors (n, 2, ...), computed exactly.
 
     All sums lie in a polygon that has two sides parallel to each vector. The longest sum is a corner of this polygon.
-    With every vector turned into the upper half plane and the vectors sorted by angle, reversing one vector after
-    another gives the corners of one half of the polygon. The other half is its mirror image.
+    To find the corners, every vector is reversed, if necessary, so that it lies in the upper half plane, and the
+    vectors are sorted by angle. Reversing one vector after another then gives the corners of one half of the polygon.
+    The other half is its mirror image.
     """
     x, y = vectors[:, 0], vectors[:, 1]
     is_upper = (y > 0) | ((y == 0) & (x > 0))
@@ -184,17 +189,18 @@ def largest_signed_sum(vectors: Floats) -> PerCase:
 
 # ---------------------------------------------------------------------- notes
 def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[Note, ...]:
-    """Notes on how an aggregate treats covariances."""
+    """Notes, one for each covariance, on how a combination under the given rule treats its correlations."""
     if rule == "rss":
         return tuple(phrases.note("counted-as-one", group=group.id) for group in groups)
     return tuple(phrases.note("correlations-unused", group=group.id) for group in groups)
 
 
 def likely_error(group: Correlated, members: Sequence[ErrorSource]) -> tuple[float, ...]:
-    """Most probable six errors of a covariance that together cause the phase √(gᵀCg): Cg/√(gᵀCg), (6,).
+    """Most probable values of the six errors of a covariance that together cause the phase √(gᵀCg), (6,).
 
-    The phase is the quadratic phase of the full model. The components are along the axes of the covariance's frame
-    and include the coverage factor. If the phase is zero, each component is its sigma.
+    The values are Cg/√(gᵀCg). The phase is the quadratic phase of the full model. The errors are along the axes of
+    the covariance's frame, in SI units, and include the coverage factor. If the phase is zero, each value is the
+    sigma of its error.
     """
     sizes = np.array([source.declared or 0.0 for source in members])
     phases = sizes * [source.full.qpe for source in members]

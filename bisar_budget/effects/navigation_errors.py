@@ -1,20 +1,20 @@
 """Random navigation errors: errors of inertial sensors, lever arms, and noise of a position.
 
 A bias of an inertial sensor is one constant error over the aperture; noise is an independent error at every moment.
-The effect of both starts at mid-aperture, where the mission declares the position and velocity errors that aiding
-leaves. A tilt also rotates the lever arm, if the file states one. An attitude error at mid-aperture rotates the arm
-there already.
+The motion errors that both cause are zero at mid-aperture, because the mission declares the position and velocity
+errors at that moment separately, as aiding leaves them. A tilt also rotates the lever arm, if the file states one. An
+attitude error rotates the arm over the whole aperture, mid-aperture included.
 
 A lever arm leads from the reference point of the navigation to the antenna's phase centre, in axes that turn with the
 body. These axes are along, cross and up of the velocity at every moment of the aperture; for a platform at rest they
 are the scene's axes. The antenna's position is the navigation's position plus R(τ)·l, with the arm l and the rotation
-R of the body. An error δl of the arm turns with the body, R(τ)·δl: it displaces the image, and defocuses it if the
+R of the body. An error δl of the arm turns with the body, R(τ)·δl. It displaces the image, and defocuses it if the
 body turns. An attitude error ψ moves the antenna by ψ × R(τ)·l. The error ψ keeps its direction in space, like the
-error of a strapdown navigation with perfect gyros, also where it tilts the specific force. A gyro bias ε makes it
-grow, ψ = ε·τ; gyro noise makes it a random walk.
+error of a strapdown navigation with perfect gyros. The same holds for its effect on the specific force. A gyro bias ε
+makes the error grow as ψ = ε·τ; gyro noise makes it a random walk.
 
-The same ψ acts through the specific force and through the arm, so an error of an inertial sensor has both effects in
-its own row. A further row shows the effect of attitude through the arm alone, and counts nowhere. Derived here.
+The same ψ acts through the specific force and through the arm, so the row of an error of an inertial sensor includes
+both effects. A further row shows the effect of attitude through the arm alone; it is part of no sum. Derived here.
 """
 
 import math
@@ -45,7 +45,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import RAW, CommonMotionError, FlownPath, LogNoise, MotionError
 
 _IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
-SPREADING_NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
+SPREADING_NOISE = ("velocity_random_walk", "angle_random_walk")  # noise of an inertial sensor, part of which spreads
 TILTS = ("attitude", "gyro_bias", "angle_random_walk")
 # The covariance of a position error over the aperture grows as this power of the aperture time.
 _GROWS = {
@@ -61,7 +61,7 @@ _GROWS = {
 # ---------------------------------------------------------------------- inertial sensors
 CORRELATED = ("random", "trajectory")  # kinds of error that are correlated noise of a position
 _CONSTANT_S = 1e9  # correlation time of an error that is constant over any aperture
-_UNIFORM_SIGMA_RATIO = 12**-0.5  # sigma of an error that is uniform over a step
+_UNIFORM_SIGMA_RATIO = 12**-0.5  # ratio of sigma to step for an error that is uniformly distributed over the step
 
 
 def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
@@ -88,7 +88,10 @@ def process_axes(mission: Mission, error: RandomError) -> dict[str, Floats]:
 
 
 def _log_process(mission: Mission, name: str, figure: str) -> tuple[GaussMarkov, Floats]:
-    """Noise, and its axes, of a log whose fixes the processor uses without smoothing, for one case."""
+    """Process and axes (3, 3) of the noise of a platform's log, for one case.
+
+    The processor uses the fixes of the log without smoothing. `figure` is `residual` or `grid`, see `_log_parts`.
+    """
     path: FlownPath | None = getattr(mission.platforms, name).path
     assert path is not None
     assert path.log_noise is not None
@@ -111,10 +114,11 @@ def specific_force(mission: Mission, state: PlatformState) -> Vectors:
 
 
 def acceleration_errors(kind: str, axes: Floats, force: Floats) -> Floats:
-    """Acceleration error per unit of a sensor error about or along each axis, (axes, 3, ...). [m/s²/unit]
+    """Acceleration error due to one unit of a sensor error on each axis, (axes, 3, ...). [m/s²/unit]
 
-    `axes` has the same shape. A tilt rotates the specific force (3, ...), which accelerometers measure. A scale
-    factor adds a fraction of the specific force. A sensor error that is an acceleration acts along its axis.
+    `axes` has the same shape. `force` (3, ...) is the specific force. [m/s²] A tilt about an axis rotates the
+    specific force. A scale factor adds a fraction of its component along the axis. Any other sensor error is an
+    acceleration along the axis.
     """
     if kind in TILTS:
         return np.asarray(np.cross(axes, force, axisa=1, axisb=0, axisc=1))
@@ -124,7 +128,7 @@ def acceleration_errors(kind: str, axes: Floats, force: Floats) -> Floats:
 
 
 def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Errors of a platform's inertial sensor, declared or not; empty without a sensor."""
+    """Yield the errors of a platform's inertial sensor, declared or not; nothing without a sensor."""
     error = seen.error(name)
     if error.imu is None:
         return
@@ -161,9 +165,10 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
 def _moves_by_imu(
     seen: SensorCases, platform_index: int, kind: str, directions: Floats, about: Floats, arm: Floats | None
 ) -> tuple[Moves, ...]:
-    """Motion of a platform per unit of a sensor error, through its acceleration error and through a lever arm.
+    """Motion of a platform per unit of a sensor error, due to the acceleration error and to the lever arm.
 
-    `directions` (axes, 3, cases) is the acceleration error per unit. [m/s²/unit]
+    `directions` (axes, 3, cases) is the acceleration error per unit. [m/s²/unit] `about` (axes, 3, cases) are the
+    axes of the sensor error. `arm` (3, nodes, cases) is the lever arm [m]; None without an arm.
     """
     ways, half = directions[:, :, None], seen.exact.half
     if arm is None or kind not in TILTS:
@@ -180,23 +185,25 @@ def _moves_by_imu(
     )
 
 
-# The evaluators take and give numbers, or arrays of cases.
+# The evaluators accept and return numbers, or arrays of cases.
 _inertial_phases: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.inertial_phases
 
 
 def _at_mid_aperture(mission: Mission, index: int, along: PerCase) -> tuple[PerCase, ...]:
-    """Quadratic phase, cubic phase and remaining phase per unit, in the published model. [rad]
+    """Quadratic, cubic and remaining phase due to one unit of a sensor error, in the published model. [rad/unit]
 
-    `along` is the component of the unit error along the line of sight.
+    `index` is the position of the kind of error in `IMU_KINDS`. `along` is the component of the acceleration error of
+    one unit along the line of sight at mid-aperture. [m/s²/unit]
     """
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
     return _inertial_phases(along, along, along, wavelength, T)[index]
 
 
 def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> tuple[PerCase, PerCase]:
-    """Sigmas of the displacement per unit of a sensor error, in the published model. [m]
+    """Sigmas of the displacement east and north due to one unit of a sensor error, in the published model. [m/unit]
 
-    `along` is the component of the unit error along the line of sight of mid-aperture.
+    `along` is the component of the acceleration error of one unit along the line of sight at mid-aperture.
+    [m/s²/unit]
     """
     fit = seen.exact.fit[:2]
     if kind in SPREADING_NOISE:
@@ -211,8 +218,8 @@ def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> tuple[PerCase,
 def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions: Floats) -> RandomEffect:
     """Effect of one unit of the sensor error `kind`, in the full model along the exact paths.
 
-    `directions` (axes, 3, cases) is the acceleration error per unit about, or along, each axis. The motion error is
-    computed for an aperture of 2 s. Its square is then scaled by a power of half the aperture time.
+    `directions` (axes, 3, cases) is the acceleration error due to one unit on each axis. [m/s²/unit] The motion error
+    is computed for an aperture of 2 s. Its square is then scaled by a power of half the aperture time.
     """
     count, along = len(seen.exact.times), seen.range_errors(platform_index, directions[:, :, None])
     scale = seen.exact.half ** _GROWS[kind]
@@ -226,9 +233,10 @@ def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions
 
 
 def _walk_of(kind: str, count: int) -> "_Walks":
-    """Position error by the noise of a sensor, as integrals of white noise.
+    """Covariance of the position error due to noise of an inertial sensor, for an aperture of 2 s.
 
-    The noise is a white acceleration, or a white tilt rate that rotates the specific force.
+    The position error is an integral of white noise. The noise is a white acceleration, or a white tilt rate whose
+    tilt rotates the specific force.
     """
     order = 1 if kind == "velocity_random_walk" else 2
     return _walks(order, order, count)
@@ -236,9 +244,10 @@ def _walk_of(kind: str, count: int) -> "_Walks":
 
 @cache
 def _courses(kind: str, count: int) -> Floats:
-    """Independent variations of the position by a unit acceleration, or by its noise, over 2 s, (courses, nodes).
+    """Position errors over an aperture of 2 s due to a unit sensor error of a kind, (courses, nodes). [m/unit]
 
-    They are zero at mid-aperture. [m/unit]
+    Noise has several independent components. Every other kind has one: the motion due to an acceleration of 1 m/s²,
+    or, for a gyro bias, due to an acceleration that grows by 1 m/s² per second. All are zero at mid-aperture.
     """
     if kind in SPREADING_NOISE:
         return factor(_walk_of(kind, count).at_nodes).T
@@ -248,7 +257,10 @@ def _courses(kind: str, count: int) -> Floats:
 
 # ---------------------------------------------------------------------- lever arms
 def body_axes(state: PlatformState, times: Floats) -> Floats:
-    """Body axes of a platform, along, cross and up of its velocity, at slow times [s], (axes, 3, *times.shape)."""
+    """Body axes of a platform at slow times [s], as unit vectors in the axes of the scene, (axes, 3, *times.shape).
+
+    They are along, cross and up of the velocity. For a platform at rest they are the axes of the scene.
+    """
     u, v, w = (np.broadcast_to(component, times.shape) for component in state.at(times)[1])
     if np.any(state.is_still):
         u, v, w = (np.where(state.is_still, *both) for both in ((1.0, u), (0.0, v), (0.0, w)))
@@ -264,7 +276,7 @@ def arm_at(state: PlatformState, arm: Vectors, times: Floats) -> Floats:
 
 
 def swung(axes: Floats, arm: Floats) -> Floats:
-    """Displacement of the antenna by a unit of tilt about each of several axes, (axes, 3, times, cases). [m/rad]
+    """Displacement of the antenna due to a unit tilt about each of several axes, (axes, 3, times, cases). [m/rad]
 
     The lever arm is (3, times, cases) [m], and the axes are (axes, 3, cases).
     """
@@ -273,7 +285,10 @@ def swung(axes: Floats, arm: Floats) -> Floats:
 
 
 def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Errors of a platform's lever arm: attitude acting through the arm, declared or not, and the arm itself."""
+    """Yield the errors of a platform's lever arm.
+
+    They are the effect of attitude errors through the arm, declared or not, and the declared uncertainty of the arm.
+    """
     error = seen.error(name)
     lever: LeverArm | None = error.lever_arm
     if lever is None:
@@ -307,8 +322,8 @@ def _with_arm(
 ) -> tuple[RandomEffect, RandomEffect]:
     """Effects, in both models, of one unit of tilt, tilt rate or tilt noise of a platform with a lever arm.
 
-    The tilt is about the axes `about` (axes, 3, cases). `directions` (axes, 3, cases) is the acceleration that the
-    tilted specific force causes. [m/s²/unit] `arm` is the arm at the nodes. [m]
+    The tilt is about the axes `about`, (axes, 3, cases). `directions` (axes, 3, cases) is the acceleration error due
+    to the tilt of the specific force. [m/s²/unit] `arm` (3, nodes, cases) is the lever arm at the nodes. [m]
     """
     state, times = seen.geometry.both[platform_index], seen.exact.times
     swings = swung(about, arm)
@@ -316,7 +331,7 @@ def _with_arm(
         order = 2 if kind == "attitude" else 3
         grows = times**order / math.factorial(order)
         return seen.of_motion(platform_index, directions[:, :, None] * grows + swings * times ** (order - 2))
-    # The tilt walks, and its double integral is a position: two walks, independent for each axis.
+    # The tilt is a random walk. Its double integral is also a position error. Both follow from the same noise.
     along = [seen.range_errors(platform_index, way) for way in (directions[:, :, None], swings)]
     stated = seen.error(PLATFORMS[platform_index]).lever_arm
     assert stated is not None
@@ -325,7 +340,7 @@ def _with_arm(
     at_mid_aperture = [np.einsum("ac,eac->ec", seen.vector(state.look), way) for way in (directions, at_middle)]
     fit, half, k, count = seen.exact.fit, seen.exact.half, seen.exact.k, len(times)
     covariance, beyond, orders, beyond_cubic = (np.zeros(()) for _ in range(4))
-    for (i, a), (j, b) in product(enumerate((2, 0)), repeat=2):  # number of integrations of each walk
+    for (i, a), (j, b) in product(enumerate((2, 0)), repeat=2):  # integrals of the tilt: double for the force
         walk, scale = _walks(a, b, count), half ** (a + b + 1)
         moved = np.einsum("anc,amc->nmc", along[i], along[j])
         covariance = covariance + scale * walk.at_nodes[..., None] * moved
@@ -334,7 +349,7 @@ def _with_arm(
         orders = orders + np.diagonal(fit @ walk.at_nodes @ fit.T)[:, None] * power
         beyond_cubic = beyond_cubic + walk.left * power
     constant, linear, quadratic_power, cubic_power = np.maximum(orders, 0.0)
-    # The spread is a mean power, which has no coverage factor.
+    # The declared size includes the coverage factor, which does not apply to the spread, a mean power.
     spread = k * np.sqrt(np.maximum(beyond_cubic, 0.0)) / seen.factor
     published = RandomEffect(
         k * np.sqrt(quadratic_power), k * np.sqrt(cubic_power), spread, *seen.moved(constant, linear)
@@ -345,10 +360,10 @@ def _with_arm(
 class _Walks(NamedTuple):
     """Covariance of two integrals of the same white noise of density 1 over an aperture of 2 s.
 
-    Both integrals start at mid-aperture and run in both directions. `at_nodes` is the covariance of the first
-    integral with the second at the nodes, (nodes, nodes), in the Legendre orders that the nodes can distinguish.
-    `left` is the mean over the aperture of their product beyond order 3. `beyond` is its mean beyond the orders that
-    the nodes can distinguish.
+    Both integrals start at mid-aperture and run forward and backward in time. `at_nodes` (nodes, nodes) is the
+    covariance of the first integral with the second at the nodes, in the Legendre orders that the nodes can
+    distinguish. `left` is the mean over the aperture of the expected product of both, without their orders 0 to 3.
+    `beyond` is the same mean without all orders that the nodes can distinguish.
     """
 
     at_nodes: Floats
@@ -360,7 +375,7 @@ class _Walks(NamedTuple):
 def _walks(first: int, second: int, count: int) -> _Walks:
     """Covariance of white noise integrated `first` + 1 times with the same noise integrated `second` + 1 times.
 
-    `count` is the number of nodes. One integration, given as 0, is a random walk.
+    `count` is the number of nodes. Noise integrated once (0) is a random walk.
     """
     gauss_nodes, weights = np.polynomial.legendre.leggauss(2 * count)
     start, weight = (1 + gauss_nodes) / 2, weights / 2  # on one side of the middle
@@ -383,10 +398,10 @@ def _walks(first: int, second: int, count: int) -> _Walks:
 
 @cache
 def _courses_of_both_walks(count: int) -> tuple[Floats, Floats]:
-    """Independent variations that make up a tilt's random walk over an aperture of 2 s, at the nodes.
+    """Independent components of a tilt that is a random walk, and of its double integral, over an aperture of 2 s.
 
-    Returns the double integral of the walk, and the walk itself, each (courses, nodes). Row i of both comes from the
-    same noise.
+    Returns the components of the double integral and those of the tilt at the nodes, each (courses, nodes). Row i of
+    both follows from the same noise.
     """
     both = np.block([[_walks(a, b, count).at_nodes for b in (2, 0)] for a in (2, 0)])
     twice, once = np.split(factor(both).T, 2, axis=1)
@@ -399,7 +414,7 @@ def _legendre(abscissas: Floats, count: int) -> Floats:
 
 # ---------------------------------------------------------------------- position noise
 def position_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Correlated noise of a platform's position."""
+    """Yield an error for each process of correlated noise of a platform's position."""
     error = seen.error(name)
     key = error.key_of("random")
     for index, process in enumerate(error.random):
@@ -413,18 +428,18 @@ def residual_subject(name: str) -> Subject:
 
 
 def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Noise of a platform's log if the processor uses the fixes without smoothing; empty for any other path.
+    """Yield the noise of a platform's log if the processor uses its fixes without smoothing; nothing for other paths.
 
-    The residual about the smooth path is a process with the covariance and correlation time of that residual. White
-    fixes joined by straight lines are correlated over half an interval. The process spreads, and its lower orders are
-    those of noise.
+    The residual of the fixes about the smooth path is represented by a Gauss–Markov process with the covariance and
+    correlation time of the residual. White fixes joined by straight lines are correlated over half an interval. Like
+    any noise, the process displaces and defocuses the image by its low orders, and spreads power by its higher ones.
 
-    The grid to which the fixes are rounded causes an error that is uniform over a step, with the variance q²/12 along
-    each coordinate. If the platform crosses many steps, the rounding differs from fix to fix. It is then part of the
-    residual, and hardly displaces the image. If the platform crosses no step, the rounding is one constant error over
-    the aperture, which the residual does not contain. The log does not show which of the two holds, and in
-    intermediate cases any fraction of the variance may be constant. The whole variance is therefore taken as
-    constant, in addition to the residual.
+    The fixes are rounded to a grid with the step q. The rounding error is uniformly distributed over a step and has
+    the variance q²/12 along each coordinate. If the platform crosses many steps within the aperture, the rounding
+    differs from fix to fix. It is then part of the residual, and hardly displaces the image. If the platform crosses
+    no step, the rounding is one constant error over the aperture, which the residual does not contain. The log does
+    not show which of the two applies, and any fraction of the variance may be constant. The whole variance is
+    therefore treated as constant, in addition to the residual.
     """
     path: FlownPath | None = getattr(seen.mission.platforms, name).path
     log = None if path is None else path.log_noise
@@ -437,9 +452,10 @@ def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, PerCase]]:
-    """Noise of a log, for the residual and for the rounding to a grid.
+    """Sigmas, axes and correlation time of the two kinds of noise of a log, by name.
 
-    Each entry has sigmas (3, cases) [m], axes (3, 3, cases) and correlation time [s].
+    `residual` is the noise of the fixes, and `grid` their rounding to a grid. Each has sigmas (3, cases) [m], axes
+    (3, 3, cases) and a correlation time [s].
     """
     residual, grid = (
         np.moveaxis(
@@ -461,7 +477,10 @@ def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, Per
 
 
 def common_noise(seen: SensorCases) -> Iterator[RandomError]:
-    """Correlated noise shared by both platforms. Along each axis of its frame the effects on both legs add."""
+    """Yield an error for each process of correlated noise that both platforms share.
+
+    The effects of an axis of the frame on both legs add with their signs. Different axes are independent.
+    """
     error = seen.mission.common_motion_error
     for index, process in enumerate(() if error is None else error.random):
         axes = {name: seen.axes(name, error.frame) for name in PLATFORMS} if error is not None else {}
@@ -469,7 +488,10 @@ def common_noise(seen: SensorCases) -> Iterator[RandomError]:
 
 
 class _Process(NamedTuple):
-    """A Gauss–Markov process: its subject, sigmas [m] and correlation time [s]. Numbers may be arrays (cases,)."""
+    """A Gauss–Markov process: its subject, sigmas along three axes [m] and correlation time [s].
+
+    Numbers may be arrays (cases,). `spreads` tells whether part of the process spreads power.
+    """
 
     subject: Subject
     sigma: Sequence[PerCase]
@@ -482,9 +504,10 @@ class _Process(NamedTuple):
 
 
 def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], path: KeyPath) -> RandomError:
-    """Error of a Gauss–Markov process that moves one or both platforms.
+    """Create the error of a Gauss–Markov process that moves one or both platforms.
 
-    `axes` gives the axes of the process for each platform that it moves, (axes, 3, cases).
+    `axes` maps the name of each platform that the process moves to the axes of the process, (axes, 3, cases). `path`
+    is the key path of the process in the mission file.
     """
     k = 2 * math.pi / seen.mission.radar.wavelength
     largest, sizes = parts_of_largest(seen.vector(process.sigma))

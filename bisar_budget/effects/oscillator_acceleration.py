@@ -1,16 +1,16 @@
-"""Oscillators under acceleration: phase errors by vibration and by turns of the platform.
+"""Oscillators under acceleration: phase errors due to vibration and to turns of the platform.
 
-An acceleration a changes the fractional frequency of an oscillator by y = Γ·a, where Γ is its acceleration
-sensitivity. Γ is a vector of unknown direction. The worst direction counts, so Γ·a is the product of the lengths of
-both.
+An acceleration a changes the fractional frequency of an oscillator by Γ·a, where Γ is the oscillator's acceleration
+sensitivity. Γ is a vector of unknown direction. The worst direction is assumed, so Γ·a is the product of the lengths
+of both vectors.
 
-- A vibration with acceleration amplitude a at frequency f causes a tone with the peak phase f₀·Γ·a/f. It is a quarter
-  cycle away from the motion itself, so the powers of the two add.
+- A vibration with acceleration amplitude a at frequency f causes a tone with the peak phase f₀·Γ·a/f. The tone is a
+  quarter cycle out of phase with the phase due to the motion itself, so the powers of the two add.
 - Random vibration causes the phase spectrum S_φ = (Γ·f₀/f)²·S_a (Filler 1988).
-- In a turn, the specific force changes by the acceleration of the path, compared with the level flight in which a
-  clock is set. The range error is c·∫Γ·a dτ = c·Γ·(v(τ) − v(0)). A constant acceleration is a frequency offset, which
-  displaces the image; a change of the acceleration within the aperture defocuses it. The root-sum-square of the
-  effects along three axes is the largest effect that a Γ of that length has in any direction. A platform in free fall
+- A clock is assumed to be set in level flight. In a turn, the specific force changes by the acceleration of the path.
+  The range error is c·∫Γ·a dτ = c·Γ·(v(τ) − v(0)). A constant acceleration causes a frequency offset, which displaces
+  the image; a change of the acceleration within the aperture defocuses it. The root-sum-square of the effects of a Γ
+  along each of three axes is the largest effect that a Γ of that length has in any direction. A platform in free fall
   has no specific force.
 """
 
@@ -34,8 +34,8 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.vibrations import FeltVibration, Vibration
 
 PHASE_LAW = (1.0, 2.0)  # S_φ = (Γ·f₀)²·S_a/f²
-_FELT_ACCELERATION_MPS2 = 1e-6  # m/s²; a smaller acceleration of a path counts as none
-_EXCHANGE_START_COUNT = 8  # beginnings of the exchanges within an interval, over which the rest of a turn is averaged
+_FELT_ACCELERATION_MPS2 = 1e-6  # m/s²; smaller accelerations of a path are ignored
+_EXCHANGE_START_COUNT = 8  # start times of the exchanges, over which the effect of a turn is averaged
 
 
 class Felt(NamedTuple):
@@ -63,7 +63,8 @@ def felt(mission: Mission, name: str) -> Felt | None:
 def lacks_a_spectrum(mission: Mission, name: str) -> PerCaseFlag:
     """Cases in which a wideband vibration without a spectrum acts on an oscillator.
 
-    Its phase f₀Γ·4π²·f·σ/g cannot be computed, because the frequency f is unknown.
+    The rms phase of the oscillator, f₀·Γ·4π²·f·σ for an rms displacement σ, cannot be computed, because the frequency
+    f is unknown.
     """
     felt_vibration = felt(mission, name)
     if (
@@ -77,7 +78,10 @@ def lacks_a_spectrum(mission: Mission, name: str) -> PerCaseFlag:
 
 
 def is_unshaken(mission: Mission, name: str) -> bool:
-    """Whether an oscillator is sensitive to acceleration, but the file states neither vibration nor turn for it."""
+    """Whether an oscillator is sensitive to acceleration, but the file states no vibration or turn that acts on it.
+
+    False for the transmitter's oscillator with a direct path, because its phase drops out of the data.
+    """
     felt_vibration = felt(mission, name)
     is_heard = name == "receiver" or not mission.has_direct_path
     if (
@@ -98,9 +102,9 @@ class AcceleratedTone(NamedTuple):
     [rad/(s²/m)] `left` is the tone that the synchronization leaves, and `echo` is the share of `left` that makes
     echoes.
 
-    `in_quadrature` is the row of the platform's vibration that causes the tone. The tone is a quarter cycle away from
-    that vibration. It is None for a vibration along several axes, and for a vibration that the file states for the
-    oscillator alone.
+    `in_quadrature` is the id of the row of the platform's vibration that causes the tone. The tone is a quarter cycle
+    out of phase with that vibration. It is None for a vibration along several axes, and for a vibration that the file
+    states for the oscillator alone.
     """
 
     name: str
@@ -130,7 +134,7 @@ class AcceleratedTone(NamedTuple):
 
 
 def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[AcceleratedTone]:
-    """List the tones of oscillators that vibrate.
+    """List the tones that sinusoidal vibrations cause in the oscillators of the platforms.
 
     With a direct path as clock, only the receiver's tones count. They enter both the direct path and the echo.
     `geometry` holds many cases if numbers of the mission are arrays.
@@ -144,7 +148,7 @@ def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None
             remaining = left_of_tone(line.frequency, mission, geometry or mission.geometry)
             a = norm(line.acceleration) if isinstance(line.acceleration, tuple) else line.acceleration
             free = mission.radar.center_frequency * a / line.frequency
-            # Axes may vibrate in any phase: then a quarter of a turn is not certain.
+            # Several axes may vibrate in any phase, so the tone may have any phase relative to their echo.
             is_apart = felt_vibration.is_own or isinstance(line.amplitude, tuple)
             shared = None if is_apart else subject(name, "vibration", "sinusoidal", entry=index).id
             echo = remaining.echo(mission)
@@ -157,16 +161,16 @@ def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None
 
 
 def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Error of an oscillator under acceleration.
+    """Yield the error of an oscillator under acceleration; nothing if the file states no sensitivity.
 
-    It contains random vibration, tones below one cycle per aperture, and turns of the platform. Its unit is the unit
-    of the sensitivity. Faster tones have rows of their own.
+    The error includes the effects of random vibration, of tones below one cycle per aperture, and of turns of the
+    platform. Faster tones have rows of their own. The declared size is the sensitivity Γ. [s²/m]
     """
     felt_vibration = felt(seen.mission, name)
     if felt_vibration is None:
         return
     published, full = seen.of_parts(_vibrating(seen, name, felt_vibration))
-    # From direct path to echo a turn changes next to nothing.
+    # Within the short delay between direct path and echo, a turn hardly changes the phase.
     turn = None if seen.mission.has_direct_path else _turning(seen, name)
     if turn is not None:
         published, full = _together(published, turn[0]), _together(full, turn[1])
@@ -179,9 +183,9 @@ def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomErro
 
 
 def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
-    """Parts of the range error per unit of Γ that vibration causes. [m²/unit²]
+    """Mean squares of the parts of the range error that vibration causes, per squared unit of Γ. [m²/unit²]
 
-    They are the parts of the vibration spectrum and of slow tones in their worst phases.
+    They add the effects of the vibration spectrum and of slow tones, each tone in its worst phase.
     """
     mission, total = seen.mission, np.zeros((len(Parts._fields), seen.cases))
     if mission.has_direct_path and name == "transmitter":  # the transmitter's oscillator drops out
@@ -216,10 +220,12 @@ def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] 
 
 
 def turn_courses(state: PlatformState, moments: Floats, interval: PerCase | None = None) -> Floats:
-    """Time error per unit of Γ along each axis of the scene, v(τ) − v(0), (n, moments, …).
+    """Time error per unit of Γ along each axis of the scene, v(τ) − v(0), (3, moments, …). [s/(s²/m)]
 
-    With an `interval` of exchanges it is the remainder after synchronization. The exchanges may begin anywhere in
-    their interval. Each of several start times contributes an equal part of the mean square.
+    `moments` are slow times. [s] With an `interval` of exchanges [s] the result is the remainder after
+    synchronization. The first exchange may be at any time within an interval, so the remainders for several start
+    times are returned, (3 · start times, moments, …). They are scaled so that the sum of their squares is the mean
+    square over the start times.
     """
 
     def gained(tau: PerCase) -> Floats:
@@ -243,22 +249,22 @@ def turn_courses(state: PlatformState, moments: Floats, interval: PerCase | None
 
 
 def _falls(mission: Mission, state: PlatformState) -> PerCaseFlag:
-    """Whether a platform is in free fall.
+    """Whether a platform is in free fall, for one case or an array of cases.
 
-    Accelerometers then measure less than the acceleration of its path.
+    The criterion is that the specific force is smaller than the acceleration of the path.
     """
     return norm(specific_force(mission, state)) < norm(state.acceleration)
 
 
 def flies_a_turn(mission: Mission, name: str) -> bool:
-    """Whether a turn of its platform's path accelerates an oscillator in any case."""
+    """Whether a turn of a platform's path accelerates the platform's oscillator in at least one case."""
     state: PlatformState = getattr(mission.geometry, name)
     bends = not state.is_quadratic or norm(state.acceleration) > _FELT_ACCELERATION_MPS2
     return bool(np.any(bends & ~np.asarray(_falls(mission, state))))
 
 
 def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
-    """Combined effect of two independent errors that are proportional to the same unit."""
+    """Combined effect of two independent errors that have the same unit; their squares add."""
     quadratic, cubic, spread, east, north = (np.hypot(*both) for both in zip(first[:5], second[:5], strict=True))
     covariance = None
     if first.covariance is not None and second.covariance is not None:
@@ -268,7 +274,7 @@ def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
 
 
 def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
-    """Phase spectrum of an oscillator under random vibration, per unit of Γ. [rad²/Hz/unit²]
+    """Phase spectrum of an oscillator under random vibration, per squared unit of Γ. [rad²/Hz/unit²]
 
     Empty if no spectrum acts on the oscillator.
     """

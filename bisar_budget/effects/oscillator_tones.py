@@ -1,10 +1,10 @@
-"""Tones of oscillators: spurs, and the part of any tone that the synchronization leaves, by frequency.
+"""Tones of oscillators: spurs, and what remains of any tone after synchronization, as tones with frequencies.
 
 The exchanges of pulses, one every T_s, sample a tone at frequency f. Between the samples, the phase is interpolated
 linearly. The interpolated phase contains tones at f + m/T_s, whose amplitudes are sinc²((f + m/T_s)·T_s) of that of
-the original tone. When the interpolated phase is subtracted, 1 − sinc²(fT_s) of the amplitude remains
-at f (m = 0). The tones with m ≠ 0 are the frequencies to which the tone is folded. The phases of the folded tones
-depend on the unknown instant of the exchange within its interval. Derived here.
+the original tone. When the interpolated phase is subtracted, 1 − sinc²(fT_s) of the amplitude remains at f (m = 0).
+The tones with m ≠ 0 are the frequencies to which the tone is folded. The phases of the folded tones depend on the
+unknown instant of the exchange within its interval. Derived here.
 """
 
 import math
@@ -19,17 +19,17 @@ from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 
-_SEEN_AMPLITUDE_FRACTION = 0.01  # of a tone's amplitude; a smaller echo counts as none
+_SEEN_AMPLITUDE_FRACTION = 0.01  # fraction of a tone's amplitude; smaller echoes are ignored
 _NEIGHBOUR_RATE_COUNT = (
-    3  # rates around 0 Hz beyond which a tone is folded with less than a hundredth of its amplitude
+    3  # sampling rates on either side of 0 Hz; a tone folded farther away has less than 1 % of its amplitude
 )
 
 
 class LeftTone(NamedTuple):
-    """The tones that synchronization leaves of a tone of amplitude 1.
+    """The tones that remain of a tone of amplitude 1 after synchronization.
 
     `frequencies` has the tone's own frequency first, and then the frequencies to which it is folded. [Hz] `shares`
-    are the amplitudes, 0 for a frequency that does not occur.
+    are the amplitudes of the remaining tones; 0 for a frequency that does not occur.
     """
 
     frequencies: tuple[PerCase, ...]
@@ -41,9 +41,10 @@ class LeftTone(NamedTuple):
         return len(self.shares) > 1
 
     def echoes(self, aperture_time: PerCase) -> list[PerCase]:
-        """Amplitudes of the tones that make echoes, which are those with at least one cycle per aperture.
+        """Amplitudes of the remaining tones as far as they make echoes.
 
-        A tone that is not folded has its own amplitude at any frequency.
+        A folded tone below one cycle per aperture makes no echo, so its amplitude is 0. A tone that is not folded
+        keeps its amplitude at any frequency.
         """
         if not self.is_folded:
             return [self.shares[0]]
@@ -53,9 +54,9 @@ class LeftTone(NamedTuple):
         ]
 
     def echo(self, mission: Mission) -> PerCase:
-        """Amplitude of the largest echo.
+        """Amplitude of the remaining tone that makes the largest echo.
 
-        Without a PSLR requirement it is the root of the sum of the powers of all echoes.
+        Without a PSLR requirement the result is the root-sum-square of the amplitudes of all tones that make echoes.
         """
         echoes = self.echoes(mission.collection.aperture_time)
         if mission.requirements.pslr is None:
@@ -65,7 +66,7 @@ class LeftTone(NamedTuple):
         return largest
 
     def slowest_echo(self, aperture_time: PerCase) -> PerCase:
-        """Lowest frequency of an echo with at least 1 % of the amplitude. [Hz]
+        """Lowest frequency of the remaining tones that make an echo and have more than 1 % of the amplitude. [Hz]
 
         For a tone that is not folded it is the tone's own frequency.
         """
@@ -78,16 +79,16 @@ class LeftTone(NamedTuple):
         return slowest
 
     def place(self, aperture_time: PerCase) -> PerCase:
-        """Frequency of the largest echo. [Hz]"""
+        """Frequency of the remaining tone that makes the largest echo. [Hz]"""
         both = np.array(np.broadcast_arrays(*self.echoes(aperture_time), *self.frequencies))
         echoes, frequencies = np.split(both, 2)
         of_largest: PerCase = np.take_along_axis(frequencies, echoes.argmax(axis=0)[None], axis=0)[0]
         return of_largest
 
     def slow_parts(self, aperture_time: PerCase) -> Parts:
-        """Parts over the aperture of the tones below one cycle per aperture, each in its worst phase. [rad²]
+        """Squares of the parts over the aperture of all tones below one cycle per aperture, in worst phases. [rad²]
 
-        The folded tones of one tone are not independent, so their amplitudes add.
+        The tones that remain of one tone are not independent, so the amplitudes of their parts add.
         """
         total: Floats = np.zeros((5, *np.broadcast_shapes(*map(np.shape, (aperture_time, *self.frequencies)))))
         for frequency, share in zip(self.frequencies, self.shares, strict=True):
@@ -103,9 +104,10 @@ class LeftTone(NamedTuple):
 
 
 def left_of_tone(frequency: PerCase, mission: Mission, geometry: BistaticGeometry) -> LeftTone:
-    """Tones that the synchronization leaves of a tone of amplitude 1.
+    """Tones that remain of a tone of amplitude 1 at a frequency [Hz] after synchronization.
 
-    With a direct path, 2|sin(πfΔt)| of the receiver's tone remains, where Δt is the delay of the echo.
+    With a direct path, the receiver's tone remains with the amplitude 2|sin(πfΔt)|, where Δt is the delay of the echo
+    after the direct path.
     """
     sync = mission.synchronization
     if mission.has_direct_path:
@@ -124,10 +126,10 @@ def left_of_tone(frequency: PerCase, mission: Mission, geometry: BistaticGeometr
 
 
 class Spur(NamedTuple):
-    """Spur of an oscillator: platform, index of its entry, and frequency [Hz].
+    """Spur of an oscillator: platform, index of its entry in the file, and frequency [Hz].
 
-    `free` is the peak phase of a free oscillator at the radar's centre frequency. [rad] `left` is the tone that the
-    synchronization leaves, and `echo` is the share of `left` that makes echoes.
+    `free` is the peak phase at the radar's centre frequency without synchronization. [rad] `left` are the tones that
+    remain of a tone of amplitude 1 after synchronization. `echo` is the amplitude of those that make echoes.
     """
 
     name: str
@@ -148,7 +150,7 @@ class Spur(NamedTuple):
         return self.free * self.echo
 
     def slow_parts(self, aperture_time: PerCase) -> Parts | None:
-        """Parts over the aperture of the folded tones below one cycle per aperture. [rad²]
+        """Squares of the parts over the aperture of the folded tones below one cycle per aperture. [rad²]
 
         None if the synchronization does not fold the spur.
         """
@@ -169,7 +171,7 @@ def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list
         for index, (frequency, level) in enumerate(oscillator.spurs if oscillator is not None else ()):
             scale = mission.radar.center_frequency / oscillator.frequency
             remaining = left_of_tone(frequency, mission, geometry or mission.geometry)
-            # A sideband of a phase φ has the amplitude φ/2 of the carrier.
+            # A phase tone of peak phase φ makes sidebands of φ/2 times the carrier's amplitude.
             free = 2 * 10 ** (level / 20) * scale
             spurs.append(Spur(name, index, frequency, free, remaining, remaining.echo(mission)))
     return spurs

@@ -1,4 +1,4 @@
-"""Oscillators: phase noise by a mask, an Allan deviation or a power law, and random errors of clocks.
+"""Oscillators: phase noise stated by a mask, an Allan deviation or a power law, and random errors of clocks.
 
 Spectra are one-sided. A synchronization link removes a part of the noise and adds noise of its own, depending on how
 the clocks are synchronized.
@@ -23,15 +23,15 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import Points, SortedPoints
 from bisar_budget.phrases import NOTHING, Note
 
-DEFAULT_BANDWIDTH_HZ = 1e3  # Hz, upper end of noise for which the file states no end
-POOR_FIT_FRACTION = 0.2  # of an Allan deviation; a power law with a larger misfit does not describe it
+DEFAULT_BANDWIDTH_HZ = 1e3  # Hz, upper end of the noise spectrum if the file states none
+POOR_FIT_FRACTION = 0.2  # of an Allan deviation; with a larger misfit, the power law does not describe the oscillator
 _EXACT_FIT_FRACTION, _GOOD_FIT_OF_TERMS_FRACTION = (
     1e-6,
     0.01,
 )  # misfits of an Allan deviation: rounding, and a fit so good that no term is added
 _RANK_FRACTION = 1e-7  # of the largest singular value; smaller ones leave coefficients undetermined
-_BELOW_MASK_EXPONENT = 3.0  # flicker of frequency; by the first points' slope, a higher point could lower a phase
-COVERED_CYCLES = 0.1  # per aperture, down to which a mask should reach: slower noise is hardly in any order
+_BELOW_MASK_EXPONENT = 3.0  # flicker frequency noise; with the points' slope, a higher point could lower a phase
+COVERED_CYCLES = 0.1  # cycles per aperture down to which a mask should reach; slower noise hardly matters
 
 
 class Noise(NamedTuple):
@@ -44,8 +44,11 @@ class Noise(NamedTuple):
 
 
 def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
-    """One-sided phase spectrum of an oscillator, scaled by the oscillator's level. [rad²/Hz]"""
-    center_frequency *= 10 ** (oscillator.level / 20)  # the noise grows as its square
+    """One-sided phase spectrum of an oscillator at a centre frequency [Hz], scaled by its level. [rad²/Hz]
+
+    A power law that is fitted to an Allan deviation depends on the aperture time. [s]
+    """
+    center_frequency *= 10 ** (oscillator.level / 20)  # the noise grows as the square of the frequency
     if oscillator.phase_noise is not None:
         return _of_mask(oscillator, center_frequency, aperture_time)
     bandwidth = DEFAULT_BANDWIDTH_HZ if oscillator.bandwidth is None else oscillator.bandwidth
@@ -102,9 +105,9 @@ def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> t
 
 
 def allan_variances(tau: float, bandwidth: float) -> tuple[float, ...]:
-    """Allan variances at the averaging time `tau` for unit values of h₋₂, h₋₁, h₀, h₁ and h₂.
+    """Allan variances at the averaging time `tau` [s] for unit values of h₋₂, h₋₁, h₀, h₁ and h₂, (5,).
 
-    They are measured within `bandwidth`. [Hz]
+    `bandwidth` is the bandwidth of the measurement. [Hz]
     """
     return (
         2 * math.pi**2 / 3 * tau,
@@ -125,7 +128,8 @@ class Fit(NamedTuple):
 def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
     """Fit the coefficients h₋₂ … h₁ of a power law, none negative, to an Allan deviation.
 
-    It is a least-squares fit of relative variances, with as few terms as describe the points. Among sets of terms
+    `points` are pairs of averaging time [s] and Allan deviation. `bandwidth` is in Hz, and `aperture_time` in s. The
+    fit is a least-squares fit of relative variances, with as few terms as describe the points. Among sets of terms
     that describe the points equally well, the set with the largest quadratic phase over the aperture is used.
     """
     per_term = evaluators.power_law_parts(aperture_time)[0]
@@ -144,7 +148,7 @@ def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
 
 @lru_cache(maxsize=64)
 def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
-    """Fit every set of one term, of two terms and so on, without negative coefficients."""
+    """Fits of all sets of terms that have only positive coefficients, as one tuple for each number of terms."""
     # White and flicker phase noise have nearly the same Allan variance: the fifth term is left out.
     term_count = 4
     variances = np.array([allan_variances(tau, bandwidth)[:term_count] for tau, _ in points])
@@ -161,9 +165,10 @@ def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
 def _least_squares(relative: Floats, terms: Sequence[int]) -> list[float] | None:
     """Coefficients of the given terms in the least-squares fit of the relative variances to 1.
 
-    `relative` (points, terms) are the variances of all terms, relative to the stated variances. The result has the
-    coefficients of all terms, 0 for those that are not given. None if a coefficient is not positive or not unique, or
-    if a variance is not positive, as may happen for a narrow band.
+    `relative` (points, terms) are the variances due to unit coefficients of all terms, divided by the stated
+    variances. `terms` are the indices of the terms of the fit. The result has the coefficients of all terms, 0 for
+    those outside the fit. None if a coefficient is not positive or not unique, or if a variance is not positive, as
+    may happen for a narrow band.
     """
     columns = relative[:, terms]
     if (columns <= 0).any():
@@ -179,7 +184,7 @@ def _least_squares(relative: Floats, terms: Sequence[int]) -> list[float] | None
 
 
 def _misfit(relative: Floats, law: Sequence[float]) -> float:
-    """Largest misfit of the deviations of a power law, as a fraction of the stated deviations."""
+    """Largest misfit of the Allan deviations of a power law, as a fraction of the stated deviations."""
     return max(float(np.abs(np.sqrt(relative @ law) - 1).max()), _EXACT_FIT_FRACTION)
 
 
@@ -187,7 +192,7 @@ def _misfit(relative: Floats, law: Sequence[float]) -> float:
 def clocks_without_oscillator(mission: Mission) -> tuple[str, ...]:
     """Platforms whose clocks run free after they were set, but whose oscillators the file does not state.
 
-    The drift of such a clock is unknown, so the location budget lacks one or both of its clock contributions.
+    The random drift of such a clock is unknown, so its contribution is missing from the location budget.
     """
     sync = mission.synchronization
     if sync is None or not sync.is_holdover:
@@ -196,10 +201,10 @@ def clocks_without_oscillator(mission: Mission) -> tuple[str, ...]:
 
 
 def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Random error of a platform's oscillator: phase noise, and spurs folded below one cycle per aperture.
+    """Yield the random error of a platform's oscillator; nothing if the file states no oscillator.
 
-    Only the noise that the synchronization of the clocks leaves in the data counts. Without a stated oscillator
-    nothing is yielded.
+    It consists of phase noise and of spurs that synchronization folds below one cycle per aperture. Only the noise
+    that remains in the data after the synchronization of the clocks is included.
     """
     mission = seen.mission
     oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
@@ -224,7 +229,7 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: PerCase) -> RandomEffect | None:
-    """Effect of the assumed noise below the first point of a mask; None if that noise is negligible."""
+    """Effect, in the full model, of the assumed noise below the first point of a mask; None if it is negligible."""
     mask = oscillator.phase_noise
     if mask is None or np.all(mask[0][0] * seen.aperture_time <= COVERED_CYCLES):
         return None
@@ -248,17 +253,17 @@ def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Booleans:
 
 
 def states_both_terms(mission: Mission) -> bool:
-    """Whether the file states both clock terms, which then replace those of free oscillators."""
+    """Whether the file states the constant and the linear clock term, which replace those of free oscillators."""
     timing = mission.timing_error
     return not mission.has_direct_path and timing.constant is not None and timing.linear is not None
 
 
 def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:
-    """Effects, in both models, of a clock phase with the given parts [rad²].
+    """Effects, in both models, of a clock phase with the given parts of its noise and its slow tones. [rad²]
 
-    Orders 0 and 1 are included where they are known. If the file states both terms of the clock, these terms replace
-    orders 0 and 1 of a free oscillator, but not orders 0 and 1 of its slow `tones`. If the line of sight turns,
-    orders 2 and 3 also displace the image, which reduces the defocus they cause.
+    Orders 0 and 1 are included where they are known. If the file states the constant and the linear term of the
+    clock, these terms replace orders 0 and 1 of the `noise`, but not those of the slow `tones`. If the line of sight
+    turns, orders 2 and 3 also displace the image, which reduces the defocus they cause.
     """
     k, is_stated = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), states_both_terms(seen.mission)
     quadratic, cubic, spread = np.sqrt(noise.rows[:3] + tones.rows[:3])
@@ -279,14 +284,15 @@ def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffe
 
 
 def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_below_mask: bool = False) -> Floats:
-    """Parts of an oscillator's phase that remain over the aperture, for a centre frequency of 1 Hz, (parts, cases).
+    """Parts of an oscillator's phase after synchronization, for a centre frequency of 1 Hz, (parts, cases). [rad²]
 
-    The parts grow as f₀². They are the parts of the whole spectrum or, with `is_below_mask`, of the spectrum below
-    the first point of a mask.
+    For a centre frequency f₀ they are f₀² times as large. They are the parts of the whole spectrum or, with
+    `is_below_mask`, of the spectrum below the first point of a mask.
 
-    The parts depend on how the clocks are synchronized. They are all of the noise for free clocks, the remaining
-    noise for exchanged pulses, and the noise since the setting for clocks that were set. For a receiver that uses the
-    direct path, they are the noise between direct path and echo.
+    The parts depend on how the clocks are synchronized. For free clocks, all of the noise remains. If the clocks
+    exchange pulses, the noise between the exchanges remains. If the clocks were set before the aperture, the noise
+    since the setting remains. If the receiver uses the direct path, the change of the receiver's noise between direct
+    path and echo remains, and nothing of the transmitter's.
     """
     sync, times = seen.mission.synchronization, seen.aperture_time
     remaining = np.zeros((len(Parts._fields), seen.cases))
@@ -306,7 +312,10 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_be
 def _left_of(
     pieces: Sequence[PowerLawPiece], interval: float | None, seen: SensorCases, cases_of_spectrum: Sequence[int]
 ) -> Parts:
-    """Parts of a spectrum that the synchronization leaves in some of the cases, (some,)."""
+    """Parts of a phase spectrum after synchronization, each (len(cases_of_spectrum),). [rad²]
+
+    `interval` is the interval of exchanged pulses [s]; None without exchanges.
+    """
     sync, aperture_time = seen.mission.synchronization, seen.aperture_time[cases_of_spectrum]
     if sync is None or interval is not None:
         return left_parts(pieces, aperture_time, interval)
@@ -316,14 +325,14 @@ def _left_of(
 
     if sync.is_holdover:
         return set_parts(pieces, aperture_time, of_cases(sync.age), of_cases(sync.averaging))
-    # The constant phase between direct path and echo moves nothing.
+    # A constant phase between direct path and echo does not displace the image.
     return heard_parts(pieces, aperture_time, of_cases(seen.geometry.echo_delay)).without_constant()
 
 
 def link_noise(seen: SensorCases) -> Iterator[RandomError]:
-    """Errors of the synchronization exchanges.
+    """Yield the random error of the synchronization exchanges; nothing if the file states none.
 
-    Each exchange has an independent error, and straight lines join the exchanges.
+    Each exchange has an independent error. Between exchanges, the error is interpolated linearly.
     """
     sync = seen.mission.synchronization
     if sync is None or sync.error is None:
@@ -335,7 +344,7 @@ def link_noise(seen: SensorCases) -> Iterator[RandomError]:
         for interval, cases in seen.alike(sync.interval):
             times, time_index = np.unique(seen.aperture_time[cases], return_inverse=True)
             parts[:, cases] = link_parts(times, interval).rows[:, time_index]
-    left = Parts(*parts).without_constant()  # a constant phase moves nothing
+    left = Parts(*parts).without_constant()  # a constant phase does not displace the image
     published, full = _of_clock(seen, left, Parts(*np.zeros_like(parts)))
     published, full = (effect._replace(spread=effect.spread / seen.factor) for effect in (published, full))
     row_subject = subject("clock", "synchronization")

@@ -1,8 +1,9 @@
 """Effects of random errors on the image, for one unit (1 sigma) of each error in each case.
 
 A random error has a sigma and no sign. Orders 0 and 1 of its range error displace the image according to Q⁻¹; orders
-from 2 on defocus it. The published model uses the line of sight of mid-aperture (`theory.random_errors`) and the Q of
-(25). The full model includes the turn of the line of sight, a direct path, and the phase that the displacement adds.
+2 and higher defocus it. The published model uses the line of sight at mid-aperture (`theory.random_errors`) and the
+matrix Q of (25). The full model includes the turn of the line of sight, a direct path, and the phase that the
+displacement adds.
 
 Numbers of a mission may be arrays (cases,). The geometry then has the same cases.
 """
@@ -39,10 +40,11 @@ from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges
 if TYPE_CHECKING:
     from bisar_budget.effects.oscillators import Noise
 
-# Nodes at which random errors are sampled: fewer tell too few orders of a process apart. More cost seconds, and
-# these follow nine circles; on a race track of 70 pieces 16 give every effect to 1e-3.
+# Numbers of nodes at which random errors are sampled. Fewer nodes distinguish too few orders of a process. More nodes
+# cost seconds. The largest number is enough for a path of nine circles. The smallest number gives every effect to
+# 1e-3 on a race track of 70 pieces.
 FEWEST_EFFECT_NODES, MOST_EFFECT_NODES = 16, 64
-_CANCELLED_SQUARE_FRACTION = VECTOR_ROUNDING_FRACTION * 1e-2  # the root of a smaller square is rounding
+_CANCELLED_SQUARE_FRACTION = VECTOR_ROUNDING_FRACTION * 1e-2  # of the size; a smaller square is rounding
 
 
 Value = TypeVar("Value")  # a number, an array (cases,), or a tuple of them
@@ -52,14 +54,14 @@ class RandomEffect(NamedTuple):
     """Effect of one unit of a random error, as one sigma: phases, displacement, and their covariance.
 
     `quadratic` and `cubic` are the phases at the aperture edge. [rad/unit] `spread` is the rms phase beyond the
-    cubic. [rad/unit] It is a mean power and includes no coverage factor. `east` and `north` are the sigmas of the
-    displacement [m/unit]. They are NaN if the displacement is unknown, as for a free oscillator.
+    cubic. [rad/unit] It stands for a mean power, so it never includes the coverage factor. `east` and `north` are the
+    sigmas of the displacement. [m/unit] They are NaN if the displacement is unknown, as for a free oscillator.
 
     `covariance` (4, 4, ...) is the covariance of quadratic phase, cubic phase, and displacement east and north, in
     the products of their units. It is None in the published model, which has only the sigmas. `hidden` is the
     quadratic phase equivalent to the loss that band and turn of the line of sight do not resolve, see
-    `ranges.exact_ranges`. [rad/unit] `rest` is the phase beyond the cubic, at one sigma, of an error that is no
-    noise, such as a bias. It spreads like the rest of any error of motion. [rad/unit]
+    `ranges.exact_ranges`. [rad/unit] `rest` is the rms phase beyond the cubic of an error that is not noise, such as
+    a bias, at one sigma. It spreads power like the phase beyond the cubic of any motion error. [rad/unit]
     """
 
     quadratic: Any
@@ -72,7 +74,7 @@ class RandomEffect(NamedTuple):
     rest: Any = 0.0
 
     def judged(self, gain: PerCase) -> PerCase:
-        """Phase that is compared with a limit raised by the gain of autofocus, see `Declared.judged`. [rad/unit]"""
+        """Phase for the comparison with a limit that includes autofocus gain, see `Declared.judged`. [rad/unit]"""
         phase: PerCase = np.hypot(self.quadratic, gain * self.hidden)
         return phase
 
@@ -106,12 +108,12 @@ class RandomEffect(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """Motion of a platform by one sigma of a random error.
+    """Motion of a platform due to one unit (1 sigma) of a random error.
 
-    Each combination of a direction in `ways` and a variation over the aperture in `courses` has an independent random
-    size of 1 sigma. `place` is the index of the platform. `ways` are (ways, 3, nodes or 1, cases) [m/unit]. `courses`
-    are (courses, nodes, cases or 1), at the nodes of `SensorCases.exact`. If an error has several `Moves`, the same
-    way and course of each have the same random size.
+    The motion is the sum of products of a direction from `ways`, a variation over the aperture from `courses`, and an
+    independent random number of variance 1 for each pair of both. `place` is the index of the platform. `ways` are
+    (ways, 3, nodes or 1, cases). [m/unit] `courses` are (courses, nodes, cases or 1), at the nodes of
+    `SensorCases.exact`. If an error has several `Moves`, the same pair of indices has the same random number in each.
     """
 
     place: int
@@ -125,9 +127,9 @@ class RandomError(NamedTuple):
     `declared` is the largest size of all axes, coverage factor included. The sizes of all axes are proportional to
     it. It is None if the file declares no size. The unit of an oscillator is `dB`, and its noise is declared as an
     amplitude factor of 1. `noise` is the spectrum of an oscillator, for a single case only. `spreads` is true for
-    noise, and false for an error that changes within the aperture by a few orders only.
+    noise, and false for an error whose variation over the aperture has only a few orders.
 
-    `counted_in` is the id of another row whose error already contains this effect, so this error counts nowhere else.
+    `counted_in` is the id of another row that already includes this effect; this error then enters no other sum.
     `moves` is the motion of platforms by one unit, used for the edge of a scene. It is empty for clocks and the air.
     `continued` is the effect of the assumed spectrum below the first point of an oscillator's mask, if the mask does
     not reach far enough down. `is_in_doubt` marks the cases in which the spectrum used for an oscillator differs from
@@ -154,7 +156,7 @@ class RandomError(NamedTuple):
 
     @property
     def owner(self) -> str:
-        """Owner of the share that the error counts against: transmitter, receiver or clock."""
+        """Owner of the budget share to which the error belongs: transmitter, receiver, clock or mission."""
         return self.subject.owner
 
     @property
@@ -187,7 +189,7 @@ class RandomError(NamedTuple):
         return False if self.declared is None else (self.declared > 0) & np.isnan(self.full.displacement)
 
     def effect(self, model: str) -> RandomEffect:
-        """Effect of one unit in a model."""
+        """Effect of one unit in the model with the given name, `full` or `published`."""
         return self.full if model == "full" else self.published
 
 
@@ -206,7 +208,7 @@ class SensorCases:
         return self.mission.scene.radius is not None
 
     def vector(self, values: Sequence[PerCase]) -> Floats:
-        """Vector with three components for each case, (3, cases)."""
+        """Convert three components, each a number or (cases,), to one array (3, cases)."""
         numbers = np.empty((3, self.cases))
         for row, value in zip(numbers, values, strict=True):
             row[:] = value
@@ -223,7 +225,10 @@ class SensorCases:
         return np.array([self.vector(axis) for axis in path.frame(frame or self.error(name).frame)])
 
     def along(self, name: str, directions: Floats) -> Floats:
-        """Root-sum-square of the projections of directions (axes, 3, cases) on the mid-aperture line of sight."""
+        """Root-sum-square of the projections of directions on the mid-aperture line of sight, (cases,).
+
+        `directions` are (axes, 3, cases). The result has their unit.
+        """
         look = self.vector(getattr(self.geometry, name).look)
         return np.asarray(np.sqrt(np.square((directions * look).sum(axis=1)).sum(axis=0)))
 
@@ -245,16 +250,16 @@ class SensorCases:
         return published_planes(self.geometry)[0]
 
     def of_courses(self, courses: Floats, at_mid_aperture: Floats) -> tuple["RandomEffect", "RandomEffect"]:
-        """Effects, in both models, of independent range errors that are constant in size, for 1 sigma of a unit.
+        """Effects, in both models, of independent range errors with a known variation over the aperture.
 
-        Each range error varies over the aperture in a known way, and its size is random.
+        The size of each range error is random, with a sigma of one unit.
 
         Parameters
         ----------
         courses : (errors, nodes, cases)
             Range errors along the turning line of sight, as the data contain them. [m/unit]
         at_mid_aperture : (errors, nodes, cases)
-            Range errors along the fixed line of sight of mid-aperture, for the published model. [m/unit]
+            Range errors along the fixed line of sight at mid-aperture, for the published model. [m/unit]
 
         Returns
         -------
@@ -266,7 +271,7 @@ class SensorCases:
             np.abs(orders) > VECTOR_ROUNDING_FRACTION * np.abs(at_mid_aperture).max(axis=1), orders, 0.0
         )
         quadratic, cubic = np.sqrt(np.square(orders[2:]).sum(axis=1))
-        # Both orders of a course are one error: unlike the orders of noise they add with their signs.
+        # The constant and linear order of one error are fully correlated, unlike those of noise: add with signs.
         (a, b), (c, d) = self.plane.adjugate
         scale = 1 / np.where(self.plane.is_singular, math.nan, self.plane.determinant)
         constant, linear = orders[0], orders[1] / self.exact.half
@@ -275,7 +280,7 @@ class SensorCases:
         effects = effects_of_courses(self.exact, self.weights, courses)
         (qpe, edge, east, north, hidden), covariance = sigmas(effects.covariance, effects.sizes)
         beyond_cubic, is_turned = k * np.sqrt(effects.left), self.exact.is_turned
-        # Where a line of sight turns far, the phase of equal loss holds the whole rest of an error of motion.
+        # If a line of sight turns widely, orders lose their meaning: count all beyond the cubic as hidden phase.
         hidden = np.hypot(hidden, np.where(is_turned, QUADRATIC_OF_VARIANCE * beyond_cubic, 0.0))
         beyond_cubic = np.where(is_turned, 0.0, beyond_cubic) / self.factor
         return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance, hidden, beyond_cubic)
@@ -308,28 +313,31 @@ class SensorCases:
 
     def _of_noise(self, effects: RangeEffects) -> RandomEffect:
         (quadratic, cubic, east, north, hidden), covariance = sigmas(effects.covariance, effects.sizes)
-        # The spread is a mean power, which has no coverage factor.
+        # The declared size includes the coverage factor, which does not apply to the spread, a mean power.
         spread = self.exact.k * np.sqrt(np.maximum(effects.left, 0.0)) / self.factor
         return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
     def of_motion(self, platform_index: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
         """Effects, in both models, of independent position errors of a platform.
 
-        `moved` is (errors, 3, nodes, cases). [m/unit]
+        `moved` are the position errors at the nodes, (errors, 3, nodes, cases). [m/unit]
         """
         look = self.vector(self.geometry.both[platform_index].look)
         return self.of_courses(self.range_errors(platform_index, moved), -np.einsum("ac,eanc->enc", look, moved))
 
     def range_errors(self, platform_index: int, moved: Floats) -> Floats:
-        """Range errors at the nodes for small position errors of a platform, (errors, 3, nodes or 1, cases). [m]"""
+        """Range errors at the nodes caused by small position errors of a platform, (errors, nodes, cases). [m]
+
+        `moved` are the position errors, (errors, 3, nodes or 1, cases). [m]
+        """
         x, y, z = np.moveaxis(moved, 1, 0)
         return self.exact.along(platform_index, (x, y, z))
 
     def moved(self, constant: PerCase, linear: PerCase, both: PerCase = 0.0) -> tuple[PerCase, PerCase]:
         """Sigmas of the displacement east and north according to (25). [m]
 
-        `constant` and `linear` are the mean squares of these two parts of the range error at the aperture edge.
-        `both` is their mean product. [m²]
+        `constant` and `linear` are the mean squares of the constant and the linear part of the range error at the
+        aperture edge. [m²] `both` is the mean product of the two parts. [m²]
         """
         half = self.aperture_time / 2
         slope, product = linear / half**2, 2 * both / half
@@ -342,18 +350,18 @@ class SensorCases:
 
     @cached_property
     def orders(self) -> Floats:
-        """Legendre orders 0 to 3 at the nodes, scaled to their leading term at the aperture edge, (nodes, 4).
+        """Legendre orders 0 to 3 at the nodes, (nodes, 4), scaled as in `orders_at`.
 
-        The scale is that of `LEGENDRE_LEADING`.
+        The leading term of each order has the size 1 at the aperture edge.
         """
         return orders_at(self.exact.sampling.places)
 
     def of_orders(self, covariance: Floats, along: PerCase = 1.0) -> tuple[Sequence[Floats], Floats]:
-        """Sigmas and covariance of phases and displacement, as in `sigmas`, by orders 0 to 3 of range errors.
+        """Sigmas and covariance of the effects of errors with given orders 0 to 3, as returned by `sigmas`.
 
         `covariance` (4, 4, ...) is the covariance of the orders of each independent error at the aperture edge. [m²]
-        `along` (errors, nodes, cases) is the range change per metre of the error. Higher orders defocus and displace
-        only by the second order of a turning line of sight.
+        `along` (errors, nodes, cases) is the range change per metre of the error. Higher orders are left out: they
+        defocus and displace the image only to second order in the turn of the line of sight.
         """
         covariance_of_cases = covariance if covariance.ndim == 3 else covariance[..., None]
         covariance_of_cases = np.broadcast_to(covariance_of_cases, (*covariance_of_cases.shape[:2], self.cases))
@@ -364,21 +372,21 @@ class SensorCases:
         return sigmas(total, np.einsum("ffc->fc", total))
 
     def courses(self, covariance: Floats) -> Floats:
-        """Independent variations over the aperture that together have a given covariance of orders 0 to 3.
+        """Independent variations over the aperture whose sum has a given covariance of orders 0 to 3.
 
-        `covariance` is (4, 4, ...). The result is (4, nodes, ...).
+        `covariance` is (4, 4, ...). The result is (4, nodes, ...), in the square root of its unit.
         """
         of_orders = factor(np.moveaxis(covariance.reshape(4, 4, -1), 2, 0))
         return np.asarray(np.einsum("no,cof->fnc", self.orders, of_orders))
 
     def of_parts(self, noise: Parts, along: PerCase = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
-        """Effects, in both models, of an error whose variation over the aperture has the given parts. [m²]
+        """Effects, in both models, of an error with given mean squares of its parts over the aperture.
 
-        `along` (nodes, cases) is the range error in the data per metre of the error. Orders 0 to 3 defocus and
-        displace, and the part beyond them spreads. The result is accurate to 5 % and 0.5 dB for a line of sight that
-        turns by up to 1 rad. Over a full circle it has the same accuracy, with two exceptions: for noise as steep as
-        f⁻⁴ the spread is wrong by 1 dB, and the location error of free clocks is wrong by 8 %
-        (`tests/effects/test_long_noise.py`).
+        `noise` are the mean squares. [m²] `along` (nodes, cases) is the range error in the data per metre of the
+        error. Orders 0 to 3 displace and defocus the image, and the part beyond them spreads power. The result is
+        accurate to 5 % and 0.5 dB for a line of sight that turns by up to 1 rad. Over a full circle it has the same
+        accuracy, with two exceptions: for noise as steep as f⁻⁴ the spread is wrong by 1 dB, and the location error
+        of free clocks is wrong by 8 % (`tests/effects/test_long_noise.py`).
         """
         k = 2 * math.pi / np.asarray(self.mission.radar.wavelength)
         quadratic, cubic, spread = (k * np.sqrt(mean_square) for mean_square in noise[:3])
@@ -389,9 +397,9 @@ class SensorCases:
         return published, RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
     def alike(self, value: Value) -> Iterator[tuple[Value, Indices]]:
-        """Group the cases that have the same numbers in a value.
+        """Group the cases for which all arrays in `value` have the same numbers.
 
-        Yields the value of each group in plain numbers, and the indices of its cases.
+        Yields, for each group, the value in plain numbers and the indices of the cases.
         """
         arrays = list(_arrays_in(value))
         if not arrays:
@@ -420,7 +428,7 @@ def _arrays_in(value: object) -> Iterator[Floats]:
 
 
 def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
-    """Copy a value, with plain numbers in place of its arrays."""
+    """Copy a value, replacing each array in it by the next of `numbers`."""
     if isinstance(value, tuple):
         values = [_with_numbers(value_part, numbers) for value_part in value]
         return value._make(values) if hasattr(value, "_make") else tuple(values)
@@ -428,7 +436,7 @@ def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
 
 
 def parts_of_largest(values: Floats) -> tuple[Floats, Floats]:
-    """Largest of the values (axes, cases), and the ratio of each value to it.
+    """Largest value over the axes, (cases,), and the ratio of each value to it, (axes, cases).
 
     The ratio is 1 where the largest value is 0.
     """

@@ -1,9 +1,9 @@
-"""List of every random error of sensors, clocks and the air that a mission names, in one case or in many.
+"""List of all random errors of sensors, clocks and the air that a mission names, for one case or many.
 
-The list also has the errors from elsewhere that the file states by their effect on the image: a cubic phase or a
-displacement. Neither has a sign. A displacement has no direction either: the squares of its east and north component
-are each half of its square. A quadratic phase, which has a sign, is listed in `sources`, and spread power in
-`analysis.spread`.
+The list also contains errors that were analysed elsewhere, and for which the file states only the effect on the
+image: a cubic phase or a displacement. Neither has a sign. A displacement has no direction either, so its east and
+north components each have half of its mean square. A stated quadratic phase has a sign and is listed in `sources`.
+Stated spread power is listed in `analysis.spread`.
 """
 
 import math
@@ -28,7 +28,7 @@ from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 
-# Effect of a unit by either model: of 1 rad, and of 1 m.
+# Effects, the same in both models, of a stated cubic phase of 1 rad and of a stated displacement of 1 m.
 _CUBIC_EFFECT = RandomEffect(0.0, 1.0, 0.0, 0.0, 0.0, np.diag([0.0, 1.0, 0.0, 0.0])[..., None])
 _DISPLACEMENT_EFFECT = RandomEffect(
     0.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5), np.diag([0.0, 0.0, 0.5, 0.5])[..., None]
@@ -40,8 +40,8 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
     """List the errors of sensors, clocks and the air that a mission names, in a fixed order.
 
     The list is empty for most missions. For a platform with an inertial sensor, all errors of the sensor are listed,
-    declared or not. For a platform with a lever arm, the attitude acting through the arm is listed. `geometry` is the
-    geometry of many cases. Without it all numbers are floats.
+    declared or not. For a platform with a lever arm, the effect of attitude errors through the arm is listed.
+    `geometry` is the geometry of many cases. Without it, the errors are those of a single case in plain floats.
     """
     seen = SensorCases(mission, geometry or mission.geometry, cases)
     errors = [error for name in PLATFORMS for error in vibration_spectrum(seen, name)]
@@ -59,7 +59,7 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
 
 
 def _stated_effects(mission: Mission) -> Iterator[RandomError]:
-    """Errors from elsewhere that the file states by their cubic phase or displacement."""
+    """Yield the errors for which the file states a cubic phase or a displacement determined elsewhere."""
     for index, stated in enumerate(mission.other_errors):
         for key, (unit, effect) in _UNIT_EFFECTS.items():
             size = getattr(stated, key)
@@ -71,7 +71,10 @@ def _stated_effects(mission: Mission) -> Iterator[RandomError]:
 
 
 def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomError:
-    """Return an error in plain numbers for one case, given that case's mission, with the noise of an oscillator."""
+    """Return an error of many cases in plain numbers for one case, including the noise of an oscillator.
+
+    `mission` is the mission of that case.
+    """
     published, full = error.published.of(case), error.full.of(case)
     noise = None
     if error.subject.kind == "oscillator" and not error.subject.axis:

@@ -6,12 +6,12 @@ or a displacement, is an integral of a weight times the range error. Its varianc
 the covariance of the range error.
 
 A process is resolved into as many Legendre orders as the nodes can distinguish. The weights are smooth and contain no
-higher orders, so the higher orders only spread. Of the resolved orders, the part beyond the cubic spreads too,
-together with the part that the displacement of the image adds along a turning line of sight.
+higher orders, so the higher orders of a process only spread power. The resolved orders beyond the cubic spread power
+as well. If the line of sight turns, the displacement of the image adds further parts beyond the cubic.
 
-A Gauss–Markov process has variance 1 and correlation exp(−|t|/τ_c) = 1 + (exp(−|t|/τ_c) − 1). The first term is a
-constant error. The second term is the departure from it. It goes to zero for a long correlation time without rounding
-error.
+A Gauss–Markov process has variance 1 and correlation exp(−|t|/τ_c) = 1 + (exp(−|t|/τ_c) − 1). The first term is the
+correlation of a constant error. The second term is called the departure. It is computed on its own, so that it goes
+to zero without rounding error for a long correlation time.
 
 Derived here. Time series check it in `tests/effects/test_changing_air.py`; random draws and direct sums check it in
 `tests/effects/test_long_noise.py`.
@@ -27,7 +27,7 @@ from bisar_budget.image_plane import LEGENDRE_LEADING
 from bisar_budget.ranges.exact_ranges import ExactRanges
 
 _ORDER_COUNT = 4  # Legendre orders 0 to 3, which displace and defocus
-_LAG_OCTAVE_COUNT = 44  # octaves of lag: half an aperture over the shortest correlation time that a file can state
+_LAG_OCTAVE_COUNT = 44  # octaves of lag, enough for the shortest correlation time that a file can state
 _NODES_PER_OCTAVE = 20  # resolve the correlation within an octave of lags to 1e-10
 
 
@@ -35,8 +35,9 @@ class RangeEffects(NamedTuple):
     """Effects of random range errors.
 
     `covariance` (8, 8, cases) is the covariance of the effects, in the order of `effect_weights`. `left` (cases,) is
-    the mean square of the range error beyond the cubic. [m²] `sizes` (8, cases) are squares of sums of magnitudes. A
-    variance that is very small compared with them is a rounding error of terms that cancel.
+    the mean square of the range error beyond the cubic. [m²] `sizes` (8, cases) are the squares of the effects if all
+    terms of their sums added in magnitude. A variance that is very small compared with its size is the rounding error
+    of terms that cancel.
     """
 
     covariance: Floats
@@ -47,14 +48,14 @@ class RangeEffects(NamedTuple):
 def effect_weights(exact: ExactRanges) -> Floats:
     """Effects per metre of range error at each node, (8, nodes, cases).
 
-    The effects are quadratic and cubic phase [rad], displacement east and north [m], and four parts of the hidden
-    phase. [rad]
+    The effects are quadratic and cubic phase [rad/m], displacement east and north [m/m], and four parts of the hidden
+    phase. [rad/m]
     """
     return np.array((*exact.phase_weights, *exact.place_weights, *exact.hidden_weights))
 
 
 def effects_of_courses(exact: ExactRanges, weights: Floats, courses: Floats) -> RangeEffects:
-    """Effects of independent range errors that have a known variation over the aperture and a random size.
+    """Effects of independent range errors, each a known variation over the aperture times a random size.
 
     `courses` (errors, nodes, cases) are the range errors at 1 sigma. [m]
     """
@@ -67,7 +68,7 @@ def effects_of_courses(exact: ExactRanges, weights: Floats, courses: Floats) -> 
 
 
 def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, beyond: PerCase) -> RangeEffects:
-    """Effects of a random process of the range error.
+    """Effects of a range error that is a random process with a given covariance.
 
     Parameters
     ----------
@@ -97,14 +98,14 @@ def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, 
 def effects_of_gauss_markov(
     exact: ExactRanges, weights: Floats, courses: Floats, ratio: Floats, *, is_phase_advanced: bool
 ) -> RangeEffects:
-    """Effects of independent Gauss–Markov processes of the range error.
+    """Effects of range errors that are independent Gauss–Markov processes of variance 1.
 
     Parameters
     ----------
     exact, weights
         As for `effects_of_process`.
     courses : (errors, nodes, cases)
-        Range error per unit of each process. For a delay it is the range error of the group. [m]
+        Range error per unit of each process. For a delay it is the group delay. [m]
     ratio : (cases,)
         Half the aperture time divided by the correlation time.
     is_phase_advanced : bool
@@ -115,7 +116,7 @@ def effects_of_gauss_markov(
     departure = departure_at_nodes(len(exact.times), ratios)[..., ratio_index.ravel()]
     courses = courses + np.zeros_like(exact.times)
     covariance = np.einsum("enc,emc->nmc", courses, courses) * departure
-    # At lag 0 the departure is 0, so the power in the resolved orders is missing from the higher orders.
+    # The departure is 0 at lag 0, so its power in the higher orders is minus its power in the resolved orders.
     power, mean = exact.fit[0] @ np.square(courses).sum(axis=0), exact.fit[0]
     beyond = -power * np.einsum("n,nnc->c", mean, departure)
     if is_phase_advanced:
@@ -129,10 +130,10 @@ def effects_of_gauss_markov(
 
 
 def departure_at_nodes(count: int, ratios: Floats) -> Floats:
-    """The correlation exp(−|t|/τ_c) − 1 between nodes, in the Legendre orders that the nodes can distinguish.
+    """Departure exp(−|t|/τ_c) − 1 between nodes, in the Legendre orders that the nodes can distinguish.
 
-    The correlation has a kink at lag 0, which a plain evaluation at the nodes would miss. Smooth weights contain no
-    higher orders than these.
+    The departure has a kink at lag 0, which its plain values at the nodes would not resolve. Therefore it is first
+    integrated against Legendre polynomials. Higher orders are not needed, because smooth weights do not contain them.
 
     Parameters
     ----------
@@ -155,10 +156,11 @@ def departure_at_nodes(count: int, ratios: Floats) -> Floats:
 
 @cache
 def _lagged(count: int) -> tuple[Floats, Floats]:
-    """Lags u from 0 to 2, in half apertures, and the quadrature weights times ∫P_m(s)·P_n(s + u) ds at each lag.
+    """Lags u from 0 to 2, (lags,), and weighted integrals of products of Legendre polynomials, (lags, count, count).
 
-    The integrals are added for both signs of the lag. Each octave of lags has the same number of nodes. They
-    therefore become denser towards 0, and resolve correlation times of any length.
+    The lags are in units of half the aperture time. The integrals are ∫P_m(s)·P_n(s + u) ds, added for both signs of
+    the lag, and multiplied by the quadrature weight of the lag. Each octave of lags has the same number of nodes. The
+    nodes therefore become denser towards 0, and resolve correlation times of any length.
     """
     x, w = np.polynomial.legendre.leggauss(_NODES_PER_OCTAVE)
     edges = np.concatenate(([0.0], 2.0 ** np.arange(1 - _LAG_OCTAVE_COUNT, 2)))

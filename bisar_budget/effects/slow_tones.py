@@ -1,17 +1,17 @@
-"""Vibrations below three cycles per aperture: their phases by exact ranges, for the worst phase of the motion.
+"""Vibrations below three cycles per aperture: phase errors from exact ranges, for the worst phase of the motion.
 
 A vibration moves its platform by A·cos(2πfτ + ψ) along an axis, and its phase ψ is unknown. The effects are computed
 for values of ψ all around the circle, and the largest effect counts. The effects of a small vibration follow from
 those of a cosine and a sine. Where the second order matters, they follow from the image point of exact ranges. Since
-the line of sight turns, motion along the track also counts. The vibration also displaces the image, and this
+the line of sight turns, motion along the track also has an effect. The vibration also displaces the image, and this
 displacement adds phases.
 
-As a function of ψ, the squares of the resulting phases are a sum of harmonics; for a small vibration only the second
-harmonic occurs. A few values of ψ are therefore enough to find the largest square. The axes may vibrate in any phase,
-so their effects add.
+As a function of ψ, the square of each resulting phase is a sum of harmonics. For a small vibration it has only a
+constant and the second harmonic. A few values of ψ are therefore enough to find the largest square. The axes may
+vibrate in any phase, so their largest effects add.
 
-A vibration that the file states along the line of sight moves along the line of sight as it turns, and is entirely
-range error. Derived here. Exact ranges in 36 phases check it (`tests/effects/test_slow_tones.py`).
+A vibration that the file states along the line of sight follows the turn of the line of sight, and all of it is range
+error. Derived here. Exact ranges in 36 phases check it (`tests/effects/test_slow_tones.py`).
 """
 
 import math
@@ -38,21 +38,21 @@ from bisar_budget.ranges.exact_ranges import (
     followed,
 )
 
-TONE_PHASE_COUNT = 16  # phases in which exact ranges follow a large vibration
+TONE_PHASE_COUNT = 16  # values of the phase ψ for which the effects are computed
 TONE_PHASES_RAD = 2 * math.pi * np.arange(TONE_PHASE_COUNT) / TONE_PHASE_COUNT
 TURNED = np.stack(
     (np.cos(TONE_PHASES_RAD), np.sin(TONE_PHASES_RAD)), axis=1
-)  # weights of a cosine and a sine in each phase
-VALUES_PER_PHASE = 16  # values of the harmonics from each phase to the next
-MAX_LANE_COUNT = 1 << 12  # lanes in one search
+)  # weights of a cosine and a sine for each value of ψ
+VALUES_PER_PHASE = 16  # factor by which the squares are interpolated between values of ψ
+MAX_LANE_COUNT = 1 << 12  # pairs of case and value of ψ for which one call computes exact ranges
 
 
 @dataclass(frozen=True, eq=False)
 class TonePhases:
-    """Effects of a vibration along each axis, for phases of the vibration all around the circle.
+    """Effects of a vibration along each axis, for values of its phase ψ all around the circle.
 
     Each field is an array (axes, TONE_PHASE_COUNT, cases): quadratic and cubic phase at the aperture edge, hidden
-    phase, and rms beyond the cubic. [rad]
+    phase, and rms phase beyond the cubic. [rad]
     """
 
     quadratics: Floats
@@ -72,16 +72,19 @@ class TonePhases:
 
     @cached_property
     def cubic(self) -> Floats:
-        """Cubic phase for the worst phase of each axis, (cases,). [rad]"""
+        """Sum of the cubic phases of all axes, each at the worst phase ψ of its vibration, (cases,). [rad]"""
         return _worst(np.square(self.cubics))
 
     @cached_property
     def rest(self) -> Floats:
-        """Rms beyond the cubic for the worst phase of each axis, (cases,). [rad]"""
+        """Sum of the rms phases beyond the cubic of all axes, each at its worst phase ψ, (cases,). [rad]"""
         return _worst(np.square(self.rests))
 
     def judged(self, gain: PerCase) -> Floats:
-        """Phase compared with a limit raised by the gain of autofocus, see `Declared.judged`, (cases,). [rad]"""
+        """Worst phase for the comparison with a limit that includes autofocus gain, see `Declared.judged`. [rad]
+
+        The result is the sum over the axes, each at its worst phase ψ, (cases,).
+        """
         return _worst(np.square(self.quadratics) + np.square(gain * self.hiddens))
 
     def hidden(self, gain: PerCase) -> Floats:
@@ -93,8 +96,9 @@ class SlowTone(NamedTuple):
     """A declared vibration and its effects.
 
     `per_metre` is the effect per metre of range error, and `declared` the effect of the declared vibration.
-    `is_there` marks the cases in which it has fewer than three cycles per aperture. `hears_part` marks a vibration
-    along three axes or with a direct path, of which the range contains only a part.
+    `is_there` marks the cases in which the vibration has fewer than three cycles per aperture. `hears_part` is true
+    for a vibration that the file states along three axes, and for any vibration in a mission with a direct path,
+    because only a part of the motion is then range error.
     """
 
     subject: Subject
@@ -120,7 +124,7 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
             tone = _Tone(exact, platform_index, line.frequency)
             value = line.displacement
             hears_all = not (is_heard or isinstance(value, tuple))
-            if not (is_heard or isinstance(value, tuple)):  # the second order of its displacement is rounding
+            if not (is_heard or isinstance(value, tuple)):  # motion along the line of sight has no second order
                 of_axes = tone.of_range(value)[None]
             else:
                 x, y, z = (track / exact.ranges[platform_index] for track in exact.tracks[platform_index])
@@ -134,7 +138,10 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
 
 
 def slow_phases(mission: Mission, slow: Mapping[str, SlowTone], gain: PerCase) -> list[DeclaredPhase]:
-    """Phases of the vibrations below one cycle per aperture, which are combined with those of other errors."""
+    """Phases of the vibrations below one cycle per aperture, to be combined with the phases of other errors.
+
+    `slow` are the results of `slow_tones`. `gain` is the gain of autofocus.
+    """
     T, phases = mission.collection.aperture_time, []
     for row_id, tone in slow.items():
         line = getattr(mission.platforms, tone.subject.owner).motion_error.vibration.sinusoidal[
@@ -174,9 +181,9 @@ class _Tone:
     def of(self, way: Vectors, size: PerCase) -> Floats:
         """Effects of a motion of amplitude `size` [m] along the direction `way`, (4, TONE_PHASE_COUNT, cases). [rad]
 
-        Fields and shape are those of `of_range`. Each component of `way` is (cases,) or (nodes, cases). The effects
-        are linear in `size`, except in cases where the second order matters. Exact ranges give the effects in these
-        cases.
+        The rows are the fields of `TonePhases`. Each component of `way` is (cases,) or (nodes, cases). The effects
+        are linear in `size`, except in cases where the second order matters. For these cases they are computed from
+        exact ranges.
         """
         exact, cases = self.exact, self.exact.half.size
         small, size = (
@@ -197,10 +204,10 @@ class _Tone:
         return small
 
     def _of_large(self, way: Vectors, size: Floats, cases: Indices) -> Floats:
-        """Effects by exact ranges in some of the cases.
+        """Effects from exact ranges for the cases with the indices `cases`, (4, TONE_PHASE_COUNT, len(cases)). [rad]
 
-        If no ground point has the range history for a phase of the vibration, the phase of the whole motion replaces
-        each effect.
+        If no ground point has the range history for a phase ψ of the vibration, each effect is set to the
+        peak-to-peak phase of the motion, 2kA.
         """
         case, turned = np.repeat(cases, TONE_PHASE_COUNT), np.tile(TONE_PHASES_RAD, cases.size)
         angle = self.angle[:, case] if self.angle.shape[1] > 1 else self.angle
@@ -218,9 +225,10 @@ def _of_case(component: PerCase, case: Indices) -> PerCase:
 
 
 def _worst(squares: Floats) -> Floats:
-    """Sum over the axes of the root of the largest square around the circle, (cases,).
+    """Largest effect of each axis over all values of the phase ψ, summed over the axes, (cases,).
 
-    `squares` are (axes, TONE_PHASE_COUNT, cases).
+    `squares` (axes, TONE_PHASE_COUNT, cases) are the squares of the effects. They are interpolated between the values
+    of ψ.
     """
     steps = TONE_PHASE_COUNT * VALUES_PER_PHASE
     around = np.fft.irfft(np.fft.rfft(squares, axis=1), steps, axis=1) * VALUES_PER_PHASE

@@ -1,4 +1,4 @@
-"""List of every error a mission can have, in one case or in many.
+"""List of the signed errors that a mission can have, for one case or many. Random errors are in `random_errors`.
 
 A check lists all errors, including those that the file does not declare, because a designer wants to know their
 allowable sizes. A sweep lists only the declared errors, and the errors whose rows are requested.
@@ -46,9 +46,9 @@ _FULL_UNIT = FullEffect(east=0.0, north=0.0, qpe=1.0, cubic=0.0)
 def exact_ranges(
     mission: Mission, geometry: BistaticGeometry, count: int | None = None, cases: int = 1
 ) -> ExactRanges:
-    """Exact ranges of a mission's cases at their scene centres.
+    """Exact ranges from the platforms of a mission's cases to the scene centres.
 
-    `count` is the number of nodes; None: as many as the cases need.
+    `count` is the number of nodes. If it is None, as many nodes are used as the cases need.
     """
     T, is_heard = mission.collection.aperture_time, mission.has_direct_path
     count = count or int(nodes_for(geometry, T, has_direct_path=is_heard))
@@ -67,15 +67,16 @@ def distribution_of(mission: Mission, source: ErrorSource) -> str:
     return "bound"
 
 
-# The evaluators take and give numbers, or arrays of cases.
+# The evaluators accept and return numbers, or arrays of cases.
 _published_motion: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.published_motion
 
 
 class _Flown(NamedTuple):
-    """One unit of an error whose platforms are in free fall.
+    """Effect and motions of one unit of an error of platforms of which at least one is in free fall.
 
-    `full` is the effect per unit of a small error. `shifts` are the motions of both platforms at the nodes,
-    (nodes, cases). [m] `rates` are the velocities at mid-aperture of a position error in `ric`, otherwise None. [m/s]
+    `full` is the effect per unit of a small error. `shifts` are the position errors of both platforms at the nodes,
+    three components (nodes, cases) each. [m/unit] `rates` are the velocities of these position errors at mid-aperture
+    for a position error in the frame `ric`, otherwise None. [m/s/unit]
     """
 
     full: FullEffect
@@ -84,7 +85,10 @@ class _Flown(NamedTuple):
 
 
 class ErrorListing:
-    """List of the errors of a mission's cases, as the file states them. See `DeclaredErrors` for the parameters."""
+    """List of the signed errors of a mission's cases, along the axes in which the file states them.
+
+    `DeclaredErrors` describes the parameters.
+    """
 
     def __init__(
         self, mission: Mission, geometry: BistaticGeometry, exact: ExactRanges, shown: Container[str] | None = None
@@ -94,7 +98,11 @@ class ErrorListing:
         self._full_legs: dict[tuple[int, str], list[FullEffect]] = {}
 
     def listed(self) -> Iterator[ErrorSource]:
-        """Yield every position, velocity, acceleration, clock and other error, in the order of the contract."""
+        """Yield the errors in the order of the contract.
+
+        They are errors of position, velocity and acceleration, of the clocks, of both platforms in common, of time
+        tags, of registered kinds, of the terrain, and quadratic phases that the file states directly.
+        """
         for platform_index, name in enumerate(PLATFORMS):
             for kind, unit in MOTION_UNITS.items():
                 yield from self._of_motion(platform_index, name, kind, unit)
@@ -117,14 +125,18 @@ class ErrorListing:
         ]
 
     def published_legs(self, platform_index: int, kind: str) -> list[Effect]:
-        """Effects of one unit of a kind of error of one platform along x, y and z by Tables I and II."""
+        """Effects of one unit of a platform's error along x, y and z, according to Tables I and II.
+
+        `kind` is the kind of the error: position, velocity or acceleration.
+        """
         first = 3 * list(MOTION_UNITS).index(kind)
         return [Effect._make(row) for row in self._published[platform_index][first : first + 3]]
 
     def full_legs(self, platform_index: int, kind: str) -> list[FullEffect]:
-        """Effects of one unit of a kind of error of one platform along x, y and z by the full model.
+        """Effects of one unit of a platform's error along x, y and z, in the full model.
 
-        The motions are those of (22). `_flown` has the motions in free fall.
+        `kind` is the kind of the error: position, velocity or acceleration. The motion errors are the polynomials of
+        (22). For a platform in free fall, `_flown` gives the effects.
         """
         if (platform_index, kind) not in self._full_legs:
             along = np.stack([self.exact.along(platform_index, axis) for axis in _UNIT_VECTORS])
@@ -134,8 +146,9 @@ class ErrorListing:
 
     @cached_property
     def _motions(self) -> list[Any]:
-        """Motion of each platform by unit errors of its state, (3, 3, 3, nodes, cases).
+        """Motion of each platform in free fall due to unit errors of its state, (3, 3, 3, nodes, cases). [m/unit]
 
+        The axes are kind of error (position, velocity, acceleration), axis of the error, and component of the motion.
         None for a platform that is not in free fall.
         """
         exact = self.exact
@@ -148,11 +161,11 @@ class ErrorListing:
         return any(self._motions[platform_index] is not None for platform_index in platforms)
 
     def _flown(self, kind: str, errors: Sequence[Mapping[int, Vectors]], frame: str) -> list[_Flown]:
-        """Motions of errors of platforms of which at least one is in free fall, with their effects.
+        """Effects and motions of unit errors of platforms of which at least one is in free fall.
 
-        In free fall an error follows the dynamics of the orbit. In the frame `ric`, velocities are relative to the
-        stars: a position error without a velocity error does not rotate. In all other frames it rotates with the
-        Earth.
+        In free fall a motion error follows the dynamics of the orbit. Velocities in the frame `ric` are relative to
+        the stars, so the vector of a position error without a velocity error does not rotate relative to the stars.
+        In all other frames it rotates with the Earth.
 
         Parameters
         ----------
@@ -200,7 +213,7 @@ class ErrorListing:
         key = "covariance" if covariance is not None else error.key_of(kind)
         path: KeyPath = ("platforms", name, "motion_error", key)
         notes, evidence = override_notes(name, error.overridden, kind), error.evidence(kind)
-        # Where the file states an error along other axes, its scene axes are listed only if all rows are.
+        # If the errors are stated in another frame, rows along scene axes are listed only if all or these are shown.
         listed_axes = [
             axis
             for axis, (row_subject, *_) in enumerate(scene_rows)
@@ -261,15 +274,15 @@ class ErrorListing:
             )
 
     def _of_clock(self) -> Iterator[ErrorSource]:
-        """Errors of the clocks: terms of the clock error, errors left by setting the clocks, and aging.
+        """Yield the errors of the clocks: terms of the clock error, errors left by setting the clocks, and aging.
 
-        A direct path removes the terms of the clock error.
+        With a direct path, the terms of the clock error have no effect in the full model.
         """
         sync, is_heard = self.mission.synchronization, not self.mission.has_direct_path
         is_set = sync is not None and sync.is_holdover
         for power, (term, unit) in enumerate(CLOCK_UNITS.items()):
             value, row_subject = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
-            if self._is_listed(row_subject, value) and not (is_set and power < 2):  # setting states these
+            if self._is_listed(row_subject, value) and not (is_set and power < 2):  # `_of_setting` lists these
                 terms = tuple(float(power == order) for order in range(4))
                 no_limit = (
                     phrases.note("no-quadratic-term-of-clock", term=term)
@@ -295,9 +308,10 @@ class ErrorListing:
         evidence: str | None = None,
         is_heard: bool = True,
     ) -> ErrorSource:
-        """Clock error whose unit has the coefficients t̃₀ … t̃₃ given by `terms`.
+        """Create a clock error, one unit of which is t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³ with the coefficients `terms`.
 
-        In the full model the error has no effect unless `is_heard`. The published model always includes it.
+        `is_heard` tells whether the data contain the error. If not, it has no effect in the full model. The published
+        model always includes it.
         """
         clock = terms if is_heard else (0.0,) * 4
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
@@ -320,7 +334,7 @@ class ErrorListing:
         )
 
     def _of_setting(self) -> Iterator[ErrorSource]:
-        """Time and frequency errors that remain after the clocks are set.
+        """Yield the time and frequency errors that remain after the clocks are set.
 
         In holdover they are listed even if they are not declared.
         """
@@ -349,9 +363,9 @@ class ErrorListing:
 
     @property
     def _delay_of_the_echo(self) -> tuple[PerCase, ...]:
-        """Polynomial coefficients of the delay of the echo after the direct path. [s]
+        """Coefficients of a cubic polynomial in slow time: the delay of the echo after the direct path in seconds.
 
-        A frequency error of the clock causes an error in the measurement of this delay.
+        A clock with a frequency error measures this delay with a proportional error.
         """
         exact = self.exact
         seconds = (sum(exact.ranges) - exact.baselines) / SPEED_OF_LIGHT_MPS
@@ -362,10 +376,10 @@ class ErrorListing:
         )
 
     def _of_aging(self, name: str) -> Iterator[ErrorSource]:
-        """Error by a frequency drift D of an oscillator since the clocks were set: a time error of D·(H + τ)²/2.
+        """Yield the error due to a frequency drift D [1/s] of an oscillator: a time error of D·(H + τ)²/2. [s]
 
-        H is the age of the setting. Without an age, only the quadratic term is known, and the location is not judged.
-        A synchronization link removes all of the drift.
+        H is the time from the setting of the clocks to mid-aperture. Without an age, only the quadratic term is
+        known, and the location is not judged. A synchronization link removes all of the drift.
         """
         oscillator, sync = getattr(self.mission.platforms, name).oscillator, self.mission.synchronization
         if oscillator is None:
@@ -394,12 +408,12 @@ class ErrorListing:
         )
 
     def _of_both_platforms(self) -> Iterator[ErrorSource]:
-        """Errors that both platforms share. The effects of both legs add with their signs.
+        """Yield the errors that both platforms share.
 
-        A bias of one GNSS service moves both measured paths by the same vector along the axes of the scene. Along the
-        axes of another frame it moves each path by the same components in the axes of that path. The range error is
-        linear in the errors, and so are Table I and the full model. The common effect is therefore the sum of the
-        effects of both platforms.
+        An error along an axis of the scene, such as a bias of one GNSS service, moves both measured paths by the same
+        vector. An error along an axis of another frame moves each path along that axis of its own frame. The range
+        error is linear in the errors, and so are Table I and the full model. The common effect is therefore the sum
+        of the effects of both platforms, with their signs.
         """
         error = self.mission.common_motion_error
         if error is None:
@@ -424,8 +438,8 @@ class ErrorListing:
                     full_legs = [self.full_legs(platform_index, kind) for platform_index in (0, 1)]
                     full = self._of_both(full_legs, axis, None if in_scene else ways)
                     if kind == "position" and name in ("x", "y"):
-                        # A horizontal shift of both platforms is a shift of the scene: x̂ is the error itself, and β̃ₙ
-                        # and ½s̈·x̂ cancel. The rest of a sum of rounded numbers would give a limit where none exists.
+                        # A horizontal shift of both platforms shifts the image by the same vector x̂. The phases due
+                        # to the error and to x̂ cancel. Rounding errors would give a limit that does not exist.
                         full = full._replace(qpe=0.0 * full.qpe, cubic=0.0 * full.cubic)
                 no_limit = phrases.note("no-quadratic-term-of-position")
                 if kind != "position":
@@ -452,19 +466,20 @@ class ErrorListing:
 
     @staticmethod
     def _of_both(legs: Sequence[Sequence[AnyEffect]], axis: int, ways: Sequence[Vectors] | None) -> AnyEffect:
-        """Effect of one error of both platforms.
+        """Effect of a unit error of both platforms, from the effects of each platform along x, y and z.
 
-        It is along an axis of the scene, or along a given direction of each platform.
+        The error is along the axis of the scene with the index `axis`. If `ways` is given, the error of each platform
+        is along its direction in `ways` instead.
         """
         if ways is None:
             return _sum([effects[axis] for effects in legs])
         return _sum([_along(effects, way) for effects, way in zip(legs, ways, strict=True)])
 
     def _of_time_tags(self) -> Iterator[ErrorSource]:
-        """Errors of the navigation's time relative to the radar's, for each platform, and for one clock of both.
+        """Yield the errors of the navigation's time relative to the radar's, of each platform and of both in common.
 
-        The position is measured a time δt too late, so the error is p(τ + δt) − p(τ). For a small δt it is v(τ)·δt.
-        Otherwise exact ranges use the path itself.
+        The position is measured a time δt too late, so the position error is p(τ + δt) − p(τ). For a small δt it is
+        v(τ)·δt. For a larger δt, exact ranges use the path p itself.
         """
         for platform_index, name in enumerate(PLATFORMS):
             error: MotionError = getattr(self.mission.platforms, name).motion_error
@@ -517,9 +532,10 @@ class ErrorListing:
         return (u, v, w)
 
     def _of_registered_kinds(self) -> Iterator[ErrorSource]:
-        """Errors of the kinds that packages register, each by the motion that its kind states.
+        """Yield the errors of the kinds that packages register, with the effects of the motion that each kind gives.
 
-        The published model projects the motion on the line of sight of mid-aperture and takes its Legendre orders.
+        The published model projects the motion on the line of sight at mid-aperture and uses the Legendre orders of
+        the projection.
         """
         exact = self.exact
         for platform_index, name in enumerate(PLATFORMS):
@@ -550,9 +566,9 @@ class ErrorListing:
                 )
 
     def _of_terrain(self) -> Iterator[ErrorSource]:
-        """Error of a scene that is higher than the processor assumes.
+        """Yield the error due to a scene that is higher than the processor assumes; nothing if the file states none.
 
-        It has the effect of measuring both platforms too high by the same amount.
+        Its effect is that of measuring both platforms too high by the same amount.
         """
         height = self.mission.scene.height_error
         if height is None:
@@ -593,9 +609,9 @@ class ErrorListing:
 
 @cache
 def _scene_axes(name: str, kind: str) -> tuple[tuple[Subject, KeyPath, str, Note], ...]:
-    """Texts for the rows of errors along the axes x, y and z of the scene.
+    """Subjects and texts for the rows of a platform's errors along the axes x, y and z of the scene.
 
-    Each item has the row's subject, the key path in the file, the equation, and the reason for a missing limit.
+    Each item has the row's subject, its key path in the file, its equation, and the reason why it may have no limit.
     """
     return tuple(
         (
@@ -613,8 +629,8 @@ def _along_scene_axis(
 ) -> PerCase:
     """Size, along one axis of the scene, of three errors that are stated along the axes of another frame.
 
-    The three errors are independent, so one-sigma values add as squares and bounds add as magnitudes. A rotation of
-    the signed values would let them cancel. The sign is that of the rotated signed values.
+    The three errors are independent: the squares of one-sigma values add, and the magnitudes of bounds add. A plain
+    rotation of the signed values would let them cancel. It determines only the sign of the result.
     """
     a, b, c = (value * direction[axis] for value, direction in zip(declared, axes, strict=True))
     size = np.sqrt(a * a + b * b + c * c) if distribution == "normal" else np.abs(a) + np.abs(b) + np.abs(c)
@@ -622,28 +638,31 @@ def _along_scene_axis(
 
 
 def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[PerCase]) -> PerCase:
-    """Sigma of the position or velocity error along a direction in the frame's axes: √(dᵀCd)."""
+    """Sigma √(dᵀCd) of the position error [m] or velocity error [m/s] along a unit direction d.
+
+    C is the covariance of the three errors, and d has its components along the axes of the covariance's frame.
+    """
     parts = [sigma * along for sigma, along in zip(covariance.of(kind), direction, strict=True)]
     return np.sqrt(squared(covariance.block(kind), parts))
 
 
 def _along(effects: Sequence[AnyEffect], direction: Vectors) -> AnyEffect:
-    """Effect of a unit error along a direction, as the projection of the effects along the three scene axes."""
+    """Effect of a unit error along a direction, as a linear combination of the effects along the three scene axes."""
     terms = [[part * way for part, way in zip(parts, direction, strict=True)] for parts in zip(*effects, strict=True)]
     return type(effects[0])(*map(_total, terms))
 
 
 def _of_both_platforms(vectors: Mapping[int, AnyVector]) -> tuple[AnyVector, AnyVector]:
-    """Vectors of both platforms, given those of the platforms that have the error.
+    """Vectors of both platforms, from a mapping of the index of a platform to its vector.
 
-    The vector of a platform without the error is not used.
+    A platform that is missing in the mapping gets the vector of the other platform, which is not used.
     """
     first = next(iter(vectors.values()))
     return vectors.get(0, first), vectors.get(1, first)
 
 
 def _of_each(effects: FullEffect) -> list[FullEffect]:
-    """Effects of single errors, from the effects of several errors, (errors, cases)."""
+    """Split the effects of several errors, (errors, cases), into one effect (cases,) for each error."""
     return [FullEffect._make(row) for row in zip(*map(np.asarray, effects), strict=True)]
 
 
@@ -652,7 +671,7 @@ def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:
 
 
 def _total(terms: Sequence[PerCase]) -> PerCase:
-    """Sum of terms. If the terms cancel exactly, the rounding error is set to 0, as it would give a false limit."""
+    """Sum of terms; 0 if they cancel except for rounding errors, which would give a limit where none exists."""
     total = sum(terms)
     return np.where(np.abs(total) > VECTOR_ROUNDING_FRACTION * sum(np.abs(term) for term in terms), total, 0.0)
 

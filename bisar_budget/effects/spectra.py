@@ -1,10 +1,11 @@
-"""Phase noise over an aperture: spectra as pieces of power laws, integrated with the Legendre parts of a tone.
+"""Parts of phase noise over an aperture: spectra of power-law pieces, weighted with the Legendre parts of a tone.
 
 Spectra are one-sided, for phase at the radar's centre frequency. [rad²/Hz] The L(f) of a data sheet is half of such a
 spectrum.
 
-In the angle x = πfT the edges of the integration panels are the same for every aperture time T, and so is the
-integral of a power law between two edges. Only the ends of a piece are integrated separately.
+The integrals use the angle x = πfT in place of the frequency f. The edges of the integration panels are then the same
+for every aperture time T, and so is the integral of a power law between two edges. Only the ends of a piece are
+integrated separately.
 """
 
 import math
@@ -20,7 +21,7 @@ from bisar_budget import evaluators
 from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.image_plane import nodes
 
-SERIES_ANGLE_RAD = 0.5  # angle, or ratio; below it terms cancel and a series is exact to 1e-8
+SERIES_ANGLE_RAD = 0.5  # angle or ratio; below it, terms cancel, and a series is used that is exact to 1e-8
 
 
 class Parts(NamedTuple):
@@ -29,10 +30,11 @@ class Parts(NamedTuple):
     `quadratic` and `cubic` are the mean squares of these parts at the aperture edge. `left` is the mean square of the
     phase beyond the cubic. `constant` and `linear` are the mean squares of the constant and the linear part at the
     aperture edge, which displace the image. `constant_quadratic` and `linear_cubic` are mean products of two parts.
-    These last four are infinite where slow noise has no bound.
+    `constant`, `linear` and both mean products are infinite if slow noise has no bound.
 
-    The last three mean products are nonzero only for the phase of a clock that was set before the aperture. In any
-    other phase, even and odd orders are uncorrelated.
+    `constant_linear`, `constant_cubic` and `linear_quadratic` are mean products of parts of even and odd order. They
+    are nonzero only for the phase of a clock that was set before the aperture. In any other phase, even and odd
+    orders are uncorrelated.
     """
 
     quadratic: PerCase
@@ -62,11 +64,11 @@ class Parts(NamedTuple):
 
     @property
     def rows(self) -> Floats:
-        """All parts as one array, (parts, ...)."""
+        """All fields as one array, (fields, ...). [rad²]"""
         return np.array(np.broadcast_arrays(*self))
 
     def times(self, power: PerCase) -> "Parts":
-        """Multiply all parts by the factor `power`."""
+        """Multiply all mean squares and mean products by the factor `power`."""
         return Parts(*(mean_square * power for mean_square in self))
 
     @property
@@ -76,13 +78,16 @@ class Parts(NamedTuple):
         return Parts(self.quadratic, self.cubic, self.left, *(nothing,) * (len(self) - 3))
 
     def without_constant(self) -> "Parts":
-        """Parts of the same phase without its constant part, for a phase whose constant does not displace."""
+        """Parts of the same phase without its constant part, if a constant phase does not displace the image."""
         nothing = 0.0 * self.quadratic
         return self._replace(constant=nothing, constant_quadratic=nothing)
 
 
 def gauss_markov(aperture_time: PerCase, correlation_time: PerCase) -> Parts:
-    """Parts of a stationary Gauss–Markov process with variance 1 and correlation exp(−|t|/τ_c)."""
+    """Parts of a stationary Gauss–Markov process with variance 1 and correlation exp(−|t|/τ_c).
+
+    `aperture_time` and `correlation_time` τ_c are in s.
+    """
     ratio = np.asarray(aperture_time / (2 * correlation_time))
     (slow,) = evaluators.gauss_markov_parts_slow(np.minimum(ratio, SERIES_ANGLE_RAD))
     fast = np.maximum(ratio, SERIES_ANGLE_RAD)
@@ -91,10 +96,10 @@ def gauss_markov(aperture_time: PerCase, correlation_time: PerCase) -> Parts:
 
 
 def tone(angle: PerCase) -> Floats:
-    """Amplitudes of the parts of a tone of amplitude 1, each in its worst phase, and its power beyond the cubic.
+    """Parts of a tone of amplitude 1 over the aperture, each for the worst phase of the tone, (5, ...).
 
-    `angle` is πfT. The rows are quadratic phase, cubic phase, fraction of the tone's power beyond the cubic, constant
-    part, and linear part.
+    `angle` is πfT. [rad] The rows are quadratic part, cubic part, fraction of the tone's power beyond the cubic,
+    constant part, and linear part. The parts are amplitudes at the aperture edge.
     """
     angle = np.asarray(angle)
     slow = np.array(*evaluators.tone_parts_slow(np.minimum(angle, SERIES_ANGLE_RAD)))  # type: ignore[arg-type]
@@ -104,26 +109,26 @@ def tone(angle: PerCase) -> Floats:
 
 
 def held(step: PerCase) -> PerCase:
-    """Spectrum of samples joined by straight lines relative to that of white noise with their variance: sinc⁴.
+    """Ratio sinc⁴ of the spectrum of white samples joined by straight lines to its value at 0 Hz.
 
-    `step` is 2π times frequency times sampling interval.
+    `step` is 2π times frequency times sampling interval. [rad]
     """
     return np.sinc(step / (2 * math.pi)) ** 4
 
 
-_INTEGRAL_COUNT = 7  # leading fields of `Parts` that any spectrum has
-_FOLLOWED_TURN_COUNT = 24  # half turns of a tone within the aperture up to which panels resolve them
-_FAST = _FOLLOWED_TURN_COUNT * math.pi  # angle from which terms that turn with a tone are averaged
-_RESOLVED_TURN_COUNT = 1.5  # half turns within a panel up to which its nodes resolve any tone
+_INTEGRAL_COUNT = 7  # leading fields of `Parts`, which are computed for any spectrum
+_FOLLOWED_TURN_COUNT = 24  # cycles of a tone within the aperture up to which panels resolve them
+_FAST = _FOLLOWED_TURN_COUNT * math.pi  # angle above which terms that oscillate with a tone are averaged
+_RESOLVED_TURN_COUNT = 1.5  # width of a panel, in cycles per aperture, up to which its nodes resolve any tone
 _FIRST_POWER_ANGLE_RAD = (
-    0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
+    0.1  # angle below which each part of a tone is its leading power; only 3 % lie there, exact to 4e-4
 )
 _OCTAVE_RATIO = 2.0
 _SAME_EDGE_RATIO = 1.000001  # largest ratio of two computations of the same edge
 _MIN_EDGE_RATIO = 1 + 1e-10  # least ratio of two edges of panels
-_FOLLOWED_IMAGE_COUNT = 10  # sampling rates up to which each image is followed
+_FOLLOWED_IMAGE_COUNT = 10  # sampling rates up to which each image is computed singly
 _PASSED_IMAGE_COUNT = 50  # sampling rates beyond which straight lines pass less than 1e-4 of a tone's amplitude
-_NEAR_ALIAS_COUNT = 3  # rates, plus one for each two powers of a slope, within which each alias is counted
+_NEAR_ALIAS_COUNT = 3  # sampling rates, plus half the slope, within which aliases are added singly
 _STEEP_EXPONENT = 4.0  # slope beyond which straight lines do not flatten an image of a piece
 _FALL_EXPONENT = 6.0  # powers of e by which a steep piece falls from edge to edge
 
@@ -145,7 +150,7 @@ def _tone_edges(aperture_time: float) -> list[float]:
     return edges + [math.pi * n / scale for n in range(1, _FOLLOWED_TURN_COUNT + 1)]
 
 
-_EDGES = np.array(_tone_edges(1 / math.pi))  # angles
+_EDGES = np.array(_tone_edges(1 / math.pi))  # edges as angles πfT
 
 
 class PowerLawPiece(NamedTuple):
@@ -190,7 +195,7 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, above: PerCas
     aperture_time : float or (cases,)
         Aperture time. [s]
     above : float or (cases,)
-        Frequency above which the spectrum counts. [Hz]
+        Lower limit of the integral. [Hz]
     """
     scale = math.pi * np.atleast_1d(aperture_time)
     total = np.zeros((_INTEGRAL_COUNT, *scale.shape))
@@ -202,9 +207,10 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, above: PerCas
 
 
 def left_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval: float | None) -> Parts:
-    """Parts over apertures (cases,) of a spectrum, or of what remains of it after synchronization.
+    """Parts of a phase spectrum over apertures, after synchronization if there is one, (cases,) each.
 
-    `interval` is the interval of the exchanged pulses [s]; None: no synchronization.
+    `aperture_time` is (cases,). [s] `interval` is the interval of the exchanged pulses [s]; None without
+    synchronization.
     """
     times, time_index = np.unique(aperture_time, return_inverse=True)
     parts_of_times = parts(pieces, times) if interval is None else synchronized_parts(pieces, times, interval)
@@ -217,7 +223,7 @@ def _like(total: Floats, aperture_time: PerCase) -> Parts:
 
 
 def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of a spectrum x^(−slope) between two angles."""
+    """Parts of a spectrum x^(−slope) between the angles `low` and `high`, (parts, cases)."""
     first = np.searchsorted(_EDGES, low * _SAME_EDGE_RATIO, side="right")
     last = np.searchsorted(_EDGES, high / _SAME_EDGE_RATIO, side="left")
     has_edge = last > first
@@ -236,9 +242,9 @@ def _between_edges(slope: float) -> Floats:
 
 
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of a power law within a panel at the end of a piece.
+    """Parts of a spectrum x^(−slope) within a panel at the end of a piece, (parts, cases).
 
-    Slow and fast tones have their own formulas. The result is 0 for a panel without length.
+    Slow and fast tones have their own formulas. The result is 0 for a panel of zero width.
     """
     total = np.zeros((_INTEGRAL_COUNT, low.size))
     is_slow = high <= _FIRST_POWER_ANGLE_RAD * _SAME_EDGE_RATIO
@@ -262,13 +268,17 @@ def _integral(exponent: float, low: Floats, high: Floats) -> Floats:
 
 
 def _slow(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of a power law for slow tones, from their leading powers x²/2, x³/6, x⁸/99225, 1 and x."""
+    """Parts of a power law for slow tones.
+
+    The quadratic and cubic part, the power beyond the cubic, the constant and the linear part of a tone are replaced
+    by their leading powers x²/2, x³/6, x⁸/99225, 1 and x.
+    """
     powers = ((4, 4), (6, 36), (8, 99225), (0, 1), (2, 1), (2, -2), (4, -6))
     return np.array([_integral(power - slope, low, high) / divisor for power, divisor in powers])
 
 
 def _fast(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of a power law for fast tones, with the terms that oscillate with the tone averaged."""
+    """Parts of a power law for fast tones; terms that oscillate with the tone are averaged."""
     (means,) = evaluators.tone_parts_fast(*(_integral(-power - slope, low, high) for power in (0, 2, 4, 6, 8)))  # type: ignore[arg-type]
     return np.array(means)
 
@@ -284,9 +294,9 @@ def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
 def squares(angle: Floats) -> Floats:
     """Squares of a tone's parts, its power beyond the cubic, and products of parts, in the order of `Parts`.
 
-    These are means for a tone of power 1. They are also the values for a tone of amplitude 1 in which each part has
-    its worst phase. The phase of order n is shifted by n quarter cycles, so orders that differ by two have opposite
-    signs.
+    These are the mean values for a tone of power 1 and random phase. They are also the values for a tone of amplitude
+    1 if each part has its worst phase. The phase of order n is shifted by n quarter cycles, so orders that differ by
+    two have opposite signs.
     """
     quadratic, cubic, spread, constant, linear = tone(angle)
     both = -constant * quadratic, -linear * cubic
@@ -299,7 +309,7 @@ _RESOLVED_AGE_CYCLES = (
 )
 _GRID_AGES_CYCLES = np.concatenate(
     (np.geomspace(1e-6, 0.125, 18), np.arange(0.25, _RESOLVED_AGE_CYCLES + 0.1, 0.25))
-)  # edges, in cycles
+)  # panel edges, in cycles within the age
 
 
 def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Floats, averaging: Floats) -> Parts:
@@ -308,8 +318,8 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
     Setting the clock subtracts a line that is fitted to the clock's phase over the averaging time, at an age H before
     mid-aperture. With x = πfT, y = πft_c and θ = 2πfH, a tone then has order 0, A₀ = j₀(x) − e^(−iθ)·[j₀(y) +
     H·(6i/t_c)·j₁(y)], and order 1, A₁ = 3i·j₁(x) − (T/2)·e^(−iθ)·(6i/t_c)·j₁(y), at the aperture edge. Higher orders
-    are those of the free clock. Derived here. The result is bounded for slopes to f⁻⁴. Above 24 cycles within the
-    age, the phases of setting and aperture count as uncorrelated.
+    are those of the free clock. Derived here. The result is bounded for spectra up to a slope of f⁻⁴. Above 24 cycles
+    within the age, the phases during setting and aperture are treated as uncorrelated.
 
     Parameters
     ----------
@@ -354,10 +364,10 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
 
 
 def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Floats) -> Iterator[Floats]:
-    """Mean squares and products of the orders of a tone of amplitude 1, for a clock that was set.
+    """Yield the mean squares and mean products of the orders of a tone of power 1, for a clock that was set.
 
-    The line that was fitted to set the clock is subtracted. Yields Re(A_m·A_n*), in the shape of `f` [Hz], for the
-    pairs of orders mn = 00, 11, 01, 02, 03, 12, 13.
+    The line that was fitted to set the clock is subtracted. The values are Re(A_m·A_n*), in the shape of `f` [Hz],
+    for the pairs of orders mn = 00, 11, 01, 02, 03, 12, 13.
     """
     quadratic, cubic, _, constant, linear = tone(math.pi * f * aperture_time)
     *_, mean, slope = tone(math.pi * f * averaging)
@@ -373,7 +383,7 @@ def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Fl
 
 
 # ---------------------------------------------------------------------- a clock that is heard twice
-_FOLLOWED_DELAY_CYCLES = 12  # turns of a tone within the delay up to which panels resolve them
+_FOLLOWED_DELAY_CYCLES = 12  # cycles of a tone within the delay up to which panels resolve them
 
 
 def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: PerCase) -> Parts:
@@ -399,7 +409,7 @@ def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: 
 
     scale = math.pi * times
     total = _over_panels(heard, edges, last, scale)
-    _add_fast(total, pieces, last, scale, 2.0)  # fast noise turns many times within the delay: its mean counts
+    _add_fast(total, pieces, last, scale, 2.0)  # for fast noise the mean of 4 sin², which is 2, is sufficient
     return _like(total, aperture_time)
 
 
@@ -407,11 +417,12 @@ def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: 
 def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, interval: float) -> Parts:
     """Integrate the spectrum that remains after synchronization.
 
-    The remaining phase is the phase less the straight lines between its samples. The lines contain sinc²(f·T_s) of a
-    tone's amplitude at its own frequency, and fold onto it every tone at a distance of m/T_s. A spectrum S becomes
-    S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines may begin at any instant within the interval. Pieces may
-    be narrow or steep, and may begin and end anywhere. The result is accurate to 1e-4, except for tones of more than
-    24 cycles within the aperture, whose parts are averaged over their cycles.
+    The phase is sampled at an `interval` T_s. [s] The remaining phase is the phase less the straight lines that join
+    its samples. The lines contain sinc²(f·T_s) of a tone's amplitude at its own frequency f, and fold onto f every
+    tone at a distance of m/T_s. A spectrum S becomes S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines may
+    begin at any instant within the interval. Pieces may be narrow or steep, and may begin and end anywhere. The
+    result is accurate to 1e-4, except for tones of more than 24 cycles within the aperture, whose parts are averaged
+    over their cycles.
     """
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     scale = math.pi * times
@@ -427,9 +438,9 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, 
 
 
 def link_parts(aperture_time: PerCase, interval: float) -> Parts:
-    """Parts of samples of variance 1 that straight lines join, from their spectrum 2·T_s·sinc⁴(f·T_s).
+    """Parts of independent samples of variance 1 joined by straight lines.
 
-    The spectrum is one-sided. Its total power is ⅔.
+    The samples have the `interval` T_s. [s] The one-sided spectrum is 2·T_s·sinc⁴(f·T_s). Its total power is ⅔.
     """
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     edges = [_exchange_edges(T, rate) for T in times.tolist()]
@@ -448,7 +459,8 @@ def _over_panels(
 ) -> Floats:
     """Integrate a density, weighted with the squared parts of a tone, over panels from 0 Hz on.
 
-    `density` is a function of frequencies and cases. `edges` are the edges of the panels of each case.
+    `density` is a function of frequencies and cases. `edges` are the edges of the panels of each case, and `high` is
+    the end of the last panel. [Hz] `scale` is πT. The result is (parts, cases).
     """
     panels = [
         (low, top, case)
@@ -467,9 +479,9 @@ def _over_panels(
 
 
 def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scale: Floats, times: float) -> None:
-    """Add the parts of a spectrum above the last frequencies, multiplied by `times`, to the total.
+    """Add to `total` the parts of a spectrum above the frequencies `last` [Hz], multiplied by `times`.
 
-    The terms that oscillate with a tone are averaged.
+    `scale` is πT. The terms that oscillate with a tone are averaged.
     """
     for piece in pieces:
         to_angle = times * piece.density * scale ** (piece.slope - 1)
@@ -479,7 +491,11 @@ def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scal
 
 
 def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, scale: Floats) -> Floats:
-    """Parts of a density over panels (n,), by Gauss–Legendre quadrature."""
+    """Parts of a spectrum over frequency panels (n,), by Gauss–Legendre quadrature, (parts, n).
+
+    `density` is the spectrum as a function of frequency. `low` and `high` are the ends of the panels. [Hz] `scale` is
+    πT.
+    """
     is_first = low == 0
     span = np.log(high / np.where(is_first, high, low))
     f = np.where(is_first, high * _LEGENDRE_NODES, low * np.exp(span * _LEGENDRE_NODES))
@@ -493,7 +509,10 @@ def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, s
 
 
 def _unjoined(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats:
-    """Spectrum that remains after synchronization, at the nodes of panels (nodes, n). [rad²/Hz]"""
+    """Spectrum that remains after synchronization, at frequencies `f` (nodes, n) of the nodes of panels. [rad²/Hz]
+
+    `rate` is the sampling rate. [Hz]
+    """
     _, once, again = np.unique(f[0] + 1j * f[-1], return_index=True, return_inverse=True)  # cases share panels
     f = f[:, once]
     density_here, passed = density(pieces, f), np.sinc(f / rate) ** 2
@@ -510,8 +529,8 @@ def _unjoined(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats
 def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
     """Sum of the density of a piece at m·rate ± start, for m = 1, 2 … [rad²/Hz]
 
-    `start` is at most half the sampling rate. Aliases where the power law changes much within one rate are added one
-    by one. The Euler–Maclaurin formula gives the sum of all farther aliases.
+    `start` is at most half the sampling rate. Near aliases, where the power law changes much within one rate, are
+    added one by one. The Euler–Maclaurin formula gives the sum of all other aliases.
     """
     far = math.ceil(_NEAR_ALIAS_COUNT + abs(piece.slope) / 2)
     first, end = max(1, math.floor(piece.low / rate)), min(far, math.ceil(piece.high / rate) + 1)
@@ -527,11 +546,11 @@ def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
 
 
 def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: float) -> list[PowerLawPiece]:
-    """Mean spectrum of the images beyond those computed singly, (2/T_s³)·∫ S·sin⁴(πfT_s) df/(πf)⁴, as pieces.
+    """Mean spectrum of the images that are not computed singly, as pieces of a power law f⁻⁴.
 
-    The images lie at x sampling rates from multiples of the rate. According to the Euler–Maclaurin formula, the mean
-    lacks the term B₂(x) times the slope at its lower end. Pieces that begin half a rate below and half a rate above
-    replace that term.
+    The mean is (2/T_s³)·∫ S·sin⁴(πfT_s) df/(πf)⁴. The images of a frequency have a distance of x sampling rates from
+    the multiples of the rate. According to the Euler–Maclaurin formula, the mean lacks the term B₂(x) times the slope
+    at its lower end. Pieces that begin half a rate lower and half a rate higher replace that term.
     """
     low, high = np.array(list(_panels(rate / 2, [rate / 4, *edges]))).T
     f = low + (high - low) * _LEGENDRE_NODES
@@ -567,7 +586,8 @@ def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) 
 def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
     """Edges of frequency panels for synchronized phases. [Hz]
 
-    Within a panel, the parts of a tone and the share of a tone that straight lines contain are smooth.
+    Within a panel, the parts of a tone, and the part of the tone that the straight lines contain, are smooth
+    functions of frequency.
     """
     edges = [*_tone_edges(aperture_time), rate / 4, *(rate * n / 2 for n in range(1, 2 * _FOLLOWED_IMAGE_COUNT + 1))]
     octave = _FOLLOWED_TURN_COUNT / aperture_time
@@ -578,9 +598,9 @@ def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
 
 
 def _image_edges(ends: Sequence[float], rate: float) -> list[float]:
-    """Edges of frequency panels for a spectrum whose pieces have the given ends, and for its images. [Hz]
+    """Edges of frequency panels within which a spectrum and its images are smooth. [Hz]
 
-    Within a panel, the spectrum and its images are smooth.
+    `ends` are the ends of the pieces of the spectrum. [Hz]
     """
     starts = {abs(end - round(end / rate) * rate) for end in ends}
     images = [
@@ -592,7 +612,7 @@ def _image_edges(ends: Sequence[float], rate: float) -> list[float]:
 
 
 def _ends(piece: PowerLawPiece) -> Iterator[float]:
-    """Ends of a piece, and frequencies where a steep piece has fallen by a few powers of e. [Hz]"""
+    """Yield the ends of a piece, and the frequencies where a steep piece has fallen by certain powers of e. [Hz]"""
     yield from (piece.low, piece.high)
     if abs(piece.slope) > _STEEP_EXPONENT:
         dense = piece.low if piece.slope > 0 else piece.high

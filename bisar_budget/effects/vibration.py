@@ -1,19 +1,20 @@
 """Declared vibrations: paired echoes, components along the line of sight, slow phases, and spectra.
 
-For a receiver that uses the direct path as its clock, the data contain ranges less the direct path. A vibration then
-counts with its effect on this difference.
+If the receiver uses the direct path as its clock, the data contain ranges less the direct path. The effect of a
+vibration is then its effect on this difference.
 
-A vibration of peak phase φ and n < 1 cycles per aperture makes no echoes. Its largest Legendre parts over the
-aperture are 5·j₂(πn)·φ and 7·j₃(πn)·φ; the phases at the aperture edge are 3/2 and 5/2 of these parts. Its sign and
-phase are unknown. It counts like any other error: alone against a limit, and in sums and root-sum-squares.
+A vibration of peak phase φ and n < 1 cycles per aperture makes no echoes. Its largest Legendre parts of order 2 and 3
+over the aperture are 5·j₂(πn)·φ and 7·j₃(πn)·φ; the phases at the aperture edge are 3/2 and 5/2 of these parts. Its
+sign and phase are unknown. Like any other error, it is compared alone with a limit, and is part of sums and
+root-sum-squares.
 
-A vibration of n > 1 cycles per aperture and peak phase φ makes echoes at n cells from the response. An echo has φ/2
-of the amplitude of the response and the same shape. For a uniform aperture this is sinc(x) = sin(πx)/(πx), whose
-sidelobes reach the next echo. The phases of vibrations are unknown. In the worst case, several echoes add in phase at
-a position x, Σ φ_k/2·|sinc(x − n_k)|, and the position with the largest sum counts. Derived here. From three cycles
-per aperture on, this agrees within 0.5 dB with transforms of the phasor for the worst phases
-(`tests/effects/test_echoes.py`). The echoes at −n_k are left out; they add up to 0.3 dB at three cycles, and less
-beyond.
+A vibration of n > 1 cycles per aperture and peak phase φ makes echoes at n resolution cells from the response. An
+echo has φ/2 times the amplitude of the response and the same shape. For a uniform aperture the shape is sinc(x) =
+sin(πx)/(πx), whose sidelobes reach the next echo. The phases of vibrations are unknown. In the worst case, several
+echoes add in phase at a position x. Their sum is Σ φ_k/2·|sinc(x − n_k)|, and the position with the largest sum is
+used. Derived here. From three cycles per aperture on, this agrees within 0.5 dB with transforms of the phasor for the
+worst phases (`tests/effects/test_echoes.py`). The echoes at −n_k are left out; they add up to 0.3 dB at three cycles,
+and less beyond.
 
 A spectrum S_a of acceleration corresponds to the spectrum S_x = S_a/(2πf)⁴ of displacement. Its quadratic phase,
 cubic phase, spread and displacement are the integrals of `spectra`. Motion slower than the aperture is therefore
@@ -44,11 +45,11 @@ from bisar_budget.mission.vibrations import AcceleratedSinusoid, FeltVibration, 
 from bisar_budget.phrases import Note
 from bisar_budget.units import format_quantity
 
-NEAR_CYCLES = 2.5  # per aperture; farther apart, two equal lines raise each other's echo by less than 1.1 dB
+NEAR_CYCLES = 2.5  # cycles per aperture; farther apart, two equal tones raise each other's echo by less than 1.1 dB
 SLOWEST_ECHO_CYCLES = 1.0  # cycles per aperture; a slower vibration makes no echoes
-ECHO_CYCLES = 3.0  # likewise; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
+ECHO_CYCLES = 3.0  # cycles per aperture; a slower vibration has echoes beside the mainlobe and a quadratic phase
 
-_SEARCH_STEPS_CELLS = (0.1, 0.02)  # coarse, then fine
+_SEARCH_STEPS_CELLS = (0.1, 0.02)  # steps of the coarse and of the fine search
 _REACH = np.arange(-6, 7)[:, None, None]
 _SEARCH_START_COUNT = 16  # positions around which the search looks
 _MAX_ECHO_COUNT = 200_000  # echoes in one array
@@ -60,7 +61,7 @@ _STEEP_PIECE_COUNT = 16  # flat pieces in place of a steep piece, which is narro
 
 # ---------------------------------------------------------------------- echoes that add
 class Worst(NamedTuple):
-    """Several tones in their worst phases.
+    """Highest echo of several tones in their worst phases.
 
     `amplitude` is the amplitude of a single tone with an equally high echo, and `cycles` is the position of that
     echo.
@@ -71,10 +72,11 @@ class Worst(NamedTuple):
 
 
 def near_groups(cycles: Floats) -> NDArray[np.intp]:
-    """Group tones (n, cases) whose neighbours in frequency are within 2.5 cycles per aperture of each other.
+    """Numbers of the groups of tones whose neighbours in frequency are at most 2.5 cycles per aperture apart.
 
-    A group has two or more tones. The groups of a case are numbered in order of frequency. Tones outside all groups,
-    and tones below one cycle per aperture, have the number -1.
+    `cycles` are the cycles per aperture of the tones, (n, cases). The result has the same shape. A group has two or
+    more tones. The groups of a case are numbered in order of frequency. Tones outside all groups, and tones below one
+    cycle per aperture, have the number -1.
     """
     order = np.argsort(cycles, axis=0, kind="stable")
     placed = np.take_along_axis(cycles, order, axis=0)
@@ -89,7 +91,10 @@ def near_groups(cycles: Floats) -> NDArray[np.intp]:
 
 
 def near_lines(cycles: Sequence[float]) -> list[tuple[int, ...]]:
-    """Indices of the tones in each group of one mission, in order of frequency."""
+    """Indices of the tones in each group of neighbouring tones, for a single case, in order of frequency.
+
+    `cycles` are the cycles per aperture of the tones. The groups are those of `near_groups`.
+    """
     if not cycles:
         return []
     number = near_groups(np.array(cycles)[:, None])[:, 0]
@@ -99,7 +104,7 @@ def near_lines(cycles: Sequence[float]) -> list[tuple[int, ...]]:
 def worst_phases(
     amplitudes: Sequence[PerCase] | Floats, cycles: Sequence[PerCase] | Floats, is_member: Booleans | None = None
 ) -> Worst:
-    """Height of the echo of several tones together, in their worst phases.
+    """Height and position of the highest echo that several tones make together in their worst phases.
 
     Parameters
     ----------
@@ -108,7 +113,7 @@ def worst_phases(
     cycles : same shape
         Cycles per aperture.
     is_member : same shape, optional
-        Tones that count, at least one in each case; all tones if omitted.
+        Whether a tone is included, at least one in each case. If omitted, all tones are included.
 
     Returns
     -------
@@ -161,9 +166,10 @@ def _highest(sizes: Floats, frequencies: Floats, starts: Floats) -> Floats:
 
 
 def _count(frequencies: Floats, starts: Floats, reach: int) -> NDArray[np.intp]:
-    """Number of tones below each starting point less one cell, or up to each starting point plus one cell.
+    """Number of tones up to a position one cell below or above each starting point, in the shape of `starts`.
 
-    `reach` is -1 or 1, respectively. Both arrays are sorted.
+    With `reach` 1, tones up to and including one cell above the starting point are counted. With `reach` -1, tones
+    more than one cell below it are counted. Both arrays are sorted.
     """
     ends = starts + reach
     both = (frequencies, ends) if reach > 0 else (ends, frequencies)
@@ -188,7 +194,7 @@ def _searched(sizes: Floats, frequencies: Floats, starts: Floats) -> tuple[Float
 
 
 def _heights(sizes: Floats, frequencies: Floats, x: Floats) -> Floats:
-    """Height of the sum of all echoes in phase, at positions (…, cases)."""
+    """Height of the sum of all echoes in phase at the positions `x` (…, cases), in cells."""
     return np.asarray((sizes * np.abs(np.sinc(x[..., None, :] - frequencies))).sum(axis=-2))
 
 
@@ -196,7 +202,7 @@ def _heights(sizes: Floats, frequencies: Floats, x: Floats) -> Floats:
 class Line(NamedTuple):
     """One sinusoid: amplitude along the line of sight, 0 to peak [m], and frequency [Hz].
 
-    `per_metre` is the size of one metre in the unit of the sinusoid's row. It is (2πf)² if the file states the
+    `per_metre` converts an amplitude in metres to the unit of the sinusoid's row. It is (2πf)² if the file states the
     acceleration.
     """
 
@@ -206,9 +212,9 @@ class Line(NamedTuple):
 
 
 def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> Vectors:
-    """Sensitivity of the range to a platform's motion, as a vector: reduction of range per metre. [-]
+    """Reduction of the range per metre of a platform's motion along each scene axis, at mid-aperture. [m/m]
 
-    With a direct path it is that of the range less the direct path.
+    With a direct path it is the reduction of the range less the direct path.
     """
     sights = (geometry or mission.geometry).sights(has_direct_path=mission.has_direct_path)
     return sights[PLATFORMS.index(name)]
@@ -217,11 +223,11 @@ def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = No
 def seen_of_axes(
     mission: Mission, name: str, *, is_vector: bool, geometry: BistaticGeometry | None = None
 ) -> list[PerCase]:
-    """Part of a metre along each axis of a platform's error that the range contains, rms over the aperture. [-]
+    """Range error per metre of a platform's vibration along each axis of its errors, as rms over the aperture. [m/m]
 
     The line of sight turns over the aperture. The rms is an upper bound for the height of every echo, and gives the
-    spread. A vibration that is no vector is along the line of sight. The range contains all of it, while the range
-    less the direct path contains a part.
+    spread. A vibration that is stated by a single value (`is_vector` false) is along the line of sight. It is
+    completely a range error, but with a direct path only a part of it is an error of the range less the direct path.
     """
     geometry, is_heard = geometry or mission.geometry, mission.has_direct_path
     if not is_vector and not is_heard:
@@ -248,10 +254,11 @@ def counted(
     metric: str,
     geometry: BistaticGeometry | None = None,
 ) -> PerCase:
-    """Amplitude (`pslr`) or rms (`islr`) of a platform's vibration along the line of sight. [m]
+    """Amplitude or rms of a platform's vibration along the line of sight. [m]
 
-    The projections follow from `seen_of_axes`. Projected amplitudes add, because the axes may vibrate in any phase.
-    Rms values are independent and add as squares.
+    `metric` is `pslr` for an amplitude and `islr` for an rms. `value` is given along the line of sight, or along
+    three axes. [m] The projections follow from `seen_of_axes`. Projected amplitudes add, because the axes may vibrate
+    in any phase. Rms values are independent, so their squares add.
     """
     sizes = value if isinstance(value, tuple) else (value,)
     seen = seen_of_axes(mission, name, is_vector=isinstance(value, tuple), geometry=geometry)
@@ -302,7 +309,7 @@ def projected(
 
 # ---------------------------------------------------------------------- below one cycle per aperture
 def quadratic_part(cycles: PerCase) -> PerCase:
-    """Worst quadratic phase of a sinusoid at the aperture edge, relative to its peak phase: 7.5·j₂(π·cycles).
+    """Ratio 7.5·j₂(π·cycles) of the worst quadratic phase of a sinusoid at the aperture edge to its peak phase.
 
     It is the least-squares quadratic of cos(πnx) over the aperture, with n cycles. For small n it is the Taylor term
     (πn)²/2.
@@ -312,7 +319,7 @@ def quadratic_part(cycles: PerCase) -> PerCase:
 
 
 def cubic_part(cycles: PerCase) -> PerCase:
-    """Worst cubic phase of a sinusoid at the aperture edge, relative to its peak phase: 17.5·j₃(π·cycles).
+    """Ratio 17.5·j₃(π·cycles) of the worst cubic phase of a sinusoid at the aperture edge to its peak phase.
 
     It is the least-squares cubic of sin(πnx) over the aperture, with n cycles.
     """
@@ -325,8 +332,8 @@ class DeclaredPhase(NamedTuple):
 
     `cubic_rad` is None for a pure quadratic phase. `is_there` marks the cases in which a vibration is slow; in all
     other cases its phases are 0. `coverage` is the coverage factor that both phases include. `hidden_rad` is the
-    quadratic phase equivalent to the loss that band and turn of the line of sight do not resolve, and counts with the
-    quadratic phase. [rad]
+    quadratic phase equivalent to the loss that band and turn of the line of sight do not resolve. It is added to the
+    quadratic phase as a root-sum-square. [rad]
     """
 
     row_id: str
@@ -338,15 +345,15 @@ class DeclaredPhase(NamedTuple):
     hidden_rad: PerCase = 0.0
 
     def judged(self, gain: PerCase) -> PerCase:
-        """Magnitude of the phase compared with a limit raised by autofocus, see `Declared.judged`. [rad]"""
+        """Phase magnitude, compared with a limit that includes autofocus gain, see `Declared.judged`. [rad]"""
         return np.hypot(self.qpe_rad, gain * self.hidden_rad)
 
 
 def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
-    """Motion of a platform by each vibration below one cycle per aperture. [m]
+    """Yield, for each vibration below one cycle per aperture, its subject and the motion of its platform. [m]
 
-    Each axis moves as a cosine and as a sine. A vibration stated along the line of sight moves along the line of
-    sight of the scene centre.
+    Along each axis the motion has a cosine and a sine component. A vibration stated along the line of sight moves its
+    platform along the line of sight to the scene centre.
     """
     for name in PLATFORMS:
         for index, line in enumerate(seen.error(name).vibration.sinusoidal):
@@ -366,22 +373,23 @@ def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
 
 # ---------------------------------------------------------------------- by a spectrum
 def power_of(vibration: Vibration | FeltVibration) -> PerCase:
-    """Power factor of `spectrum_level`, by which a spectrum is scaled."""
+    """Factor 10^(L/10) for a spectrum, where L is the `spectrum_level` of the vibration in dB; 1 without a level."""
     return 1.0 if vibration.spectrum_level is None else 10 ** (np.asarray(vibration.spectrum_level) / 10)
 
 
 def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -> tuple[PowerLawPiece, ...]:
-    """Convert a spectrum of acceleration [(m/s²)²/Hz] to pieces of power laws.
+    """Convert a vibration spectrum to pieces of power laws, multiplied by a power law of frequency.
 
-    The spectrum is multiplied by `law`, factor·f^(−slope). A spectrum of displacement is first converted to that of
-    acceleration, which is (2πf)⁴ times as large. The spectrum must consist of plain numbers.
+    `law` is the pair (factor, slope) of the power law factor·f^(−slope), which multiplies the spectrum of
+    acceleration. [(m/s²)²/Hz] A spectrum of displacement is first converted to that of acceleration, which is (2πf)⁴
+    times as large. The spectrum must consist of plain numbers.
     """
     factor, slope = law
     if not spectrum.is_accelerated:
         factor, slope = factor / DISPLACED[0], slope - DISPLACED[1]
     pieces = []
     for (f, density), (g, last) in pairwise(spectrum.points):
-        if not (density and last):  # a density so small that it became 0 has no logarithm
+        if not (density and last):  # a density that underflowed to 0 has no logarithm
             continue
         own_slope = math.log(density / last) / math.log(g / f)
         if abs(own_slope) <= _STEEP_DENSITY_EXPONENT:
@@ -395,7 +403,7 @@ def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -
 
 
 def _mean(slope: float, low: float, high: float, at_low: float, at_high: float) -> float:
-    """Mean density of a steep power law between two frequencies."""
+    """Mean density of the power law f^(−slope) between two frequencies [Hz], given its densities at both."""
     return (at_high * high - at_low * low) / ((1 - slope) * (high - low))
 
 
@@ -406,11 +414,11 @@ def spectrum_parts(
     interval: float | None = None,
     delay: PerCase | None = None,
 ) -> Parts:
-    """Parts over the aperture of a spectrum multiplied by a law, (cases,) each, see `spectrum_pieces`.
+    """Parts over the aperture of a vibration spectrum multiplied by a power law, (cases,) each.
 
-    `interval` is the interval of exchanged pulses; the parts are then those that remain after synchronization.
-    `delay` is the time between two moments; only the difference of the phase between them then counts. Densities,
-    intervals and delays may differ from case to case.
+    `law` is described in `spectrum_pieces`. With an `interval` of exchanged pulses [s], the parts are those that
+    remain after synchronization. With a `delay` [s], they are the parts of the difference between the phase at two
+    moments that are this time apart. Densities, intervals and delays may differ from case to case.
     """
     total = np.zeros((len(Parts._fields), seen.cases))
     for (of_group, exchanged), cases in seen.alike((spectrum, interval)):
@@ -424,9 +432,9 @@ def spectrum_parts(
 
 
 def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Error of a platform's vibration that is stated by a spectrum.
+    """Yield the error of a platform's vibration that the file states by a spectrum; nothing without a spectrum.
 
-    Its unit is that of noise: the declared size is an amplitude factor of 1.
+    As for noise of an oscillator, the unit is dB, and the declared size is an amplitude factor of 1.
     """
     vibration = seen.error(name).vibration
     if vibration.spectrum is None:
@@ -435,7 +443,7 @@ def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
     platform_index = PLATFORMS.index(name)
     x, y, z = (
         track / seen.exact.ranges[platform_index] for track in seen.exact.tracks[platform_index]
-    )  # the line of sight, along which the platform shakes
+    )  # the line of sight, along which the platform vibrates
     published, full = seen.of_parts(noise.times(power_of(vibration)), seen.exact.along(platform_index, (x, y, z)))
     path = ("platforms", name, "motion_error", "vibration", "spectrum")
     row_subject = subject(name, "vibration", "spectrum")
@@ -456,7 +464,7 @@ def displacement_rms(spectrum: Spectrum, power: float = 1.0) -> float:
 
 
 def pieces_of_vibration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
-    """Phase spectrum of a platform's vibration along the line of sight, one way. [rad²/Hz]"""
+    """One-way phase spectrum of a platform's vibration along the line of sight. [rad²/Hz]"""
     vibration = getattr(mission.platforms, name).motion_error.vibration
     k = 2 * math.pi / mission.radar.wavelength * float(counted(mission, name, 1.0, "islr"))
     factor, slope = DISPLACED

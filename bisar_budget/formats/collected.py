@@ -1,15 +1,15 @@
-"""Collections that are read from radar files (scene, band, aperture, both paths, errors), and their mission files.
+"""Data that the import takes from a radar file (scene, band, aperture, paths, errors), and the mission file of them.
 
 Slow time is the time at which a pulse is at the scene point. The pulse leaves the transmitter R_t/c earlier and
-reaches the receiver R_r/c later, where R_t and R_r are the slant ranges. The position of a path at a slow time is the
-position of the transmitter at transmission, or of the receiver at reception. The range sum of a mission at a slow
-time is then the range sum of the pulse.
+reaches the receiver R_r/c later, where R_t and R_r are the slant ranges. At a slow time, the path of the transmitter
+has its position at the transmission of the pulse, and the path of the receiver its position at the reception. The sum
+of both ranges at a slow time is therefore the range sum of that pulse.
 
-Errors follow `ErrorParameters` of CPHD 1.1.0 and `ErrorStatistics` of SICD, volume 1: sigmas of position and
-velocity, P1 to V3, with their correlations. CRSD 1.0 and the bistatic part of SICD have covariances. Frames follow
-SICD, volume 3. ECF is fixed to the Earth. RIC_ECF has radial, in-track and cross-track axes that follow from the
-velocity relative to the turning Earth. RIC_ECI follows from the velocity relative to the stars; it is `ric` of a
-mission.
+`ErrorParameters` of CPHD 1.1.0 and `ErrorStatistics` of SICD, volume 1, state sigmas of position and velocity, P1 to
+V3, with their correlations. CRSD 1.0 and the bistatic part of SICD state covariance matrices. SICD, volume 3, defines
+the frames of the errors. ECF is fixed to the Earth. RIC_ECF has radial, in-track and cross-track axes, which are
+computed with the velocity relative to the rotating Earth. RIC_ECI has the same axes, computed with the velocity
+relative to the stars; a mission file calls it `ric`.
 """
 
 import json
@@ -50,16 +50,16 @@ _BETTER_FIT_FRACTION = 0.9  # of the residual; an order with a larger residual f
 
 
 class NoPathError(ValueError):
-    """No path can be fitted to the positions of a file."""
+    """The positions in a radar file are too few, or out of range, so that no path can be fitted to them."""
 
 
 @dataclass(frozen=True)
 class DeclaredMotionError:
     """Standard deviations of the measured path of one platform, along the axes of a frame of the mission.
 
-    `position` [m] and `velocity` [m/s] are one sigma for each axis, None if not declared. `correlation` is (6, 6), or
-    empty without correlations. `acceleration` [m/s²] is in the same frame. `distribution` is a distribution of the
-    mission file.
+    `position` [m], `velocity` [m/s] and `acceleration` [m/s²] have one sigma for each axis; None means not declared.
+    `correlation` contains the correlations (6, 6) of position and velocity; it is empty if there are none.
+    `distribution` is the name of the distribution, as a mission file writes it.
     """
 
     frame: str
@@ -79,7 +79,7 @@ class DeclaredMotionError:
 
 @dataclass(frozen=True)
 class ReferenceGeometry:
-    """Geometry at the reference vector of a file: its slow time [s], both slant ranges [m], bistatic angle [rad]."""
+    """Slow time [s], slant ranges [m] and bistatic angle [rad] at the reference pulse or time of a file."""
 
     slow_time: float
     transmitter_range: float
@@ -89,10 +89,11 @@ class ReferenceGeometry:
 
 @dataclass(frozen=True)
 class FileErrors:
-    """Errors that a radar file declares: motion errors of each platform, or common to both, and clock terms.
+    """Errors that a radar file declares: motion errors of each platform or common to both, and errors of the clocks.
 
-    `timing_constant` is a standard deviation of delay [s], and `timing_linear` is one of relative clock frequency.
-    `remarks` are facts for which a mission has no key. `at` is the XML path of the errors.
+    `timing_constant` is the standard deviation of the delay [s]. `timing_linear` is the standard deviation of the
+    relative difference of the clock frequencies. `remarks` explain how the errors were converted, and what could not
+    be expressed with the keys of a mission. `at` is the XML path of the errors.
     """
 
     transmitter: DeclaredMotionError | None = None
@@ -106,11 +107,11 @@ class FileErrors:
 
 @dataclass(frozen=True)
 class Imported:
-    """A collection that is read from a radar file.
+    """Scene, band, aperture, paths and errors that are read from a radar file.
 
     If `is_monostatic`, transmitter and receiver are one platform, so that its errors are the same for transmission
-    and reception. `remarks` are for the reader of the mission file; each is one fact. `unused` is a remark on vectors
-    that are not used, or empty.
+    and reception. `remarks` are sentences for the reader of the mission file. `unused` is a remark on the vectors
+    (records of pulses) of the file that are not used; it is empty if all are used.
     """
 
     file: str
@@ -134,7 +135,7 @@ class Imported:
 
 @dataclass(frozen=True)
 class Seen:
-    """Fitted paths of both platforms, as a mission states them, and the axes of the scene."""
+    """Paths of both platforms as polynomials of slow time, and the scene axes in which they are given."""
 
     transmitter: Fitted
     receiver: Fitted
@@ -142,7 +143,7 @@ class Seen:
 
 
 def reference_of(seen: Seen, slow_time: float) -> ReferenceGeometry:
-    """Compute the slant ranges [m] and the bistatic angle [rad] at a slow time. [s]"""
+    """Compute the slant ranges [m] and the bistatic angle [rad] at a slow time [s] from the fitted paths."""
     t, r = (track.state.at(slow_time)[0] for track in (seen.transmitter, seen.receiver))
     angle = math.atan2(norm(cross(unit(t), unit(r))), dot(unit(t), unit(r)))
     return ReferenceGeometry(slow_time, float(norm(t)), float(norm(r)), angle)
@@ -153,16 +154,17 @@ def fitted(times: Floats, positions: Floats, aperture_time_s: float, wavelength_
 
     The order of the polynomial is the lowest at which no position is farther from the path than 1/1000 of the
     wavelength, so that the phase error is negligible. The highest order is 4, because a mission states position,
-    velocity, acceleration, jerk and snap. If no order is sufficient, the lowest order is taken whose residuals no
-    higher order clearly reduces. The residuals are then noise of the positions, or faster motion.
+    velocity, acceleration, jerk and snap. If even this order is not sufficient, the function takes the lowest order
+    whose rms residual is at most 1/0.9 of that of the highest order. The residuals are then noise of the positions,
+    or motion that is faster than such a polynomial.
 
-    Slow times (n,) are in seconds, positions (n, 3) in metres along the scene's axes.
+    `times` (n,) are slow times in seconds; `positions` (n, 3) are in metres along the axes of the scene.
 
     Raises
     ------
     NoPathError
-        There are fewer than five positions within the aperture, or the positions or the aperture exceed the limits of
-        a mission.
+        There are fewer than five positions within the aperture, a position is farther away than a mission file
+        accepts, or the aperture time is not positive or too long.
     """
     if not 0 < aperture_time_s <= MAX_APERTURE_S:
         raise NoPathError(f"an aperture of {aperture_time_s:g} s is none; accepted: up to {MAX_APERTURE_S:g} s")
@@ -227,7 +229,7 @@ def sigmas_and_correlations(element: Element) -> Floats:
 
 
 def _require_size(sigmas: Floats, element: Element) -> None:
-    """Raise an error if sigmas (6,) are too large for a motion error; call this before they are squared."""
+    """Raise `FormatError` if sigmas (6,) of position or velocity are larger than a mission file accepts."""
     for kind, largest, written in zip((sigmas[:3], sigmas[3:]), _MAX_SIGMAS, ("m", "m/s"), strict=True):
         if kind.max() > largest:
             raise element.fault(f"has a sigma of {kind.max():.3g} {written}, more than {largest:g} {written}")
@@ -236,7 +238,7 @@ def _require_size(sigmas: Floats, element: Element) -> None:
 def correlated(covariance: Floats) -> tuple[Floats, Floats]:
     """Split a covariance (n, n) into sigmas (n,) and correlations (n, n).
 
-    Correlations of an error whose sigma is 0 are 0.
+    The correlations of a component whose sigma is 0 are set to 0, also on the diagonal.
     """
     sigmas = np.sqrt(np.clip(np.diag(covariance), 0, None))
     scale = np.outer(sigmas, sigmas)
@@ -246,11 +248,13 @@ def correlated(covariance: Floats) -> tuple[Floats, Floats]:
 def declared(
     covariance: Floats, frame: Element, state: PlatformState, axes: SceneAxes, owner: str
 ) -> tuple[DeclaredMotionError, list[str]]:
-    """Turn a covariance (6, 6) from the frame of a file into a frame of a mission, with remarks on the changes.
+    """Convert the errors of one platform from the frame of a radar file to a frame of a mission file.
 
-    ECF becomes the axes of the scene. RIC_ECI is `ric`. RIC_ECF is turned about the radial axis into `ric`; for a
-    platform in free fall, velocities then become relative to the stars. If the turned errors have no correlations,
-    only sigmas are returned.
+    `covariance` (6, 6) is that of position and velocity in the frame that the element `frame` names. Errors in ECF
+    are rotated to the axes of the scene. RIC_ECI is the frame `ric` of a mission, and needs no rotation. Errors in
+    RIC_ECF are rotated about the radial axis to `ric`; for a platform in free fall, their velocities are also
+    converted to velocities relative to the stars. Returns the errors, and remarks that describe the conversion. If
+    the converted errors have no correlations, their `correlation` is empty.
     """
     name = frame.text()
     _require_size(np.sqrt(np.abs(covariance).max(axis=1)), frame)
@@ -290,7 +294,7 @@ def declared(
 
 
 def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
-    """Unit vectors of a frame of a file, in the axes of the scene."""
+    """Unit vectors, in the axes of the scene, of the frame `name` (ECF, RIC_ECF or RIC_ECI) of a radar file."""
     if name == "ECF":
         x, y, z = zip(*axes.axes, strict=True)
         return x, y, z
@@ -302,7 +306,11 @@ def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
 
 
 def of_sigmas(parameters: Element | None, seen: Seen, *, is_monostatic: bool) -> FileErrors:
-    """Read the errors from `ErrorParameters` of CPHD, or from `ErrorStatistics` of SICD if it has components."""
+    """Read the errors that `ErrorParameters` of CPHD or `ErrorStatistics` of SICD states as sigmas.
+
+    `parameters` is this element. If it is None, or has no errors that a mission can express, the result contains only
+    a remark that says so.
+    """
     if parameters is None:
         return FileErrors(remarks=("The file declares no errors (ErrorParameters).",))
     mono = parameters.maybe("Monostatic") or (parameters.maybe("Components") if is_monostatic else None)
@@ -338,10 +346,10 @@ def _of_monostatic(mono: Element, seen: Seen) -> FileErrors:
 
 
 def _common(declared_error: DeclaredMotionError, remarks: list[str]) -> FileErrors:
-    """Make the errors of a single platform that transmits and receives.
+    """Make the errors of a monostatic file, in which one platform transmits and receives.
 
-    Errors that are the same along all axes become common errors. Other errors are stated for both platforms, with a
-    remark on how to combine them.
+    Errors that are the same along all axes become errors common to transmitter and receiver. Other errors are stated
+    once for the transmitter and once for the receiver, with a remark that they have to be added.
     """
     if declared_error.is_isotropic:
         remarks.append(
@@ -398,10 +406,10 @@ def _of_bistatic(bistatic: Element, seen: Seen) -> FileErrors:
 def _with_added(
     bistatic: Element, declared_errors: dict[str, DeclaredMotionError | None]
 ) -> tuple[dict[str, DeclaredMotionError | None], list[str]]:
-    """Apply the parameters that this program adds to the files it exports, and return the changed errors and remarks.
+    """Complete the errors with the parameters that this program writes to `AddedParameters` of a CPHD file.
 
-    The parameters state accelerations, distributions, and which errors are not declared. Other parameters become
-    remarks.
+    The parameters state accelerations, distributions, and which sigmas of the file are placeholders for errors that
+    are not declared. Returns the completed errors of each platform, and other parameters as remarks.
     """
     remarks = []
     for parameter in bistatic.all("AddedParameters/Parameter"):
@@ -432,11 +440,11 @@ def _with_added(
 def of_matrices(
     parameters: Element | None, seen: Seen, names: tuple[str, str], clocks: tuple[int, int]
 ) -> FileErrors:
-    """Read the errors from `ErrorParameters/SARImage` of CRSD, or from `ErrorStatistics` of SICD if it is bistatic.
+    """Read the errors that `ErrorParameters/SARImage` of CRSD or a bistatic SICD states as covariance matrices.
 
-    `parameters` contains `Monostatic` or `Bistatic`, or is the bistatic part itself. `names` are the names of two
-    elements: the element with the covariances, and the element with times and frequencies. `clocks` are the rows of
-    the frequencies of both clocks in the matrix of the second element.
+    `parameters` is the element that contains `Monostatic` or `Bistatic`, or the bistatic element itself. The first of
+    `names` is the element with the covariances of position and velocity. The second of `names` is the element with
+    the covariance of the times and clock frequencies; `clocks` are the indices of both clock frequencies in it.
     """
     if parameters is None:
         return FileErrors(remarks=("The file declares no errors (ErrorParameters).",))
@@ -508,7 +516,7 @@ _BENDS = (
 
 
 def mission_tree(imported: Imported) -> JsonObject:
-    """Return the content of the mission file as a tree: keys with values in usual units, without comments."""
+    """Return the content of a mission file as nested dictionaries, in which quantities are texts with usual units."""
     tree: JsonDocument = {
         "schema_version": 1,
         "name": imported.name,
@@ -540,7 +548,7 @@ def mission_tree(imported: Imported) -> JsonObject:
 
 
 def mission_text(imported: Imported) -> str:
-    """Return the text of a mission file, with remarks for the reader in comments."""
+    """Return the text of a mission file, with the remarks of the import as comments."""
     tree = mission_tree(imported)
     paragraphs = [wrap(printable(paragraph), _COMMENT_WIDTH - 2) or [""] for paragraph in _head(imported)]
     lines = [f"# {line}".rstrip() for paragraph in paragraphs for line in paragraph]

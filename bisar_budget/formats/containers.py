@@ -1,8 +1,8 @@
-"""Reading of radar files: the header, the XML and the parameters of every pulse, but never the signal.
+"""Reading of the header, the XML and the parameters of the pulses from radar files; the signal is never read.
 
 CPHD 1.1.0 (NGA.STND.0068-1) and CRSD 1.0 (NGA.STND.0080-2) begin with a header of text lines, which gives the byte at
-which each block begins. SICD (NGA.STND.0024) has its XML in a segment of a NITF file. XML is read without entities
-and references. Elements know their paths in the document, so that every fault can name the path.
+which each block begins. SICD (NGA.STND.0024) has its XML in a segment of a NITF file. XML with entities, or with
+references to other files, is refused. An error message names the path of the faulty element in the document.
 """
 
 import math
@@ -36,14 +36,14 @@ class FormatError(Exception):
 
 
 class MissingExtraError(Exception):
-    """The extra `formats` is not installed."""
+    """The optional dependencies `bisar-budget[formats]` (lxml, sarkit) are not installed."""
 
     def __init__(self) -> None:
         super().__init__(f"bisar-budget reads and writes radar formats with sarkit: {install_command('formats')}")
 
 
 def check_extra() -> None:
-    """Raise a `MissingExtraError` if the extra `formats` is not installed."""
+    """Raise `MissingExtraError` unless the optional dependencies `formats` (lxml, sarkit) can be imported."""
     try:
         for module in ("lxml.etree", "sarkit", "sarkit.cphd"):
             import_module(module)
@@ -52,10 +52,10 @@ def check_extra() -> None:
 
 
 class Element:
-    """An element of an XML document, with its file and its path in the document.
+    """An element of the XML document of a radar file, with methods that find and convert elements below it.
 
-    Paths are in the syntax of ElementPath without namespaces: `Channel/Parameters/FxC`. A step may have a condition
-    on a child, `Parameters[Identifier='1']`.
+    The methods take paths relative to the element, in the syntax of ElementPath but without namespaces, such as
+    `Channel/Parameters/FxC`.
     """
 
     def __init__(self, file: str, node: "_Element") -> None:
@@ -68,12 +68,12 @@ class Element:
 
     @property
     def namespace(self) -> str:
-        """Namespace of the element."""
+        """XML namespace of the element, which contains the version of the format; empty if it has none."""
         return str(self.node.tag).rpartition("}")[0].lstrip("{")
 
     @property
     def path(self) -> str:
-        """Path of the element from the root: `/CPHD/Channel/Parameters[2]`."""
+        """Path of the element from the root of the document, such as `/CPHD/Channel/Parameters[2]`."""
         steps = []
         node = self.node
         while node is not None:
@@ -85,11 +85,11 @@ class Element:
         return "/" + "/".join(reversed(steps))
 
     def fault(self, problem: str, below: str = "") -> FormatError:
-        """Make an error about this element, or about a path below it."""
+        """Make an error whose message names the file, this element or the path `below` it, and the problem."""
         return FormatError(self.file, f"{self.path}{'/' + below if below else ''} {problem}")
 
     def all(self, path: str) -> list["Element"]:
-        """All elements at a path."""
+        """All elements at a path below this element; empty if there are none."""
         return [Element(self.file, node) for node in self.node.findall(_any_namespace(path))]
 
     def maybe(self, path: str) -> "Element | None":
@@ -105,13 +105,13 @@ class Element:
         return element
 
     def with_child(self, path: str, child: str, text: str) -> "Element | None":
-        """First element at a path whose child `child` has the text `text`, or None."""
+        """First element at a path that has a child `child` with the text `text`; None if there is none."""
         return next(
             (element for element in self.all(path) if element.maybe(child) and element.text(child) == text), None
         )
 
     def text(self, path: str = "") -> str:
-        """Text of the element at a path."""
+        """Text of the element at a path, without leading and trailing spaces."""
         return (self.one(path).node.text or "").strip()
 
     def number(self, path: str = "") -> float:
@@ -133,12 +133,12 @@ class Element:
         return int(text)
 
     def vector(self, path: str = "") -> Vector:
-        """Read the vector with components X, Y and Z at a path."""
+        """Read the vector at a path from its child elements X, Y and Z."""
         node = self.one(path)
         return (node.number("X"), node.number("Y"), node.number("Z"))
 
     def polynomial(self, path: str = "", variables: int = 1) -> Floats:
-        """Read the coefficients of a polynomial of one or more variables, (order1 + 1, …)."""
+        """Read the coefficients of a polynomial at a path, an array (order1 + 1, …) with one axis per variable."""
         node = self.one(path)
         numbers = range(1, variables + 1)
         coefficients = np.zeros([node._attribute(f"order{number}", _MAX_POLYNOMIAL_ORDER) + 1 for number in numbers])
@@ -150,7 +150,7 @@ class Element:
         return coefficients
 
     def path_polynomial(self, path: str) -> Floats:
-        """Read the polynomial of a position as a function of time; returns the coefficients, (order + 1, 3)."""
+        """Read the coefficients (order + 1, 3) of the polynomials of time that give the position X, Y and Z."""
         axes = [self.one(path).polynomial(axis) for axis in "XYZ"]
         most = max(axis.size for axis in axes)
         return np.stack([np.pad(axis, (0, most - axis.size)) for axis in axes], axis=1)
@@ -158,7 +158,7 @@ class Element:
     def matrix(self, path: str, size: int) -> Floats:
         """Read a symmetric matrix (size, size) from `Entry` elements.
 
-        One entry of each symmetric pair is enough. Pairs without an entry are 0.
+        The file may state only one of the two equal entries (i, j) and (j, i). Entries that it does not state are 0.
         """
         entries = np.full((size, size), np.nan)
         for entry in self.one(path).all("Entry"):
@@ -182,12 +182,12 @@ def _any_namespace(path: str) -> str:
 
 
 def parse(file: str, data: bytes, start: int = 0) -> Element:
-    """Parse an XML document from a file; `start` is the byte of the file at which the document begins.
+    """Parse `data`, the XML document that begins at the byte `start` of a file, and return its root element.
 
     Raises
     ------
     FormatError
-        The data are not XML, or have a document type, entities or references.
+        The data are not XML, or have a document type, entities or references to other files.
     """
     try:
         from lxml import etree
@@ -224,9 +224,9 @@ _ROOTS = {"CPHD": "CPHD", "CRSDsar": "CRSD", "CRSDtx": "CRSD", "CRSDrcv": "CRSD"
 
 @dataclass(frozen=True)
 class Container:
-    """The readable parts of a radar file: its format, its XML, and the position of each block.
+    """Format and XML of a radar file, and the positions of its binary blocks.
 
-    `blocks` has the first byte and the length of each block, by name; it is empty if the file is only XML.
+    `blocks` maps the name of a block to its first byte and its length in bytes; it is empty if the file is only XML.
     """
 
     file: str
@@ -237,11 +237,11 @@ class Container:
 
     @property
     def has_vectors(self) -> bool:
-        """Whether the file contains the parameters of pulses, and not only XML."""
+        """Whether the file has a block with the parameters of the pulses (PVP)."""
         return "PVP" in self.blocks
 
     def vectors(self, block: str, offset: int, count: int, dtype: np.dtype[np.void]) -> Records:
-        """Read the parameters of `count` vectors of a block, from an offset in bytes; no other bytes are read."""
+        """Read the parameters of `count` pulses from a block, beginning at `offset` bytes from its start."""
         start, length = self.blocks[block]
         needed = count * dtype.itemsize
         if offset + needed > length or needed > _MAX_VECTOR_BYTES:
@@ -256,7 +256,10 @@ class Container:
 
 
 def open_container(file: str) -> Container:
-    """Read the header and the XML of a file; raises `FormatError` if it is unreadable, unknown or cut off."""
+    """Read the header and the XML of a radar file.
+
+    Raises `FormatError` if the file cannot be read, has an unknown format, or is cut off.
+    """
     try:
         if not stat.S_ISREG(os.stat(file).st_mode):  # a pipe would wait for ever
             raise FormatError(file, "is no regular file")

@@ -1,7 +1,7 @@
 """Export of a simulated phase history as CPHD 1.1.0 (NGA.STND.0068-1).
 
-The signal follows from the true ranges, and the file states the measured positions. The difference is the declared
-errors, as in recorded data: an image that is formed with the stated positions is displaced and defocused. The signal
+The signal is computed from the true ranges, and the file states the measured positions. Both differ by the declared
+errors, as in recorded data, so that an image formed with the stated positions is displaced and defocused. The signal
 is in the frequency domain, and SGN is −1. A point whose echo arrives ΔTOA later than the echo of the reference point
 has the signal exp(−j2π fx ΔTOA), as in the signal model of the standard. The reference point (SRP) is the scene
 centre.
@@ -71,9 +71,10 @@ _VECTOR_WORDS = (
 
 @dataclass(frozen=True)
 class Exported:
-    """Content of an exported CPHD file, and numbers for its description.
+    """Bytes of an exported CPHD file, with the numbers of its vectors, samples per vector and scatterers.
 
-    `half` is half the side length of the image area [m]. `remarks` name details that the mission does not state.
+    `half` is half the side length of the image area [m]. `remarks` state which values were assumed because the
+    mission does not state them.
     """
 
     data: bytes
@@ -86,10 +87,10 @@ class Exported:
 
 @dataclass(frozen=True)
 class _Plan:
-    """Dimensions of the phase history and of the image area.
+    """Numbers of pulses and samples of the phase history to simulate, and size of the image area.
 
     `pulses` and `samples` are the numbers of pulses and of frequencies. `delay` is the largest magnitude of the delay
-    relative to the reference point [s]. `half` is half the side length of the image area [m]. `cell` are the
+    relative to the reference point [s]. `half` is half the side length of the image area [m]. `cell` contains the
     resolutions in range and cross-range [m].
     """
 
@@ -103,13 +104,13 @@ class _Plan:
 def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     """Simulate the phase history of targets with the declared errors of a mission, and return it as CPHD.
 
-    Clutter has one random scatterer for each resolution cell of the image area.
+    If `targets` contains clutter, it is simulated by one random scatterer per resolution cell of the image area.
 
     Raises
     ------
     SimulationError
-        There are too few pulses for the scene, or more memory is needed than `simulation.memory_limit`. Both are
-        checked before data are computed.
+        The mission has too few pulses for the scene, or the phase history needs more memory than
+        `simulation.memory_limit`. Both are checked before the signal is computed.
     MissingExtraError
         The extra `formats` is not installed.
     """
@@ -157,7 +158,7 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
 
 
 def _plan(mission: Mission, targets: Targets, collection: PointCollection, errors: Errors) -> _Plan:
-    """Choose the image area, and enough samples and pulses to avoid ambiguities in range and Doppler."""
+    """Choose the size of the image area, and enough samples and pulses to have no ambiguities in it."""
     T, radar = mission.collection.aperture_time, mission.radar
     try:
         effect = collection.effect(errors.still())
@@ -210,12 +211,14 @@ def _scene(mission: Mission, targets: Targets, plan: _Plan) -> tuple[Floats, NDA
 def _vectors(
     mission: Mission, slow_time: Floats, flown: Flight, smooth: Flight, axes: SceneAxes, plan: _Plan
 ) -> tuple[Records, float]:
-    """Compute the parameters of each vector, and the time from the file's start to the middle of the aperture [s].
+    """Compute the parameters of the vectors, one for each pulse, as the CPHD file states them.
 
-    A pulse is at the scene centre at its slow time. According to the measured positions it leaves the transmitter
-    R_t/c earlier and is received R_r/c later, so the reference time of section 6.5.1 (5) is the slow time. While slow
-    time advances by 1 s, the time of transmission advances by 1 − Ṙ_t/c and the time of reception by 1 + Ṙ_r/c.
-    Velocities with respect to slow time are therefore divided by these factors.
+    Also returns the time from the start of the collection to the middle of the aperture [s]. `smooth` is the flight
+    `flown` without vibration and fast errors. A pulse is at the scene centre at its slow time. According to the
+    measured positions it leaves the transmitter R_t/c earlier and is received R_r/c later, so the reference time of
+    section 6.5.1 (5) is the slow time. While slow time advances by 1 s, the time of transmission advances by 1 −
+    Ṙ_t/c and the time of reception by 1 + Ṙ_r/c. Velocities with respect to slow time are therefore divided by these
+    factors.
     """
     dtype = np.dtype(
         [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR_WORDS]
@@ -271,7 +274,7 @@ def _document(
     offset: float,
     remarks: list[str],
 ) -> "_ElementTree":
-    """Make the XML of the file as an lxml tree; sarkit computes the reference geometry from the vectors."""
+    """Make the XML document of the CPHD file; sarkit computes its `ReferenceGeometry` from the vectors."""
     etree = import_module("lxml.etree")
     skcphd = import_module("sarkit.cphd")
     low, high = float(vectors["FX1"][0]), float(vectors["FX2"][0])
@@ -341,7 +344,8 @@ def _document(
 def _grow(etree: ModuleType, root: "_Element", leaves: _Leaves) -> None:
     """Add an element below the root for each path in `leaves`, with the value as its text.
 
-    A step of a path may have an attribute. Polynomials get only their constant term.
+    A name in a path may have an attribute, such as `IACP@index=1`. The value of an element whose name ends with
+    `Poly` becomes the constant term of a polynomial of order 0.
     """
     elements = {"": root}
     for path, value in leaves.items():
@@ -371,9 +375,9 @@ def _degrees(path: str, point: Geodetic) -> _Leaves:
 
 
 def _scene_coordinates(plan: _Plan, axes: SceneAxes) -> _Leaves:
-    """Make the `SceneCoordinates` elements: the plane of the scene with x east and y north, and the image area.
+    """Make the elements of `SceneCoordinates`: the ground plane (x east, y north), the image area and the image grid.
 
-    Corners are clockwise as seen from above.
+    The corners of the image area are listed clockwise as seen from above.
     """
     half = plan.half
     corners = [(-half, -half), (-half, half), (half, half), (half, -half)]
@@ -431,10 +435,10 @@ def _product(mission: Mission, targets: Targets, remarks: list[str]) -> _Leaves:
 
 # ---------------------------------------------------------------------- declared errors
 def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
-    """Elements of `ErrorParameters` for both platforms: the declared sigmas, without the coverage factor.
+    """Make the elements of `ErrorParameters` from the declared errors of both platforms; empty if there are none.
 
-    The sigmas of each platform include errors that both platforms share. Errors for which the standard has no element
-    are in `AddedParameters`.
+    The elements state declared sizes as one sigma, without the coverage factor. The sigmas of each platform include
+    the errors that both platforms share. Errors for which the standard has no element are in `AddedParameters`.
     """
     added: dict[str, str] = {}
     leaves: _Leaves = {}
@@ -457,9 +461,9 @@ def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
 
 
 def _rows_without_element(mission: Mission, added: Mapping[str, str]) -> dict[str, str]:
-    """Declared sizes, by row, of errors for which the standard has no element, without the coverage factor.
+    """Texts of the declared sizes, by row id, of the errors for which the CPHD standard has no element.
 
-    Errors that `added` has in the words of the file are left out.
+    The sizes do not include the coverage factor. Errors that are already in `added` are left out.
     """
     alone = mission._replace(allocation=mission.allocation._replace(coverage_factor=1.0))
     sizes: dict[str, str] = {}
@@ -473,9 +477,10 @@ def _rows_without_element(mission: Mission, added: Mapping[str, str]) -> dict[st
 
 
 def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, str]) -> tuple[Floats, str]:
-    """Compute the covariance (6, 6) of position and velocity of one platform, and name its frame. [m², m²/s, m²/s²]
+    """Compute the error covariance (6, 6) of position and velocity of one platform, and name its frame.
 
-    The frame is a frame of the standard. Errors that a covariance cannot contain are added to `added`.
+    Units are m², m²/s and m²/s². The frame is `ECF` or `RIC_ECI` of the standard. Declared errors that a covariance
+    cannot express, such as an acceleration, are added as texts to `added`.
     """
     error = getattr(mission.platforms, owner).motion_error
     state: PlatformState = getattr(mission.geometry, owner)
@@ -522,7 +527,7 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
 
 
 def _along_scene(covariance: Floats, state: PlatformState, frame: str) -> Floats:
-    """Turn a covariance (6, 6) from the axes of a frame to the axes of the scene, with Earth-fixed velocities."""
+    """Rotate a covariance (6, 6) from a frame of a mission to the scene axes, with Earth-fixed velocities."""
     axes = np.array(state.frame(frame), dtype=float)
     if frame == "ric" and state.fall is not None:
         covariance = with_rate(covariance, -axes @ np.array(state.fall.rotation))
@@ -540,7 +545,7 @@ def _pos_vel_err(path: str, covariance: Floats, frame: str) -> _Leaves:
 
 
 def _file(tree: "_ElementTree", vectors: Records, signal: NDArray[np.generic]) -> bytes:
-    """Write a CPHD file with sarkit from the XML, the parameters of the vectors and the signal; return its bytes."""
+    """Combine XML, vectors and signal into a CPHD file with sarkit, and return the bytes of the file."""
     skcphd = import_module("sarkit.cphd")
     with tempfile.TemporaryFile() as stream:  # the writer needs a real file
         with skcphd.Writer(stream, skcphd.Metadata(xmltree=tree)) as writer:

@@ -1,6 +1,7 @@
 """Import of collections from CPHD, CRSD and SICD files.
 
-The paths of the platforms follow from the parameters of the pulses in CPHD and CRSD, and from polynomials in SICD.
+The paths of the platforms are fitted to the positions that CPHD and CRSD state for each pulse. SICD states the paths
+as polynomials of time.
 """
 
 import hashlib
@@ -42,7 +43,7 @@ _MAX_GAP_FRACTION = 0.02  # of the aperture that may be without pulses at its en
 
 @dataclass(frozen=True, eq=False)
 class _Pulses:
-    """Pulses of a channel: times of transmission and reception [s], and Earth-fixed positions at these times [m]."""
+    """Times of transmission and reception of pulses [s], and Earth-fixed platform positions at these times [m]."""
 
     sent: Floats
     transmitter: Floats
@@ -53,7 +54,7 @@ class _Pulses:
 
     @property
     def unused_words(self) -> str:
-        """Remark on vectors that are not used; empty if all are used."""
+        """Text that states how many vectors of the file are not used, and why; empty if all are used."""
         if not self.unused:
             return ""
         count = self.sent.size + self.unused
@@ -71,9 +72,10 @@ class _Aperture(NamedTuple):
 
 
 def import_collection(file: str, channel: str | None = None) -> Imported:
-    """Read the collection of a CPHD, CRSD or SICD file, or of the XML of such a file. The signal is not read.
+    """Read scene, band, aperture, paths and errors from a CPHD, CRSD or SICD file, or from the XML of CPHD or SICD.
 
-    `channel` is the identifier of a channel of CPHD or CRSD; None is the reference channel.
+    The signal is not read. `channel` is the identifier of a channel of CPHD or CRSD; None selects the reference
+    channel.
 
     Raises
     ------
@@ -91,7 +93,7 @@ def import_collection(file: str, channel: str | None = None) -> Imported:
 
 # ---------------------------------------------------------------------- CPHD
 def _cphd(container: Container, channel: str | None) -> Imported:
-    """Import CPHD 1.0.1 or 1.1.0 (NGA.STND.0068-1)."""
+    """Import CPHD 1.0.1 or 1.1.0 (NGA.STND.0068-1) from its vectors, or from `ReferenceGeometry` if it has none."""
     xml = container.xml
     channel, parameters = _chosen(xml, channel, "Channel/Parameters", "Identifier")
     center, bandwidth = parameters.number("FxC"), parameters.number("FxBW")
@@ -131,7 +133,7 @@ def _cphd(container: Container, channel: str | None) -> Imported:
 
 
 def _dtype(xml: Element, block: str) -> np.dtype[np.void]:
-    """Make the NumPy data type for the parameters of a vector, or of a transmitted pulse, from their XML."""
+    """Make the NumPy data type of one record of the block PVP or PPP from its description in the XML."""
     module = import_module("sarkit.cphd" if xml.tag == "CPHD" else "sarkit.crsd")
     reads = module.get_ppp_dtype if block == "PPP" else module.get_pvp_dtype
     try:
@@ -179,7 +181,7 @@ def _pulses_of_cphd(container: Container, vectors: Records, parameters: Element)
 
 
 def _scene_time(pulses: _Pulses, axes: SceneAxes) -> Floats:
-    """Compute the times (pulses,) at which pulses are at the scene point. [s]
+    """Compute the time at which each pulse is at the scene point, an array (pulses,). [s]
 
     This is the reference time of CPHD 1.1.0, section 6.5.1 (5).
     """
@@ -192,7 +194,7 @@ def _scene_time(pulses: _Pulses, axes: SceneAxes) -> Floats:
 
 
 def _dwell(xml: Element, dwell: Element | None, identifiers: Element, point: Vector) -> _Aperture:
-    """Compute the centre of dwell and the dwell time at the scene point as in CPHD 1.1.0, section 6.5.1 (6)."""
+    """Compute the aperture at the scene point from the dwell polynomials (CPHD 1.1.0, section 6.5.1 (6))."""
     if dwell is None:
         raise xml.fault("is missing: nothing says how long the scene point is seen", "Dwell")
     times = []
@@ -238,7 +240,7 @@ def _off_reference_point(xml: Element, point: Vector) -> list[str]:
 
 
 def _stated(xml: Element, axes: SceneAxes, is_monostatic: bool) -> Seen:
-    """Read the paths of both platforms from `ReferenceGeometry` of CPHD."""
+    """Make straight paths from the position and velocity of each platform in `ReferenceGeometry` of CPHD."""
     geometry = xml.one("ReferenceGeometry")
     paths = (
         ("Monostatic/ARP", "Monostatic/ARP") if is_monostatic else ("Bistatic/TxPlatform/", "Bistatic/RcvPlatform/")
@@ -253,7 +255,7 @@ def _stated(xml: Element, axes: SceneAxes, is_monostatic: bool) -> Seen:
 
 # ---------------------------------------------------------------------- CRSD
 def _crsd(container: Container, channel: str | None) -> Imported:
-    """Import CRSD 1.0 of a SAR collection (NGA.STND.0080-2), from transmitted pulses and receive windows."""
+    """Import a SAR collection in CRSD 1.0 (NGA.STND.0080-2) from its transmitted pulses and receive windows."""
     xml = container.xml
     if xml.tag != "CRSDsar":
         raise FormatError(container.file, f"/{xml.tag} is one way of a collection; accepted: CRSDsar, which has both")
@@ -293,10 +295,10 @@ def _crsd(container: Container, channel: str | None) -> Imported:
 def _pulses_of_crsd(
     container: Container, vectors: Records, transmit_vectors: Records, point: Vector, parameters: Element
 ) -> _Pulses:
-    """Find the pulses, and the time at which the echo of the scene point is received for each of them.
+    """Read the pulses, and compute when and where the echo of the scene point is received for each of them.
 
-    The file states the receiver's position at the start of the receive window. Its velocity extrapolates the position
-    to the time of the echo, less than a millisecond later.
+    The file states position and velocity of the receiver at the start of the receive window. With this velocity the
+    position is extrapolated to the time of the echo, less than a millisecond later.
     """
     xml = container.xml
     window_start, positions, velocities, index = _fields(
@@ -322,7 +324,7 @@ def _pulses_of_crsd(
 
 # ---------------------------------------------------------------------- SICD
 def _sicd(container: Container, channel: str | None) -> Imported:
-    """Import SICD (NGA.STND.0024-1), from the polynomials of the platforms in the aperture of the image."""
+    """Import SICD (NGA.STND.0024-1); the paths are its position polynomials, sampled in the aperture of the image."""
     xml = container.xml
     if channel is not None:
         raise FormatError(container.file, f"a SICD is one image and has no channel {shown(channel)!r}")
@@ -337,7 +339,7 @@ def _sicd(container: Container, channel: str | None) -> Imported:
     transmitter_path, receiver_path = _polynomials_of_sicd(xml, is_monostatic)
 
     def pulses_at(times: Floats) -> _Pulses:
-        """Compute the pulses that are at the scene point at `times`."""
+        """Compute times and platform positions for the pulses that are at the scene point at `times`."""
         sent, received = times, times
         if not is_monostatic:  # a monostatic aperture reference point is at the time in between
             for _ in range(_LIGHT_TIME_STEPS):
@@ -404,13 +406,14 @@ def _polynomials_of_sicd(xml: Element, is_monostatic: bool) -> tuple[Floats, Flo
 def _aperture_of_sicd(
     xml: Element, point: Vector, middle: float, center: float, pulses_at: Callable[[Floats], _Pulses]
 ) -> tuple[_Aperture, list[str]]:
-    """Compute the aperture of a pixel at the scene point, and make remarks on it.
+    """Compute the aperture of a pixel at the scene point, and make remarks that explain it.
 
-    The aperture is the processed time, or a shorter time that follows from the bandwidth of the image. The processing
-    of a stripmap takes more time than the illumination of one point. The wave vector of the image changes along the
-    column direction `col` by |d(u_t + u_r)/dt · col| f/c per second, where u_t and u_r are unit vectors along the
-    lines of sight. The bandwidth ImpRespBW of a column is this change during the aperture. `middle` is the middle of
-    the aperture [s], and `center` is the centre frequency [Hz].
+    The aperture is the processed time interval of the file, or a shorter one that is computed from the bandwidth of
+    the image, since a stripmap is processed from more data than one point contributes to. The spatial frequency of
+    the image along its column direction `col` changes by |d(u_t + u_r)/dt · col| f/c per second, where u_t and u_r
+    are unit vectors along the lines of sight. The bandwidth ImpRespBW of a column is the change during the aperture.
+    `middle` is the middle of the aperture [s], and `center` is the centre frequency f [Hz]. `pulses_at` returns the
+    pulses that are at the scene point at given times.
     """
     formation = xml.one("ImageFormation")
     begin, end = formation.number("TStartProc"), formation.number("TEndProc")
@@ -443,7 +446,7 @@ def _aperture_of_sicd(
 
 # ---------------------------------------------------------------------- all formats
 def _chosen(xml: Element, channel: str | None, path: str, key: str) -> tuple[str, Element]:
-    """Find the identifier and the parameters of a channel; if `channel` is None, of the reference channel."""
+    """Find the identifier and the XML element of a channel; None selects the reference channel of the file."""
     name = xml.text("Channel/RefChId") if channel is None else channel
     parameters = xml.with_child(path, key, name)
     if parameters is None:
@@ -453,7 +456,10 @@ def _chosen(xml: Element, channel: str | None, path: str, key: str) -> tuple[str
 
 
 def _flown(container: Container, pulses: _Pulses, point: Vector, aperture: _Aperture, center: float) -> Seen:
-    """Fit the paths of both platforms to the positions of the pulses in the aperture; `center` is in Hz."""
+    """Fit the paths of both platforms to the positions of the pulses in the aperture.
+
+    `point` is the scene point, and `center` is the centre frequency [Hz].
+    """
     if not center > 0:
         raise FormatError(container.file, f"its centre frequency is {center:g} Hz")
     axes = axes_at(geodetic(point))
@@ -482,7 +488,7 @@ def _coverage(pulses: _Pulses, axes: SceneAxes, aperture: _Aperture) -> list[str
 
 
 def _names(xml: Element, path: str) -> tuple[str, list[str]]:
-    """Read the name of the collection, and a remark on its collector and illuminator."""
+    """Read the name of the collection, and make a remark that names its collector and illuminator if stated."""
     elements = {key: xml.maybe(f"{path}/{key}") for key in ("CoreName", "CollectorName", "IlluminatorName")}
     core, collector, illuminator = (element.text() if element is not None else "" for element in elements.values())
     collected = f"Collected by {shown(collector)}" if collector else ""

@@ -1,4 +1,4 @@
-"""Functions of `import bisar_budget as bb`: questions about a mission, and answers that notebooks display."""
+"""Functions of the Python interface, `import bisar_budget as bb`, and the results that they return."""
 
 # What other rooms may use.
 __all__ = ["checks", "imaging", "missions", "progress", "questions", "results", "sweeps"]

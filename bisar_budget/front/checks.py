@@ -1,4 +1,4 @@
-"""Checks of missions, with the optional parts of reports: Monte Carlo, images, studies and specifications."""
+"""Checks of missions, and the optional parts of reports: Monte Carlo, images, trade studies and specifications."""
 
 import datetime as dt
 import os
@@ -55,7 +55,7 @@ def day_of(date: str | dt.date | None) -> dt.date:
     Raises
     ------
     ValueError
-        The argument or the environment variable is not a day.
+        `date` is not a day, or the environment variable SOURCE_DATE_EPOCH is not a time in seconds since 1970.
     """
     if isinstance(date, dt.datetime):
         return date.date()
@@ -76,9 +76,9 @@ def day_of(date: str | dt.date | None) -> dt.date:
 
 
 def day_origin(day: str | dt.date | None, giver: str) -> str:
-    """Name the origin of the day on which waivers are judged.
+    """Name the origin of the day on which waivers are judged, for reports.
 
-    The origin is `giver` if `day` is given, or else the environment variable, or else the day of the run.
+    The origin is `giver` if `day` is given, or else the variable SOURCE_DATE_EPOCH, or else the day of the run.
     """
     if day is not None:
         return giver
@@ -86,7 +86,7 @@ def day_origin(day: str | dt.date | None, giver: str) -> str:
 
 
 def outside_of(model: str | None, day: str | dt.date | None) -> Outside:
-    """Influences on a verdict that come from the arguments `model` and `day` of a question."""
+    """Describe the arguments `model` and `day` of a call as influences on a verdict from outside the mission file."""
     options = () if model is None else (Override("--model", model, _CALLER),)
     return Outside(options, day_origin(day, _CALLER), day is not None, _CALLER)
 
@@ -114,20 +114,23 @@ def check(
     date : str or date, optional
         Day on which waivers are judged; by default the day of SOURCE_DATE_EPOCH, or else today, UTC.
     monte_carlo : int, optional
-        Number of draws of the errors, to report how often each requirement is met; `seed` is as in `monte_carlo`.
+        Number of draws of the errors, to report how often each requirement is met.
+    seed : int, optional
+        Seed of these draws, as in the function `monte_carlo`.
     verify : bool
-        Whether to form images at the limits; their verdicts then also influence the status.
+        Whether to form images with errors at the limits; their verdicts then also influence the status.
     sweep : mapping, optional
-        Values of one key or two, as in `sweep`; the report shows the results.
+        Values of one or two keys, as in the function `sweep`. The mission is also checked with each of these values,
+        and the report shows the results.
     outside : Outside, optional
-        Origins of the model and the day; by default the caller.
+        Origins of `model` and `date` that the report names; by default the caller.
 
     Raises
     ------
     MissionError
         The model is unknown.
     QuestionError
-        The mission cannot answer the sweep.
+        The values of `sweep` do not fit the mission, such as those of an unknown key, or are too many.
     """
     from bisar_budget.front.results import CheckResult
 
@@ -159,7 +162,7 @@ def checked(
     swept: Sequence[str] = (),
     is_illustrated: bool = False,
 ) -> list[CheckedMission]:
-    """Check mission files, and add all content that a report needs.
+    """Check mission files, and add the optional parts of the report that were requested.
 
     Parameters
     ----------
@@ -170,18 +173,18 @@ def checked(
     model, changes, outside
         As in `check_files`.
     drawn : Draws, optional
-        Draws of a Monte Carlo; None without one.
+        Number of draws and seed of a Monte Carlo; None if none is requested.
     is_verified : bool
-        Whether images are formed at the limits, and their verdicts are added.
+        Whether to form images with errors at the limits, and add their verdicts.
     swept : sequence of str
-        Texts `KEY=VALUES` of a study.
+        Texts `KEY=VALUES` with the values of one or two keys for a trade study; empty if none is requested.
     is_illustrated : bool
-        Whether the report can show pictures. Analyses and images are then kept, and sheets of specifications added.
+        Whether the report can show pictures. Analyses and images are then kept, and specifications are added.
 
     Raises
     ------
     QuestionError
-        A mission cannot answer the study; the message begins with its file.
+        The values of `swept` do not fit a mission; the message begins with the name of its file.
     """
     keep = whole if is_verified or is_illustrated else without_analysis
     results = check_files(files, today, model, keep, drawn=drawn, changes=changes, outside=outside)
@@ -202,14 +205,14 @@ def pieces(
     changes: Sequence[SetValue] = (),
     outside: Outside = NOTHING_OUTSIDE,
 ) -> list[Piece]:
-    """Check files, and return the text of the report for each mission; findings are not kept in memory."""
+    """Check mission files, and return for each its text of the report, without keeping its findings in memory."""
     keep = partial(piece, format_name=format_name, style=style)
     return check_files(files, today, model, keep, changes=changes, outside=outside)
 
 
 # ---------------------------------------------------------------------- draws
 def drawn_here(draws: int, seed: int | None) -> Draws:
-    """Make the settings for a Monte Carlo whose draws this process makes, with a progress bar."""
+    """Make the settings of a Monte Carlo that runs in this process and shows a progress bar."""
     from bisar_budget.sampling.draws import in_turn
 
     return Draws(draws, seed, partial(_watched, in_turn, None))
@@ -219,9 +222,10 @@ def drawn_here(draws: int, seed: int | None) -> Draws:
 def drawn_by(
     scheduler: str | None, patience: int, draws: int | None, seed: int | None, files: int
 ) -> "Iterator[Draws | None]":
-    """Yield the settings for a Monte Carlo on this machine or on the workers of a scheduler; None without draws.
+    """Context manager that yields the settings of a Monte Carlo; None if `draws`, the number of draws, is None.
 
-    `files` is the number of mission files. `patience` is the longest time to wait without a worker. [s]
+    The workers of `scheduler` make the draws; if it is None, this machine makes them. `patience` is the longest time
+    for which to wait for a worker of the scheduler [s]. `files` is the number of mission files of the command.
     """
     if draws is None:
         yield None
@@ -236,7 +240,10 @@ def drawn_by(
 
 
 def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "Iterator[tuple[DrawsPiece, Tally]]":
-    """Yield the pieces of draws from `make`, and show progress; if they will take long, tell the user first."""
+    """Yield the pieces of draws that `make` computes, and show a progress bar.
+
+    For more than a million draws, the time is estimated first, and the user is told if it is more than a minute.
+    """
     from bisar_budget.sampling.draws import Drawer, DrawsPiece
 
     if drawing.draws > _MANY_DRAWS and drawing.judged:
@@ -260,9 +267,9 @@ def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "I
 
 # ---------------------------------------------------------------------- images
 def with_images(missions: Sequence[CheckedMission], today: dt.date, *, is_illustrated: bool) -> list[CheckedMission]:
-    """Verify the limits of usable missions by images, and return all missions, with the verdicts of the images.
+    """Form images with errors at the limits of each usable mission, and add the verdicts of the images to it.
 
-    With `is_illustrated` the usable missions also have images for their most important rows.
+    If `is_illustrated`, images for the most important rows are added too. Unusable missions are returned unchanged.
     """
     from bisar_budget.budget.verdicts import with_verdicts
     from bisar_budget.front import imaging
@@ -288,14 +295,15 @@ def with_images(missions: Sequence[CheckedMission], today: dt.date, *, is_illust
 def with_studies(
     missions: Sequence[CheckedMission], asked: Sequence[str] | Mapping[str, object], model: str | None, today: dt.date
 ) -> list[CheckedMission]:
-    """Sweep each usable mission, and return the missions with the results as a study.
+    """Check each usable mission with all given values of one or two keys, and add the results as a trade study.
 
-    `asked` are texts `KEY=VALUES`, or a mapping of keys to values.
+    `asked` contains the values, as texts `KEY=VALUES` or as a mapping of keys to values. Unusable missions are
+    returned unchanged.
 
     Raises
     ------
     QuestionError
-        A mission cannot answer the sweep; the message begins with its file.
+        The values do not fit a mission; the message begins with the name of its file.
     """
     from bisar_budget.design.table import listed
     from bisar_budget.findings.trade import TradeStudy
@@ -339,9 +347,9 @@ def with_studies(
 def _of(
     mission: Mission, ask: Callable[Arguments, Answer], *arguments: Arguments.args, **options: Arguments.kwargs
 ) -> Answer:
-    """Call a function that answers a question about a mission, and return its result.
+    """Call the function `ask` with the arguments, and return its result.
 
-    If the function raises `QuestionError`, the name of the mission file is put before the message.
+    If the function raises `QuestionError`, the name of the file of `mission` is put before the message.
     """
     try:
         return ask(*arguments, **options)
@@ -350,9 +358,9 @@ def _of(
 
 
 def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, object]) -> "Cases":
-    """Make the cases of a study, with several values of each key.
+    """Make the cases of a trade study, one for every combination of the values of its keys.
 
-    Raises `QuestionError` if there are too many keys, or more than `MAX_STUDY_CASES` cases.
+    Raises `QuestionError` for more than two keys, a key with a single value, or more than `MAX_STUDY_CASES` cases.
     """
     from bisar_budget.design.cases import grid
     from bisar_budget.front.missions import grid_of
@@ -380,9 +388,10 @@ def gathered(
     advance: Callable[[int], None] = lambda _: None,
     jobs: int | None = None,
 ) -> "Gathered":
-    """Check all cases, and gather the columns that a drawing needs.
+    """Check all cases of a sweep, and gather the columns of its table that a drawing needs.
 
-    `advance` is called after each part, with the number of its cases.
+    `columns` are further columns to gather. `advance` is called after each part of the cases is checked, with the
+    number of cases in this part.
     """
     from bisar_budget.design.sweep import Asked
     from bisar_budget.report.drawing.trades import Gathered
@@ -400,9 +409,9 @@ def gathered(
 
 # ---------------------------------------------------------------------- specifications
 def with_sheets(missions: Sequence[CheckedMission], model: str | None, today: dt.date) -> list[CheckedMission]:
-    """Add a sheet of specifications to each mission whose file has `allocation.specify`.
+    """Find specifications for the errors of each mission whose file has `allocation.specify`, and add them.
 
-    A mission for which no sheet can be made gets a warning instead.
+    If no specifications can be found, the mission gets a warning that says why.
     """
     return [
         _with_sheet(findings, model, today) if isinstance(findings, MissionFindings) else findings

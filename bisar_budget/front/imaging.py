@@ -1,4 +1,4 @@
-"""Functions that form images of a mission, at the limits of its rows or with its declared errors."""
+"""Functions that simulate images of a mission, with errors at the limits of its rows or with its declared errors."""
 
 from collections.abc import Sequence
 from datetime import date
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def verify(mission: Mission, only: str = "*", *, jobs: int | None = None) -> VerifyResult:
-    """Form images at the limits of a mission, and measure whether the limits are correct.
+    """Form images with errors at the limits of a mission's rows, and measure whether the limits are correct.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def verify(mission: Mission, only: str = "*", *, jobs: int | None = None) -> Ver
     Raises
     ------
     QuestionError
-        No row with a limit has an id that matches.
+        No row with a limit has an id that matches the pattern `only`.
     """
     (verified,) = verify_all([mission], only, jobs, outside=outside_of(None, None))
     return VerifyResult(verified)
@@ -55,9 +55,10 @@ def verify_all(
     *,
     outside: Outside = NOTHING_OUTSIDE,
 ) -> list[VerifiedMission]:
-    """Verify several missions, in processes on this machine or on workers of a scheduler.
+    """Form images at the limits of several missions, in processes on this machine or on the workers of a scheduler.
 
-    Arguments and errors are as in `verify`.
+    `outside` describes influences on the verdicts from outside the mission files. The other arguments and the
+    exceptions are those of `verify`.
     """
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     if not total and only != "*":
@@ -94,12 +95,12 @@ def faster(jobs: int | None = None) -> str:
 
 
 def standing(targets: str | None) -> Targets:
-    """Read targets from a text; None gives one point at the centre of the scene.
+    """Read the targets of a simulation from a text; None gives one point at the centre of the scene.
 
     Raises
     ------
     QuestionError
-        The text has no valid targets; the message begins with `--targets`.
+        The text does not describe valid targets; the message begins with `--targets`.
     """
     try:
         return Targets() if targets is None else parse_targets(targets)
@@ -110,7 +111,7 @@ def standing(targets: str | None) -> Targets:
 def simulate(
     mission: Mission, targets: str | Targets | None = None, *, image_former: str = "backprojection"
 ) -> SimulateResult:
-    """Form the image of a point, or of a scene, with the declared errors, before and after autofocus.
+    """Form the image of a point, or of several targets, with the declared errors, before and after autofocus.
 
     Parameters
     ----------
@@ -119,7 +120,7 @@ def simulate(
     targets : str, optional
         Targets in the scene, as in `simulate --targets`; by default a point at the scene's centre.
     image_former : str
-        `backprojection`, `polar_format`, `matched_filter` or `far_field`.
+        Algorithm: `backprojection`, `polar_format`, `matched_filter` or `far_field`.
 
     Raises
     ------

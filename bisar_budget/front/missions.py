@@ -34,7 +34,7 @@ def load(path: str | os.PathLike[str]) -> Mission:
     Raises
     ------
     MissionError
-        The file cannot be used; `faults` lists every fault with its line.
+        The file cannot be used; the attribute `faults` of the exception lists every fault with its line.
     """
     return load_mission(os.fspath(path))
 
@@ -47,21 +47,21 @@ def loads(text: str | bytes, file: str = "mission.yaml") -> Mission:
     text : str or bytes
         Content of a mission file.
     file : str
-        Name for messages; names of files in the text are relative to its folder.
+        File name of the mission for messages. Names of files in the text are relative to the folder of this file.
 
     Raises
     ------
     MissionError
-        The text cannot be used; `faults` has every fault with its line.
+        The text cannot be used; the attribute `faults` of the exception lists every fault with its line.
     """
     return parse_mission(text, file)
 
 
 @dataclass(frozen=True)
 class Spaced:
-    """Evenly spaced values of a key, made by `linspace` or `geomspace`.
+    """Range of evenly spaced values for a key of a sweep, made by `linspace` or `geomspace`.
 
-    `start` and `stop` are texts with a unit. If `is_log`, the values have equal ratios.
+    `start` and `stop` are texts with a unit. If `is_log`, successive values have equal ratios, not equal differences.
     """
 
     start: str
@@ -70,7 +70,7 @@ class Spaced:
     is_log: bool = False
 
     def of(self, key: str) -> str:
-        """Write the values of `key` as the text of an option `sweep --vary`."""
+        """Write the range as a value of the option `--vary`, such as `collection.aperture_time=1 s:5 s:101`."""
         return f"{key}={self.start}:{self.stop}:{self.count}" + (":log" if self.is_log else "")
 
 
@@ -88,23 +88,26 @@ def linspace(start: object, stop: object, count: int) -> Spaced:
 
 
 def geomspace(start: object, stop: object, count: int) -> Spaced:
-    """Make `count` values from `start` to `stop` with equal ratios; arguments are as in `linspace`, but positive."""
+    """Make `count` values from `start` to `stop` with equal ratios, for `sweep`.
+
+    The arguments are those of `linspace`, but `start` and `stop` must be positive.
+    """
     return Spaced(text_of("", start), text_of("", stop), count, is_log=True)
 
 
 def cases_of(mission: Mission, values: Mapping[str, object] | str | os.PathLike[str], paired: bool = False) -> Cases:
-    """Make the cases of a sweep over the values of keys, or read the cases of a file.
+    """Make the cases of a sweep from the values of its keys, or read the cases from a CSV file.
 
-    A sweep has every combination of the values, and the last key varies fastest.
+    By default there is a case for every combination of the values, and the last key varies fastest.
 
     Parameters
     ----------
     mission : Mission
         The loaded mission.
     values : mapping or path
-        Values by key: a range of `linspace`, an array of numbers in SI, a quantity with an array, or a list of texts,
-        which are values with units or words. Alternatively `values` is the path of a CSV file, whose header has
-        `KEY [unit]` for each column.
+        Values by key. The values of one key are a range of `linspace`, an array of numbers in SI, a quantity with an
+        array, or a list of texts. Each text is a number with its unit, or a word. Alternatively `values` is the path
+        of a CSV file, whose header has `KEY [unit]` for each column.
     paired : bool
         Whether each case takes one value of every key, instead of every combination.
 
@@ -112,7 +115,7 @@ def cases_of(mission: Mission, values: Mapping[str, object] | str | os.PathLike[
     ------
     QuestionError
         A key is unknown or takes neither a number nor a word, a key has no values, or paired keys have different
-        numbers of values. A faulty file raises the subclass `TableError`, which has a line for each fault.
+        numbers of values. A faulty CSV file raises the subclass `TableError`, whose `lines` have one line per fault.
     """
     if not isinstance(values, Mapping):
         return table_file(tree_of(mission), os.fspath(values))
@@ -127,23 +130,24 @@ def cases_of(mission: Mission, values: Mapping[str, object] | str | os.PathLike[
 
 
 def grid_of(mission: Mission, values: Mapping[str, object]) -> Cases:
-    """Make the cases with every combination of values of keys; `values` is as in `cases_of`."""
+    """Make a case for every combination of the values of the keys; `values` is a mapping as in `cases_of`."""
     tree = tree_of(mission)
     axes = [_axis(tree, key, axis_values) for key, axis_values in values.items()]
     return Cases(tuple(axis.varied[0] for axis in axes), tuple(axis.columns[0] for axis in axes), is_grid=True)
 
 
 def cases_of_texts(mission: Mission, texts: Sequence[str], sample: str | None = None) -> Cases:
-    """Make the cases of texts such as `collection.aperture_time=1:5s:101`.
+    """Make the cases of a sweep from texts such as `collection.aperture_time=1:5s:101`.
 
-    They are every combination of the values, or with `sample` a random sample of the ranges.
+    There is a case for every combination of the values. If `sample`, the value of the option `--sample`, is given,
+    the cases are a random sample of the ranges instead.
     """
     tree = tree_of(mission)
     return grid(tree, texts) if sample is None else sample_of(tree, texts, sample)
 
 
 def _axis(tree: JsonObject, key: str, values: Measured) -> Cases:
-    """Make the cases of one key from its values."""
+    """Make the cases of a sweep over a single key from its values, in any form that `cases_of` accepts."""
     if isinstance(values, Spaced):
         return grid(tree, [values.of(key)], "sweep")
     if isinstance(values, str):

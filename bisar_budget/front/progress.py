@@ -1,4 +1,4 @@
-"""Estimated time, workers and progress bars of long work; bars appear only in a notebook or a terminal."""
+"""Time estimates, progress bars and scheduler workers for long computations."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -33,10 +33,10 @@ SAYING: ContextVar[Callable[[str], None]] = ContextVar("SAYING", default=lambda 
 
 @contextmanager
 def watched(label: str) -> "Iterator[Progress]":
-    """Yield a function that shows the progress of long work as a bar with the remaining time.
+    """Yield a function that shows the progress of a long computation as a bar with the remaining time.
 
-    The function is called with the number of finished items and the number of all items. The bar appears only in a
-    notebook or a terminal, and only if the work takes longer than a second.
+    The caller passes the number of finished items and the number of all items to the function. The bar appears only
+    in a notebook or a terminal, and only if the computation takes longer than a second. `label` names the work.
     """
     began, bars = monotonic(), list["tqdm[NoReturn]"]()
 
@@ -75,10 +75,10 @@ def _bar(label: str, total: int, is_notebook: bool) -> "tqdm[NoReturn]":
 
 @contextmanager
 def watched_checks(name: str) -> "Iterator[Progress]":
-    """Yield a function that shows the progress of many checks of one mission.
+    """Yield a function that shows the progress of many checks of one mission as a bar.
 
-    The function is called with the number of finished checks and the expected number. Its second call estimates the
-    time of all checks, because the first check also imports modules. `name` is the name of the mission.
+    The caller passes the number of finished checks and the expected number of checks to the function. The total time
+    is estimated at the second call, because the first check also imports modules. `name` is the name of the mission.
     """
     since, calls, before = monotonic(), 0, 0
     with watched("Checking values") as show_progress:
@@ -97,7 +97,7 @@ def watched_checks(name: str) -> "Iterator[Progress]":
 
 
 def lasting(seconds: float) -> str:
-    """Write a duration in seconds in words, such as `3 minutes`."""
+    """Convert a duration in seconds to a text with a suitable unit, such as `3 minutes`."""
     for unit, size in (("years", 365.25 * 86400), ("days", 86400), ("hours", 3600), ("minutes", 60)):
         if seconds >= 2 * size:
             return f"{seconds / size:.0f} {unit}"
@@ -105,18 +105,19 @@ def lasting(seconds: float) -> str:
 
 
 def foretell(seconds: float, doing: str, advice: str = "") -> None:
-    """Tell the user how long work will take, if this is more than a minute, and how it would be faster.
+    """Tell the user how long a computation will take, if this is more than a minute.
 
-    `seconds` is the estimated time, `doing` names the work, and `advice` is added to the message.
+    `seconds` is the estimated time, `doing` names the computation, and `advice` says how it would be faster.
     """
     if seconds > MIN_ANNOUNCED_S:
         SAYING.get()(f"{doing} will take about {lasting(seconds)}{'; ' if advice else ''}{advice}.")
 
 
 def foreseen(count: int, trial: Callable[[int], float], few: int, most: int) -> float:
-    """Estimate the time for `count` items. [s]
+    """Estimate the time to process `count` items from trials with fewer items. [s]
 
-    `trial` processes a number of items, from `few` to `most`, and returns the time that it took. [s]
+    `trial` processes as many items as its argument says, and returns the time that it took [s]. The number of items
+    grows from trial to trial, from `few` up to about `most`, until a trial takes long enough to be measured.
     """
     trial(few)  # imports modules and fills caches
     tried, seconds = few, trial(few)
@@ -131,9 +132,9 @@ def foreseen(count: int, trial: Callable[[int], float], few: int, most: int) -> 
 
 # ---------------------------------------------------------------------- workers
 def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[Workers | None]":
-    """Connect to the workers of a scheduler; the context gives None without a scheduler.
+    """Context manager that connects to a Dask scheduler, and yields its workers; None if `scheduler` is None.
 
-    `patience` is the longest time to wait without a worker. [s]
+    `scheduler` is the address of the scheduler. `patience` is the longest time to wait for a worker. [s]
     """
     if scheduler is None:
         return nullcontext()
@@ -143,7 +144,7 @@ def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[
 
 
 def hold_to_tables() -> None:
-    """Raise an error if the libraries are missing that write the parts of a sweep to files."""
+    """Raise an error if a library is missing that `--resume` needs to store the checked parts of a sweep in files."""
     from bisar_budget.cluster.parts_folder import check_libraries
 
     check_libraries("--resume", TABLES_MEMORY_BYTES, "tables", "pyarrow")

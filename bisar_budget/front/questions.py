@@ -1,4 +1,4 @@
-"""Questions about a mission that need many checks: sweeps, solutions, specifications, passes and draws."""
+"""Functions that check a mission many times: sweep, solve, sensitivity, allocate, passes and monte_carlo."""
 
 import datetime as dt
 import math
@@ -40,7 +40,10 @@ if TYPE_CHECKING:
 def _judged(
     mission: Mission, model: str | None, date: str | dt.date | None, outside: Outside | None
 ) -> tuple[dt.date, tuple[Override, ...]]:
-    """Find the day on which waivers are judged, and the influences on the verdict from outside the file."""
+    """Find the day on which waivers are judged, and list the influences on the verdict from outside the mission file.
+
+    Raises `QuestionError` for an unknown model.
+    """
     if model not in (None, *GATING_MODELS):
         raise QuestionError(f"--model {printable(str(model))}: accepted: {', '.join(GATING_MODELS)}")
     today = day_of(date)
@@ -76,12 +79,13 @@ def sweep(
     model, date, outside
         As in `check`.
     jobs : int, optional
-        Number of processes for cases that are read one by one; by default the number of cores.
+        Number of processes, used if many cases cannot be checked as arrays, but have to be read one by one. By
+        default the number of cores.
 
     Raises
     ------
     QuestionError
-        A key or a column is unknown, or a key has no value.
+        A key or a column is unknown, or no value is given for a key.
     """
     today, influences = _judged(mission, model, date, outside)
     cases = cases_of(mission, values, paired) if isinstance(values, Mapping | str | os.PathLike) else values
@@ -115,20 +119,20 @@ def solve(
         Range of the search, such as `("0.2 s", "20 s")`. The default is a tenth to ten times the value of the file,
         and the full circle for an azimuth.
     scale : bool
-        Whether to solve for a factor that multiplies all errors of a section; the key names the section.
+        Whether to solve for a factor that multiplies all errors of a section. `key` is then the path of the section.
     row : str, optional
-        Row that has to meet its limit, instead of the whole mission.
+        Id of a row. If given, this row alone has to comply, instead of the whole mission.
     target : str
-        `fail` if the mission complies without failures, `warn` if it complies without failures and warnings.
+        With `fail`, a mission complies if nothing fails. With `warn`, it must have no warnings either.
     verify : bool
-        Whether to form images of the binding row at the solution.
+        Whether to form images with the binding row at the solution, and add their verdict.
     model, date, outside
         As in `check`.
 
     Raises
     ------
     QuestionError
-        The mission cannot answer the question.
+        The question cannot be answered for this mission, such as for an unknown key; the message says why.
     """
     from bisar_budget.design.compare import compare_parts, is_sensor_key
     from bisar_budget.design.solve import solve as solved
@@ -151,12 +155,12 @@ def solve(
 
 
 def hold_to_parts(key: str, between: object, scale: bool) -> None:
-    """Raise an error if a range or a factor is given for a key that names parts of the catalogue.
+    """Raise an error if a range or a scale factor is given for a key whose values are parts of the catalogue.
 
     Raises
     ------
     QuestionError
-        The key names parts of the catalogue.
+        The key names a part of the catalogue, and `between` or `scale` is given.
     """
     from bisar_budget.design.compare import is_sensor_key
 
@@ -166,7 +170,10 @@ def hold_to_parts(key: str, between: object, scale: bool) -> None:
 
 
 def _imaged(mission: Mission, solution: "Solution | Comparison", model: str | None) -> "Solution | Comparison":
-    """Form images at a solution, and return the solution with their verdict."""
+    """Form images with the binding row at the solution, and return the solution with the verdict of the images.
+
+    If there is no row to image, the solution is returned unchanged.
+    """
     from bisar_budget.design.imaged import imaged, to_image
     from bisar_budget.front.imaging import faster
 
@@ -186,7 +193,10 @@ def sensitivity(
     date: str | dt.date | None = None,
     outside: Outside | None = None,
 ) -> SensitivityResult:
-    """Rank the numbers of a mission by their effects on its worst utilization; arguments are as in `solve`."""
+    """Rank the numbers in a mission by their effects on its worst utilization, or on the utilization of `row`.
+
+    The arguments are those of `solve`.
+    """
     from bisar_budget.design.sensitivity import sensitivity as sensitivity_of
 
     today, influences = _judged(mission, model, date, outside)
@@ -217,14 +227,14 @@ def allocate(
     reserve : float, optional
         Fraction of every limit that is kept free, 0 to 1; by default the fraction above `allocation.warn_above`.
     offer : Mission, optional
-        Mission whose figures are compared with the specifications.
+        Mission of a supplier, whose declared errors are compared with the specifications.
     model, date, outside
         As in `check`.
 
     Raises
     ------
     QuestionError
-        The mission cannot answer the question.
+        The question cannot be answered for this mission, such as for an unknown key; the message says why.
     """
     from bisar_budget.design.allocate import allocate as allocated
     from bisar_budget.design.offers import offer as offered
@@ -240,7 +250,10 @@ def allocate(
 
 
 def _weighted(keys: Sequence[str] | Mapping[str, float] | None) -> Mapping[str, float] | None:
-    """Weights of the errors to specify, by key; keys without a weight have equal weights."""
+    """Return weights of the errors to specify, by key; keys given without weights get the weight 1, None stays None.
+
+    Raises `QuestionError` for a weight that is not a positive number.
+    """
     if not isinstance(keys, Mapping):
         return keys if keys is None else dict.fromkeys(keys, 1.0)
     for key, weight in keys.items():
@@ -270,19 +283,19 @@ def passes(
     start : str or date, optional
         First day of UTC, or an instant such as `2026-07-01T05:30:00Z`; by default the day of the check.
     days : float
-        Length of the span. [d]
+        Length of the period that is searched for passes. [d]
     min_elevation, squint : str, float or quantity
-        Least elevation of the satellite as seen from the scene, and squint at the mid-time: texts with a unit, or
-        radians.
+        Least elevation of the satellite as seen from the scene, and squint angle at the mid-time of the aperture.
+        Either is a text with a unit, or a number in radians.
     platform : str, optional
-        Platform of the passes, `transmitter` or `receiver`; by default the first with an orbit.
+        Platform that is the satellite, `transmitter` or `receiver`; by default the first with an orbit.
     model, date, outside
         As in `check`.
 
     Raises
     ------
     QuestionError
-        The mission cannot answer the question.
+        The passes cannot be found, such as for a mission without an orbit; the message says why.
     """
     from bisar_budget.design.passes import passes as find_passes
     from bisar_budget.design.passes import start_of
@@ -306,7 +319,7 @@ def passes(
 
 
 def angle_of(option: str, value: object, least: float) -> float:
-    """Read the angle of an option, from `least` [deg] to less than 90 deg; returns radians.
+    """Convert the value of an angle option to radians; it must lie between `least` [deg] and 90 deg.
 
     Raises
     ------
@@ -331,7 +344,8 @@ def monte_carlo(mission: Mission, draws: int = 20_000, *, seed: int | None = Non
     draws : int
         Number of draws.
     seed : int, optional
-        By default `simulation.seed` of the mission file, or else 1. The same seed gives the same result.
+        Seed of the random numbers; by default `simulation.seed` of the mission file, or else 1. The same seed gives
+        the same result.
 
     Raises
     ------

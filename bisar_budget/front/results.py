@@ -1,4 +1,4 @@
-"""Results of the Python interface, with a short `repr`, tables and drawings for notebooks, and data frames."""
+"""Classes of the results of the Python interface, which notebooks display and which convert to data frames."""
 
 import json
 import os
@@ -47,7 +47,7 @@ DataFrame = Any
 
 
 class MissingPackageError(ImportError):
-    """A package that an answer needs is not installed; the message says which."""
+    """An optional package that a method of a result needs is not installed; the message names the package."""
 
 
 def frame_of(columns: Mapping[str, object], library: str | None = None) -> DataFrame:
@@ -80,21 +80,21 @@ def _frame_of_rows(rows: Sequence[Mapping[str, object]], library: str | None) ->
 class Picture:
     """A drawing that notebooks show.
 
-    `save` writes the drawing to a file. `of` takes a kind of file, and returns the content of such a file.
+    The method `save` writes the drawing to a file. The attribute `of` is the function `draw`.
 
     Parameters
     ----------
     title : str
         Title of the drawing.
     draw : callable
-        Function that takes the kind of file, `svg`, `png` or `pdf`, and returns the content.
+        Function that takes the kind of file, `svg`, `png` or `pdf`, and returns the content of such a file as bytes.
     """
 
     def __init__(self, title: str, draw: Callable[[str], bytes]) -> None:
         self.title, self.of = title, draw
 
     def __repr__(self) -> str:
-        """Title of the drawing, on one line."""
+        """Text on one line with the title of the drawing."""
         return f"Picture({self.title!r})"
 
     def _repr_html_(self) -> str:
@@ -120,7 +120,7 @@ def write_file(path: str, content: bytes) -> None:
     Raises
     ------
     ValueError
-        The path is a named pipe, a socket or a device, which could wait or never end.
+        The path is a named pipe, a socket or a device, to which writing could block.
     """
     if kind := special_file(path):
         raise ValueError(f"cannot write {path}: {kind}; accepted: a regular file")
@@ -131,9 +131,10 @@ def write_file(path: str, content: bytes) -> None:
 # ---------------------------------------------------------------------- a check
 @dataclass(frozen=True, repr=False, eq=False)
 class CheckResult(Mapping[str, Row]):
-    """Findings of a check, as a mapping of row ids to rows, in the order of the JSON contract.
+    """Result of `check`: a mapping of row ids to rows, in the order of the JSON report.
 
-    `findings` are the findings that reports show. `model` and `day` are the arguments of the check.
+    `findings` contains everything that reports show. `model` is the argument of `check`, and `day` is the day on
+    which waivers were judged.
     """
 
     findings: MissionFindings
@@ -141,12 +142,12 @@ class CheckResult(Mapping[str, Row]):
     day: date
 
     def __repr__(self) -> str:
-        """Mission, status and number of rows of each status, on one line."""
+        """Text on one line with the name of the mission, its status and the number of rows of each status."""
         counts = ", ".join(f"{count} {status}" for status, count in self.findings.summary.items())
         return f"<check of {self.findings.name!r}: {self.status}; {counts}>"
 
     def __getitem__(self, row_id: str) -> Row:
-        """The row with an id, such as `receiver.velocity.y`."""
+        """Return the row with the id `row_id`, such as `receiver.velocity.y`."""
         try:
             return self._rows[row_id]
         except KeyError:
@@ -171,17 +172,17 @@ class CheckResult(Mapping[str, Row]):
 
     @property
     def waived_by(self) -> tuple[str, ...]:
-        """Ids of the waivers that cover rows or requirements, as the file writes them."""
+        """Ids, as in the mission file, of the waivers that apply to rows or requirements, such as `receiver.*`."""
         return tuple(waiver.id for waiver in self.findings.waived_by)
 
     @property
     def exit_code(self) -> int:
-        """Exit code of `bisar-budget check`: 0 if all requirements are judged, and met or waived, otherwise 1."""
+        """Exit code of `bisar-budget check`: 0 if every requirement is judged, and is met or waived; otherwise 1."""
         return exit_code({self.status}, False)
 
     @property
     def requirements(self) -> Mapping[str, JudgedRequirement]:
-        """Requirements of the file by their keys, each with its status and the row that decides."""
+        """Requirements of the mission file by key, each with its status and the row that determines this status."""
         return {requirement.key: requirement for requirement in self.findings.requirements}
 
     def to_dict(self) -> JsonDocument:
@@ -214,7 +215,7 @@ class CheckResult(Mapping[str, Row]):
         Raises
         ------
         ValueError
-            The suffix is not that of a format.
+            The suffix does not belong to a format of reports.
         """
         name = os.fspath(path)
         form = format_of(name)
@@ -277,12 +278,12 @@ _SPECIFIED = ("key", "value", "ordered", "unit", "declared")
 # ---------------------------------------------------------------------- answers to other questions
 @dataclass(frozen=True, repr=False, eq=False)
 class _Answer:
-    """Base class for the results of questions; a result also has all attributes of `found`."""
+    """Base class of results, which wrap the findings `found` and have all attributes of `found`."""
 
     found: Any
 
     def __getattr__(self, name: str) -> Any:
-        """Look up an attribute of `found`."""
+        """Return the attribute of `found` for a name that the result itself does not have."""
         if name.startswith("_") or name == "found":
             raise AttributeError(name)
         return getattr(self.found, name)
@@ -296,13 +297,16 @@ class _Answer:
         return as_json([self.found], Style())
 
     def to_dict(self) -> JsonDocument:
-        """The document that the matching command writes with `--format json`, as a dictionary."""
+        """Return, as a dictionary, the document that the command of the same name writes with `--format json`."""
         document: JsonDocument = json.loads(self._document())
         return document
 
 
 def _waived(waivers: Sequence[Sequence[str]]) -> str:
-    """Words for the number of waived cases and the ids of their waivers; empty if no case is waived."""
+    """Phrase with the number of waived cases and the ids of their waivers; empty if no case is waived.
+
+    `waivers` contains the ids of the waivers of each waived case. The phrase begins with a comma.
+    """
     ids = tuple(dict.fromkeys(waiver for case in waivers for waiver in case))
     return f", {waived_count(len(waivers), ids)}" if waivers else ""
 
@@ -310,14 +314,14 @@ def _waived(waivers: Sequence[Sequence[str]]) -> str:
 class SolveResult(_Answer):
     """Result of `solve`: the values at which compliance begins or ends.
 
-    Its attributes are those of the solution: `value` in SI, `crossings`, `status` and `nearest`. For a key that names
-    parts of the catalogue, they are `parts` with complying parts first, `complying` and `status`.
+    For a number, the result has the attributes `value` in SI, `crossings`, `status` and `nearest`. For a key that
+    names a part of the catalogue, it has `parts` with complying parts first, `complying` and `status`.
     """
 
     found: "Solution | Comparison"
 
     def __repr__(self) -> str:
-        """Summary on one line: the key, the solution or the complying part of the range, and waived values."""
+        """Text on one line with the key, the value (or whether all or no values comply), and waived values."""
         return f"<solve of {self.found.key} for {self.found.name!r}: {self._summary}>"
 
     @property
@@ -351,17 +355,17 @@ class SolveResult(_Answer):
 
 
 class SensitivityResult(_Answer):
-    """Result of `sensitivity`: `slopes` are the effects of the numbers on the worst utilization, largest first."""
+    """Result of `sensitivity`: `slopes` has the effect of each number on the worst utilization, largest first."""
 
     found: "Sensitivity"
 
     def __repr__(self) -> str:
-        """Summary on one line, with the number that has the largest effect."""
+        """Text on one line that names the number of the mission with the largest effect."""
         first = self.found.slopes[0].key if self.found.slopes else "none"
         return f"<sensitivity of {self.found.name!r}: {len(self.found.slopes)} numbers, first {first}>"
 
     def plot(self) -> Picture:
-        """Draw the effects as bars."""
+        """Draw a bar for each number, as long as its effect on the worst utilization."""
         from bisar_budget.report.drawing.figure import drawing_file
         from bisar_budget.report.drawing.tornado import tornado
 
@@ -375,15 +379,15 @@ class SensitivityResult(_Answer):
 class AllocateResult(_Answer):
     """Result of `allocate`: specifications that together meet every requirement.
 
-    The attributes `specifications`, `complies` and `requirements` are taken from the sheet of specifications `found`.
-    If the mission of an offer was given, `offer` compares its figures with the specifications.
+    The attributes `specifications`, `complies` and `requirements` are those of `found`. If `allocate` was given the
+    mission of a supplier, `offer` compares its declared errors with the specifications; otherwise `offer` is None.
     """
 
     found: SpecificationSheet
     offer: "Offer | None" = None
 
     def __repr__(self) -> str:
-        """Number of specifications, and whether the mission complies with them, on one line."""
+        """Text on one line with the number of specifications, and whether the mission complies with them."""
         verdict_words = "complies" if self.found.complies else "does not comply"
         return f"<allocate of {self.found.name!r}: {len(self.found.specifications)} specifications, {verdict_words}>"
 
@@ -393,7 +397,7 @@ class AllocateResult(_Answer):
         return as_json([(self.found, self.offer)], Style())
 
     def to_dataframe(self, library: str | None = None) -> DataFrame:
-        """The specifications as a data frame; numbers are in SI, and lists of three if the axes differ."""
+        """The specifications as a data frame; sizes are in SI, and are lists of three values if the axes differ."""
         (mission,) = self.to_dict()["missions"]
         return _frame_of_rows([{key: row[key] for key in _SPECIFIED} for row in mission["specifications"]], library)
 
@@ -406,12 +410,12 @@ class AllocateResult(_Answer):
 
 
 class VerifyResult(_Answer):
-    """Result of `verify`: `rows` are the verdicts of images on the limits, and `status` is their common status."""
+    """Result of `verify`: `rows` has the verdict of images on each limit, and `status` summarizes the verdicts."""
 
     found: VerifiedMission
 
     def __repr__(self) -> str:
-        """Number of limits with each verdict, on one line."""
+        """Text on one line with the number of limits for each verdict."""
         counts = Counter(row.verdict for row in self.found.rows)
         verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
         return f"<verify of {self.found.name!r}: {verdicts}>"
@@ -438,7 +442,7 @@ class VerifyResult(_Answer):
 class PassesResult(_Answer):
     """Result of `passes`: a sequence of the passes of a satellite, each with the verdict of the mission in it.
 
-    `mission` and `model` are the arguments of the question.
+    `mission` and `model` are the arguments of the function `passes`.
     """
 
     found: "Passes"
@@ -446,7 +450,7 @@ class PassesResult(_Answer):
     model: str | None = None
 
     def __repr__(self) -> str:
-        """Number of passes that comply, on one line."""
+        """Text on one line with the numbers of all, of complying and of waived passes."""
         answer = self.found
         waived = _waived([each.waived_by for each in answer.found if each.status == "waived"])
         return f"<passes of {answer.name!r}: {len(answer.complying)} of {len(answer.found)} comply{waived}>"
@@ -456,13 +460,13 @@ class PassesResult(_Answer):
         return len(self.found.found)
 
     def __getitem__(self, index: int) -> "SatellitePass":
-        """The pass at an index, from 0."""
+        """Return the pass at an index; the first pass has the index 0."""
         return self.found.found[index]
 
     def mission_text(self, satellite_pass: "SatellitePass", folder: str | os.PathLike[str]) -> str:
-        """Text of a mission file whose aperture is at the mid-time of a pass.
+        """Text of a mission file in which the middle of the aperture is at the mid-time of a pass.
 
-        Names of files in it are relative to `folder`.
+        Names of files in the text are relative to `folder`, where the mission file is to be written.
         """
         from bisar_budget.design.passes import center_time
         from bisar_budget.mission.edited import in_folder, with_values
@@ -482,7 +486,7 @@ class PassesResult(_Answer):
         return _frame_of_rows(self.to_dict()["passes"], library)
 
     def plot(self) -> Picture:
-        """Draw the tracks of the satellite in the sky, and the resolutions as functions of time."""
+        """Draw the tracks of the satellite in the sky of the scene, and the resolutions of the passes over time."""
         from bisar_budget.report.drawing.figure import drawing_file
         from bisar_budget.report.drawing.sky_plot import sky_plot
         from bisar_budget.report.formats.pass_list import verdict
@@ -495,15 +499,16 @@ class PassesResult(_Answer):
 
 
 class MonteCarloResult(_Answer):
-    """Result of `monte_carlo`: the probability that all requirements are met, and the results of each requirement.
+    """Result of `monte_carlo`: probabilities that each requirement, and all requirements together, are met.
 
-    `probability` and the entries of `requirements` have confidence intervals.
+    `probability` is that of all requirements together, and `requirements` has an entry for each requirement. Every
+    probability has a confidence interval.
     """
 
     found: MonteCarlo
 
     def __repr__(self) -> str:
-        """Number of draws and probability that all requirements are met, on one line."""
+        """Text on one line with the number of draws, and the probability that all requirements are met."""
         answer = self.found
         if answer.probability is None:
             return f"<monte_carlo: {answer.draws} draws, no requirement to hold>"
@@ -511,7 +516,7 @@ class MonteCarloResult(_Answer):
         return f"<monte_carlo: {answer.draws} draws, all hold in {answer.probability:.4g} ({interval})>"
 
     def to_dict(self) -> JsonDocument:
-        """The Monte Carlo part of the document that `check --monte-carlo --format json` writes."""
+        """Return, as a dictionary, the Monte Carlo results as `check --monte-carlo --format json` writes them."""
         from bisar_budget.report.formats.json_document import monte_carlo_item
 
         document: JsonDocument = json.loads(json.dumps(monte_carlo_item(self.found)))
@@ -529,13 +534,13 @@ class MonteCarloResult(_Answer):
 
 
 class SimulateResult:
-    """Result of `simulate`: `image` is formed with the declared errors, and `images` contains all formed images."""
+    """Result of `simulate`: `image` is the image with the declared errors; `images` also has all other images."""
 
     def __init__(self, images: "PointImages", mission: Mission) -> None:
         self.images, self._mission = images, mission
 
     def __repr__(self) -> str:
-        """Shape and spacing of the image, on one line."""
+        """Text on one line with the shape of the image in pixels, and the pixel spacings."""
         x, y = self.images.scene_spacing
         return f"<simulate of {self._mission.name!r}: image {self.image.shape}, pixels {x:.3g} m by {y:.3g} m>"
 
@@ -545,7 +550,7 @@ class SimulateResult:
         return self.images.in_scene
 
     def plot(self) -> Picture:
-        """Draw Figures 3 to 7 of Rigling & Moses with the images of this mission."""
+        """Draw the images of this mission in the manner of Figures 3 to 7 of Rigling & Moses."""
         from bisar_budget.report.drawing.point_plot import drawn
 
         return Picture(self._mission.name, lambda kind: drawn(self.images, self._mission.name, kind))

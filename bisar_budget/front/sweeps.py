@@ -41,13 +41,14 @@ _MAX_SHOWN_CASES = 10  # largest number of cases that a notebook shows, if there
 
 @dataclass(repr=False, eq=False)
 class SweepResult:
-    """Result of `sweep`: the table of a mission checked in many cases.
+    """Result of `sweep`: a table with the results of checking a mission for many sets of values.
 
-    `to_dataframe` and `to_xarray` return the table, and an index with a column's name returns this column. Each case
-    is `mission` with one set of the values of `cases`. Cases are checked when their results are first needed.
-    `statuses` counts the statuses of the checked cases, and `waived_by` has the ids of their waivers. If `workers` of
-    a scheduler are given, they check the cases. If `beside` is the path of a file, finished parts of the table are
-    kept in a folder next to this file; with `is_resumed` the sweep continues from them.
+    Each case is `mission` with one set of the values in `cases`, and is a line of the table. Cases are checked when
+    their results are first needed. `to_dataframe` and `to_xarray` return the whole table, and `result[name]` returns
+    the column with this name. `more` are the names of columns to add. `statuses` counts the checked cases by status,
+    and `waived_by` has the ids of their waivers. `workers` of a scheduler, if given, check the cases. If `beside` is
+    the path of a file, checked parts of the table are stored in a folder next to this file; if `is_resumed`, a sweep
+    that was interrupted continues with the stored parts.
     """
 
     mission: Mission
@@ -64,11 +65,11 @@ class SweepResult:
     waived_by: dict[str, None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Prepare the cases for checks; raises `QuestionError` if the mission cannot answer the question."""
+        """Prepare the checks; raises `QuestionError` for an unknown column, or a key without a valid value."""
         self.asked = Asked(self.mission, self.cases, columns=self.more, model=self.model, today=self.day)
 
     def __repr__(self) -> str:
-        """Keys, number of cases and number of cases that comply, on one line."""
+        """Text on one line with the varied keys, the number of cases and the number of complying cases."""
         return f"<sweep of {self.mission.name!r} over {self._keys(', ')}: {self.summary}>"
 
     def _keys(self, between: str) -> str:
@@ -76,7 +77,7 @@ class SweepResult:
 
     # ------------------------------------------------------------------ checking cases
     def foreseen(self) -> float:
-        """Estimate the time to check all cases; 0 for few cases. [s]"""
+        """Estimate the time to check all cases [s]; 0 if there are so few cases that it does not matter."""
         if self.cases.count <= _MANY_CASES:
             return 0.0
 
@@ -96,9 +97,10 @@ class SweepResult:
 
     @contextmanager
     def checked(self) -> Iterator[tuple[Described, Iterator[Part]]]:
-        """Yield the description of the table, and an iterator that checks the parts of the table on demand.
+        """Context manager that yields the description of the table, and an iterator over the parts of the table.
 
-        A progress bar is shown in a notebook or a terminal.
+        The iterator checks the cases of a part when the part is requested. A notebook or a terminal shows a progress
+        bar.
         """
         sweep: AbstractContextManager[Swept]
         if self.beside is None:
@@ -110,10 +112,10 @@ class SweepResult:
 
     @contextmanager
     def _kept(self, path: str) -> Iterator[Swept]:
-        """Check all parts of the table, store them in a folder, and yield the sweep; remove the folder at the end.
+        """Check all parts of the table, store them in a folder, and yield the table that is read from the folder.
 
-        Workers of a scheduler, or processes on this machine, check the parts. After an interruption the folder stays,
-        and a message tells how to continue.
+        Workers of a scheduler, or processes on this machine, check the parts. At the end the folder is removed. After
+        an interruption the folder remains, and a message tells how to continue the sweep.
         """
         from bisar_budget.cluster.parts_folder import parts_folder, question_of
 
@@ -176,14 +178,14 @@ class SweepResult:
 
     @property
     def is_unjudged(self) -> bool:
-        """Whether no case could be judged, although some have a valid mission."""
+        """Whether there are cases with a valid mission, but all of them have the status `not_evaluated`."""
         return self.statuses.keys() - {"error"} == {"not_evaluated"}
 
     def drawing(self, trade_data: Gathered, *, is_polar: bool = False) -> str:
-        """Draw gathered cases as SVG.
+        """Draw the checked cases, and return the drawing as SVG text.
 
-        If a single key varies, the drawing also shows the utilizations of all rows that are the worst in any case.
-        With `is_polar` the drawing is polar.
+        `trade_data` has the columns to draw. If only one key varies, the drawing also shows the utilization of every
+        row that is the worst row of some case. If `is_polar`, the axes of the drawing are polar.
         """
         from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
 
@@ -212,18 +214,18 @@ class SweepResult:
 
     @property
     def summary(self) -> str:
-        """Phrase with the number of all cases and the number of complying cases; checks the cases if necessary."""
+        """Phrase with the number of cases and of complying cases; checks the cases if they are not checked yet."""
         return self.so_far if self._parts else ""  # cases are counted when they are checked
 
     @cached_property
     def columns(self) -> Mapping[str, Values]:
-        """Values of each column (cases,), by name; varied keys are in the unit in which their values were given."""
+        """Values (cases,) of each column, by its name; values of a varied key are in the unit of the request."""
         table = self._table
         values = [table.values(block) for block in table.swept.parts]
         return {column.name: np.concatenate([block[column.name] for block in values]) for column in table.columns}
 
     def __getitem__(self, name: str) -> Values:
-        """Values of the column with a name, (cases,)."""
+        """Return the values (cases,) of the column `name`; raises `KeyError` if there is no such column."""
         if name not in self.columns:
             raise KeyError(f"{name}: no such column; accepted: {', '.join(self.columns)}")
         return self.columns[name]
@@ -235,7 +237,7 @@ class SweepResult:
         return frame_of(lists, library)
 
     def to_xarray(self, chunks: Mapping[str, int] | int | str | None = None) -> "Dataset":
-        """The table as `xarray.Dataset`, with a dimension for each key, and with units and long names (CF).
+        """The table as `xarray.Dataset`, with a dimension for each varied key, and CF units and long names.
 
         Parameters
         ----------
@@ -265,9 +267,10 @@ class SweepResult:
         )
 
     def _later(self) -> "dict[str, Array]":
-        """Make the columns as Dask arrays, with one task for each chunk of the sweep.
+        """Make the columns of the table as Dask arrays, whose chunks of cases are checked when Dask computes them.
 
-        The tasks hold copies of all files that the mission names, so that later changes to the files have no effect.
+        The tasks contain copies of all files that the mission names, so that later changes to these files have no
+        effect.
         """
         try:
             from dask import array
@@ -292,12 +295,12 @@ class SweepResult:
         Parameters
         ----------
         column : str, optional
-            Column that is drawn instead.
+            Name of a column of numbers to draw instead.
 
         Raises
         ------
         QuestionError
-            There are more keys than a drawing has axes.
+            More keys vary than a drawing has axes, or `column` is not a column of numbers.
         """
         from bisar_budget.report.drawing.figure import drawing_file
 
@@ -321,9 +324,9 @@ class SweepResult:
 
 
 def _values(common: tuple[Question, Described, AbstractContextManager[object]], block: Block) -> Mapping[str, Values]:
-    """Check a block of cases, and return the values of its columns.
+    """Check a block of cases, and return the values of each column of the table for these cases.
 
-    Only one thread at a time checks cases, because a table caches results.
+    A lock in `common` lets only one thread at a time check cases, because the table caches results.
     """
     question, table, lock = common
     with lock:
@@ -331,7 +334,7 @@ def _values(common: tuple[Question, Described, AbstractContextManager[object]], 
 
 
 def percentage(count: int, total: int) -> str:
-    """Text of a count as a percentage of a total; 0 % and 100 % are only used for none and all."""
+    """Write `count` as a percentage of `total`; `0 %` is written only for none, and `100 %` only for all."""
     if count in (0, total):
         return "100 %" if count else "0 %"
     return f"{min(max(100 * count / total, 0.1), 99.9):.3g} %"

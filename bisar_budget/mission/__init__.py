@@ -1,4 +1,4 @@
-"""The mission file: its keys and their meaning (`model`), and the reading of a file (`load`)."""
+"""Mission files: their keys with types and meanings (`model`), and the reader of such files (`load`)."""
 
 # What other rooms may use.
 __all__ = [

@@ -1,7 +1,8 @@
-"""Paths of keys in a mission file: values that options put there, and hints for unknown keys.
+"""Changes of single keys of a mission, as the options `--set KEY=VALUE` make them, and hints for unknown keys.
 
 `--set KEY=VALUE` changes a value for one run only. The value goes into the tree of the file before the tree is
-interpreted, so every check works as for a file. `KEY=null` removes the key. The readers define the known keys.
+interpreted, so every check works as for a value in the file. `KEY=null` removes the key. The known keys are those
+that the readers of the mission (`readers`) define.
 """
 
 from collections.abc import Iterator, Sequence
@@ -57,17 +58,17 @@ def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
 
 
 def parts_of(key: str) -> tuple[str, ...]:
-    """Split a path of keys into its parts.
+    """Split the path of a key into its keys and list indices.
 
-    Both `other_errors[0].name` and `other_errors.0.name` give other_errors, 0, name.
+    Both `other_errors[0].name` and `other_errors.0.name` give `("other_errors", "0", "name")`.
     """
     return tuple(key.replace("[", ".").replace("]", "").split("."))
 
 
 def apply_changes(tree: Tree, changes: Sequence[SetValue]) -> None:
-    """Put the value of each option into the tree; problems become faults of the tree.
+    """Put the value of each option into the tree of a mission file; invalid values become faults of the tree.
 
-    A value replaces the value of the file. If the file has no such value, it is added.
+    A value replaces the value of the file. If the file has no such value, it is added. A null removes the key.
 
     Raises
     ------
@@ -87,9 +88,9 @@ def takes_out(change: SetValue) -> bool:
 
 
 def _take_out(tree: Tree, change: SetValue) -> None:
-    """Remove a key from the tree.
+    """Remove the key that an option sets to null from the tree.
 
-    A known key that the file does not have is no fault. An unknown key is a fault.
+    A known key that the file does not have is no fault. An unknown key is a fault, and so is an entry of a list.
     """
     steps = parts_of(change.key)
     container: Content = tree.root
@@ -158,10 +159,10 @@ def _apply(tree: Tree, change: SetValue) -> None:
 def next_name(
     container: Content, steps: tuple[str, ...], has_dotted_keys: bool = False
 ) -> tuple[str | int | None, tuple[str, ...]]:
-    """Split a path into its first key or index within a container and the remaining steps.
+    """Split a path into the first key or index, which belongs to `container`, and the remaining steps.
 
     The first key or index is None if the container cannot have it. A key may contain dots itself. With
-    `has_dotted_keys` all steps are one key, joined by dots.
+    `has_dotted_keys` all steps together are one key, joined by dots.
     """
     if isinstance(container, list):
         is_entry = is_index(steps[0]) and int(steps[0]) <= len(container)
@@ -177,7 +178,7 @@ def next_name(
 
 
 def _put(container: Content, name: str | int, value: object) -> None:
-    """Set a value in a mapping or a list. In a list, the index after the last entry appends the value."""
+    """Set a value at a key of a mapping or at an index of a list; an index equal to the list's length appends it."""
     if isinstance(container, list) and name == len(container):
         container.append(value)
     else:
@@ -185,9 +186,9 @@ def _put(container: Content, name: str | int, value: object) -> None:
 
 
 def _value(tree: Tree, change: SetValue, path: KeyPath) -> Content:
-    """Parse the value that an option sets, as if it were in the file; a number needs no parsing.
+    """Parse the value that an option sets, as if it were in the file; a number of a sweep needs no parsing.
 
-    A fault names the option. The result is `INVALID` for a text that cannot be read.
+    Faults go to the tree and name the option. The result is `INVALID` for a text that cannot be read.
     """
     if isinstance(change, SetNumber):
         return change.value
@@ -208,7 +209,7 @@ def _value(tree: Tree, change: SetValue, path: KeyPath) -> Content:
 
 
 def _forget(tree: Tree, path: KeyPath) -> None:
-    """Delete the file positions of a value and of all values below it, so that no fault refers to them."""
+    """Delete the file positions of a value and of all values inside it, so that no fault refers to them."""
     for events in (tree.keys, tree.values):
         for key_path in [key_path for key_path in events if key_path[: len(path)] == path]:
             del events[key_path]
@@ -224,12 +225,12 @@ _KNOWN_KEY_SIMILARITY_RATIO, _UNKNOWN_KEY_SIMILARITY_RATIO = 0.8, 0.6
 
 @cache
 def all_keys() -> tuple[str, ...]:
-    """Paths of all keys, without indices of lists: `other_errors.name`."""
+    """Paths of all keys that a mission file may have, without indices of lists, such as `other_errors.name`."""
     return tuple(dict.fromkeys(_below(MISSION, "")))
 
 
 def _below(reader: Reader[object], path: str) -> Iterator[str]:
-    """Yield the paths of all keys that a reader knows; `path` is the path of the reader's own value."""
+    """Yield the paths of all keys inside the value that a reader reads; `path` is the path of that value."""
     if isinstance(reader, OneOf):
         for form in reader.forms:
             yield from _below(form, path)
@@ -245,10 +246,10 @@ def _below(reader: Reader[object], path: str) -> Iterator[str]:
 
 
 def nearest_keys(path: str) -> str:
-    """Hint for an unknown path: the nearest known path, or the sections that have its last key.
+    """Hint for the path of an unknown key: the nearest known path, or the sections that have its last key.
 
     A misspelt key is compared only with the keys of its own section. A path that lacks its first sections is compared
-    with the known paths that have the same end. The hint is empty if there is neither.
+    with the known paths that have the same end. The hint is empty if neither gives a known path.
     """
     path = path[:_MAX_PATH_CHARACTERS]
     steps = parts_of(path)
@@ -269,11 +270,11 @@ def nearest_keys(path: str) -> str:
 
 
 def section_hint(path: str, near: str) -> str:
-    """Hint for an unknown path: the sections that have its last key, or else the hint `near`.
+    """Hint for the path of an unknown key: the sections that have its last key, or else the hint `near`.
 
     `near` is a hint that names a similar key. It is returned if the key resembles a key of its own section, or if no
-    section has the key. Otherwise the hint names the sections whose path begins with the most keys of this path. It
-    is empty if there are more than `_MAX_HINT_PATH_COUNT` such sections.
+    section has the key. Otherwise the hint names the sections whose paths share the most leading keys with this path.
+    It is empty if there are more than `_MAX_HINT_PATH_COUNT` such sections.
     """
     *above, name = _names(path[:_MAX_PATH_CHARACTERS]) or [""]
     sections = [key.split(".")[:-1] for key in all_keys() if key.rpartition(".")[2] == name]
@@ -288,7 +289,7 @@ def section_hint(path: str, near: str) -> str:
 
 
 def _is_key(name: str) -> bool:
-    """Whether any section has a key of this name."""
+    """Whether any section of the mission file has a key of this name."""
     return any(key.rpartition(".")[2] == name for key in all_keys())
 
 
@@ -298,20 +299,20 @@ def _names(path: str) -> list[str]:
 
 
 def _keys_of(section: Sequence[str]) -> list[str]:
-    """Names of the keys of a section."""
+    """Names of the keys directly in a section; `section` holds the keys of the section's path."""
     path = ".".join(section)
     return [key.rpartition(".")[2] for key in all_keys() if key.rpartition(".")[0] == path]
 
 
 def _split(names: list[str]) -> tuple[str, str]:
-    """Split a path into its longest known beginning and the remainder."""
+    """Split a path of keys into its longest beginning that is a known path, and the rest; either may be empty."""
     paths = all_keys()
     count = next((count for count in range(len(names), 0, -1) if ".".join(names[:count]) in paths), 0)
     return ".".join(names[:count]), ".".join(names[count:])
 
 
 def _spelt_right(steps: Sequence[str]) -> str:
-    """The path with each unknown key replaced by the nearest key of its section; empty if no key is near."""
+    """Replace each unknown key of a path by the most similar key of its section; empty if one has no similar key."""
     meant: list[str] = []
     section: list[str] = []
     for step in steps:
@@ -329,7 +330,7 @@ def _spelt_right(steps: Sequence[str]) -> str:
 
 
 def _shared(names: list[str], other_names: list[str]) -> int:
-    """Number of keys at the beginning that two paths have in common."""
+    """Number of leading keys that two paths have in common."""
     return next(
         (at for at, (a, b) in enumerate(zip(names, other_names, strict=False)) if a != b),
         min(len(names), len(other_names)),
@@ -349,21 +350,21 @@ ACCEPTED_ERRORS = (
 
 
 def is_error(key: str) -> bool:
-    """Whether a key states the size of an error.
+    """Whether a key states the size of an error, such as `timing_error.quadratic`.
 
-    These are the keys in sections of errors, except for intervals, frequencies and similar numbers.
+    These are all keys in the sections that declare errors, except for intervals, frequencies and similar numbers.
     """
     steps = parts_of(key)
     return any(step in _ERROR_KEYS for step in steps[:3]) and steps[-1] not in _NO_SIZES
 
 
 def name_of_error(key: str) -> str:
-    """Name of an error in rows, such as `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
+    """Name of an error as row ids have it: `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
     return ".".join(step for step in parts_of(key) if step not in ("platforms", "motion_error", "registered"))
 
 
 def report_specified(tree: Tree) -> None:
-    """Report the keys in `allocation.specify` that are not keys of errors."""
+    """Report each entry of `allocation.specify` that is not a key of an error as a fault of the tree."""
     specify = tree.root["allocation"]["specify"]
     for index, key in enumerate(specify):
         path = ("allocation", "specify", key if isinstance(specify, dict) else index)

@@ -1,7 +1,7 @@
-"""Position-velocity covariance of a platform's motion error: readers of its two forms, and checks.
+"""Position-velocity covariance of a platform's motion error: readers of its two forms in a mission file, and checks.
 
-A file has either a 6 x 6 matrix or sigmas with their correlations. A mission holds sigmas and a correlation matrix. A
-correlation matrix has no units, so a tolerance means the same for metres and for millimetres per second.
+A file has either a 6 x 6 matrix or sigmas with their correlations. A mission always holds sigmas and a correlation
+matrix. A correlation matrix has no units, so a tolerance means the same for metres and for millimetres per second.
 """
 
 import math
@@ -43,8 +43,9 @@ _Matrix = tuple[tuple[float, ...], ...]
 class Covariance(NamedTuple):
     """Covariance of position and velocity error along the axes of their frame.
 
-    `sigmas` (6,) are one sigma of position [m] and velocity [m/s]; `correlation` (6, 6) has a diagonal of 1 and
-    is positive semi-definite to six decimals. `pairs` are the pairs of errors as the file names them.
+    `sigmas` (6,) are one sigma of position [m] and velocity [m/s]. `correlation` (6, 6) has a diagonal of 1 and is
+    positive semi-definite to six decimals. `is_matrix` tells whether the file has the 6 x 6 matrix. `pairs` are the
+    names of the correlated pairs as the file writes them, such as `position.x-velocity.x`.
     """
 
     sigmas: tuple[float, ...]
@@ -53,23 +54,26 @@ class Covariance(NamedTuple):
     pairs: tuple[str, ...] = ()
 
     def of(self, kind: str) -> Vector:
-        """Sigmas along the axes of the frame, for the `kind` "position" [m] or "velocity" [m/s]."""
+        """One sigma of the error of a `kind`, "position" [m] or "velocity" [m/s], along each axis of the frame."""
         first = 3 * MOTION_KINDS.index(kind)
         a, b, c = self.sigmas[first : first + 3]
         return (a, b, c)
 
     def block(self, kind: str) -> list[tuple[float, ...]]:
-        """Correlation matrix (3, 3) of the three errors of a `kind`, "position" or "velocity"."""
+        """Correlation matrix (3, 3) of the errors along the three axes, for the `kind` "position" or "velocity"."""
         first = 3 * MOTION_KINDS.index(kind)
         return [row[first : first + 3] for row in self.correlation[first : first + 3]]
 
     def path(self, kind: str, axis: int) -> KeyPath:
-        """Path of a sigma, relative to `covariance` in the file; in the matrix form, the path of its variance."""
+        """Path of the sigma of an axis, relative to `covariance` in the file.
+
+        If the file has the 6 x 6 matrix, this is the path of the variance.
+        """
         index = 3 * MOTION_KINDS.index(kind) + axis
         return (index, index) if self.is_matrix else (kind, axis)
 
     def has_correlations(self) -> bool:
-        """Whether any two of the errors are correlated."""
+        """Whether any two of the six errors are correlated."""
         return any(rho for i, row in enumerate(self.correlation) for rho in row[:i])
 
 
@@ -87,9 +91,9 @@ def _problems(correlation: _Matrix) -> Iterator[Problem]:
 def _rows(
     value: object, readers: Sequence[Sequence[Reader[float]]], path: KeyPath, report: Report, otherwise: str
 ) -> list[tuple[float, ...]] | Invalid:
-    """Read a 6 x 6 matrix as six rows; returns `INVALID` after a report.
+    """Read a 6 x 6 matrix, each element with its own reader; returns six rows, or `INVALID` after a report.
 
-    `otherwise` describes the other accepted form in messages.
+    `otherwise` describes the other form that the key accepts; the message about a wrong shape names it.
     """
     if not isinstance(value, list) or len(value) != MATRIX_SIZE:
         given = f", {len(value)} given" if isinstance(value, list) else ""
@@ -116,16 +120,16 @@ def _rows(
 
 
 def _report_all(faults: Sequence[Problem], path: KeyPath, report: Report) -> bool:
-    """Report faults; returns whether there are any."""
+    """Report faults of the value at `path`; returns whether there are any."""
     for fault in faults:
         report(path, fault)
     return bool(faults)
 
 
 def _asymmetries(rows: Sequence[Sequence[float]], scales: Sequence[float]) -> Iterator[Problem]:
-    """Yield a problem for each element that differs from its mirror element.
+    """Yield a problem for each element of a 6 x 6 matrix that differs from its mirror element.
 
-    Differences are compared with the product of the scales of row and column.
+    The tolerance of an element is relative to the product of the `scales` of its row and its column.
     """
     for i in range(MATRIX_SIZE):
         for j in range(i):
@@ -134,7 +138,7 @@ def _asymmetries(rows: Sequence[Sequence[float]], scales: Sequence[float]) -> It
 
 
 def _symmetric(rows: Sequence[Sequence[float]]) -> _Matrix:
-    """Mean of a matrix and its transpose, with a diagonal of 1 and elements limited to ±1."""
+    """Correlation matrix from a 6 x 6 matrix: its mean with its transpose, limited to ±1, with a diagonal of 1."""
     return tuple(
         tuple(1.0 if i == j else max(-1.0, min(1.0, (rows[i][j] + rows[j][i]) / 2)) for j in range(MATRIX_SIZE))
         for i in range(MATRIX_SIZE)
@@ -152,7 +156,7 @@ class _MatrixReader(Reader[Covariance]):
     """The 6 x 6 matrix: m², m²/s and m²/s², position before velocity, each in the order of the frame's axes."""
 
     def read(self, value: object, path: KeyPath, report: Report) -> Covariance | Invalid:
-        """Read the elements, and check that they are a covariance."""
+        """Read the elements, and check that they form a covariance matrix."""
         rows = _rows(value, _ELEMENTS, path, report, "a mapping with position, velocity and correlation")
         if rows is INVALID:
             return INVALID
@@ -172,7 +176,7 @@ class _MatrixReader(Reader[Covariance]):
         )
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: array of six arrays of six."""
+        """JSON Schema: an array of six rows with six elements each."""
         return _matrix_schema([[element.schema(definitions) for element in row] for row in _ELEMENTS])
 
 
@@ -209,7 +213,7 @@ class _CorrelationReader(Reader[_Correlations]):
     _NUMBER = Quantity(units.RATIO, ge=-1, le=1)
 
     def read(self, value: object, path: KeyPath, report: Report) -> _Correlations | Invalid:
-        """Read pairs or a matrix."""
+        """Read the correlations of pairs, or a correlation matrix, and check that it is positive semi-definite."""
         read = self._pairs(value, path, report) if isinstance(value, dict) else self._matrix(value, path, report)
         if read is INVALID:
             return INVALID
@@ -253,11 +257,11 @@ class _CorrelationReader(Reader[_Correlations]):
         return _Correlations(tuple(map(tuple, rows)), tuple(named.values())) if is_valid else INVALID
 
     def below(self, part: str) -> Reader[object] | None:
-        """Reader of the correlation of a pair."""
+        """Reader of the correlation of a pair such as `position.x-velocity.x`; None if the key names no pair."""
         return self._NUMBER if "-" in part else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: object of pairs, or array of six arrays of six."""
+        """JSON Schema: an object with pairs as keys, or an array of six rows with six elements each."""
         number = self._NUMBER.schema(definitions)
         name = rf"(?:{'|'.join(MOTION_KINDS)})\.(?:{'|'.join(_AXIS)})"
         pairs = {
@@ -269,7 +273,7 @@ class _CorrelationReader(Reader[_Correlations]):
 
 
 def error_index(name: str) -> int | None:
-    """Index from 0 to 5 of `position.x`, `velocity.along` and the like; None for another name."""
+    """Index, 0 to 5, of an error such as `velocity.along` in the 6 x 6 matrix; None for another name."""
     kind, _, axis = name.partition(".")
     return 3 * MOTION_KINDS.index(kind) + _AXIS[axis] if kind in MOTION_KINDS and axis in _AXIS else None
 
@@ -294,7 +298,7 @@ class Sigmas(NamedTuple):
 
 class _SigmasReader(Section[Sigmas | Covariance]):
     def read(self, value: object, path: KeyPath, report: Report) -> Covariance | Invalid:
-        """Read the section as a covariance."""
+        """Read a section of sigmas and correlations as a `Covariance`."""
         sigmas_section = super().read(value, path, report)
         if not isinstance(sigmas_section, Sigmas):
             return INVALID
@@ -308,7 +312,7 @@ COVARIANCE = either(dict, _SigmasReader(Sigmas), _MatrixReader())
 
 
 def misplaced_axes(covariance: Covariance, frame: str) -> Iterator[Problem]:
-    """Yield a problem for each correlated pair with an axis that the frame does not have.
+    """Yield a problem for each correlated pair that names an axis which `frame` does not have.
 
     The paths of the problems are relative to `motion_error`.
     """

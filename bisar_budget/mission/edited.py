@@ -1,4 +1,4 @@
-"""Changes of values in the text of a mission file. All other text, including comments, stays unchanged."""
+"""Changes of values directly in the text of a mission file, so that all other text, including comments, is kept."""
 
 import json
 import os
@@ -20,7 +20,7 @@ Node = Any
 
 
 def with_values(text: str, changes: Sequence[SetValue]) -> str:
-    """Replace values in the text of a valid mission file; each new value is a text as in a mission file.
+    """Replace values in the text of a valid mission file; each new value is written as in a mission file.
 
     Missing sections are added. A null as the new value removes the key.
     """
@@ -37,7 +37,7 @@ def with_values(text: str, changes: Sequence[SetValue]) -> str:
 def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
     """Put a section of keys and values into the text of a mission file.
 
-    It replaces an existing section of the same name, or is added at the end. Keys of the section may contain dots.
+    The section replaces an existing section of the same name, or is added at the end. Its keys may contain dots.
     """
     is_of_dos, text = "\r\n" in text, text.replace("\r\n", "\n")
     root: Node = yaml.compose(text, Loader=_LOADER)
@@ -61,9 +61,9 @@ def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
 
 
 def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
-    """Yield the changes of file names that a mission file needs after it is moved to another folder.
+    """Yield the changes that keep the relative file names in a mission valid if its file is moved to `folder`.
 
-    With these changes it names the same files as before.
+    With these changes the mission names the same files as before. Absolute file names need no change.
     """
     for key, name in (*path_files(mission), *_named_part_files(mission)):
         if os.path.isabs(name):
@@ -77,7 +77,7 @@ def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
 
 
 def _named_part_files(mission: Mission) -> Iterator[tuple[str, str]]:
-    """Yield key and file name of each part that a mission names by a path, and not by its name in the catalogue."""
+    """Yield the key and the file name of each part that a mission names by its file, not by its catalogue name."""
     for owner, platform in mission.platforms._asdict().items():
         sensor = platform.motion_error.sensor
         key = f"platforms.{owner}.motion_error.sensor"
@@ -90,7 +90,7 @@ def _named_part_files(mission: Mission) -> Iterator[tuple[str, str]]:
 
 
 def _with_value(text: str, steps: tuple[str, ...], value: str) -> str:
-    """Set the value at a path of keys in a text."""
+    """Set the value of a key in the text of a mission file; `steps` are the keys and indices of its path."""
     node: Node = yaml.compose(text, Loader=_LOADER)
     while True:
         key, remaining = _next(node, steps)
@@ -105,9 +105,9 @@ def _with_value(text: str, steps: tuple[str, ...], value: str) -> str:
 
 
 def _without_key(text: str, parts: tuple[str, ...]) -> str:
-    """Remove a key and its value from a text, if the key exists.
+    """Remove a key and its value from the text of a mission file, if the key exists.
 
-    A section that has no other keys becomes empty. Comments elsewhere stay.
+    A section that then has no keys becomes empty. Comments elsewhere stay.
     """
     node: Node = yaml.compose(text, Loader=_LOADER)
     end_of_key = 0
@@ -136,7 +136,10 @@ def _without_key(text: str, parts: tuple[str, ...]) -> str:
 
 
 def _next(node: Node, parts: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
-    """Split a path into its first key or index within a node and the remaining parts; a key may contain dots."""
+    """Split a path into the first key or index, which belongs to `node`, and the remaining parts.
+
+    A key may contain dots.
+    """
     names: dict[str, None] | list[Node] = (
         {key.value: None for key, _ in node.value} if isinstance(node, yaml.MappingNode) else list(node.value)
     )
@@ -145,21 +148,24 @@ def _next(node: Node, parts: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
 
 
 def _below(node: Node, name: str) -> Node:
-    """Node at a key or an index of a node; None if there is none."""
+    """Node of the value at a key of a mapping or at an index of a list; None if there is no such value."""
     if isinstance(node, yaml.MappingNode):
         return next((value for key, value in node.value if key.value == name), None)
     return node.value[int(name)] if int(name) < len(node.value) else None
 
 
 def _end_of_key(node: Node, name: str) -> int:
-    """Index in the text at which a key of a mapping ends; for a list, the index at which the list begins."""
+    """Character index in the text at which a key of a mapping ends; for a list, the index at which it begins."""
     if not isinstance(node, yaml.MappingNode):
         return int(node.start_mark.index)
     return next(int(key.end_mark.index) for key, _ in node.value if key.value == name)
 
 
 def _replaced(text: str, node: Node, value: str, end_of_key: int) -> str:
-    """Replace a node in a text with a value; comments inside a node that spans several lines are kept."""
+    """Replace the text of a node by `value`; comments inside a node that spans several lines are kept.
+
+    `end_of_key` is the character index at which the key of the node ends.
+    """
     start, end = node.start_mark.index, node.end_mark.index
     if isinstance(node, yaml.ScalarNode):
         is_apart = start == 0 or text[start - 1].isspace()
@@ -184,14 +190,17 @@ def _without_trailing_comments(inside: str) -> str:
 
 
 def _nested(parts: Sequence[str], value: str) -> str:
-    """Text of a value below nested keys, in one line."""
+    """Text of a value below nested keys, in one line: `{a: {b: 1 m}}` for the keys a and b."""
     for part in reversed(parts):
         value = f"{{{part}: {value}}}"
     return value
 
 
 def _with_entry(text: str, node: Node, key: str, remaining: Sequence[str], value: str) -> str:
-    """Add a further key to a mapping, or a further entry to a list, in the style of that node."""
+    """Add a key to a mapping, or an entry to a list, in the style (one line or several) of that node.
+
+    `remaining` are keys below the new key or entry, down to the value.
+    """
     nested_value, start, end = _nested(remaining, value), node.start_mark.index, node.end_mark.index
     entry = nested_value if isinstance(node, yaml.SequenceNode) else f"{key}: {nested_value}"
     if node.flow_style:

@@ -1,6 +1,6 @@
-"""Data-sheet figures of inertial sensors, position noise, oscillators and synchronisation, as sections of the file.
+"""Sections of a mission file with data-sheet figures: inertial sensors, position noise, oscillators, synchronisation.
 
-Values are in SI units, 1 sigma.
+Values are in SI units, 1 sigma. A figure is a number that a data sheet states, such as a bias or a phase-noise mask.
 """
 
 import math
@@ -60,15 +60,16 @@ class Overridden(NamedTuple):
     Attributes
     ----------
     figure : str
-        Key of the figure.
+        Key of the replaced figure.
     key : str
-        Key below the platform that replaces the figure.
+        Key, relative to the platform, that replaces the figure.
     part : str
-        Name of the part or log.
+        Name of the part or log that states the replaced figure.
     text : str
-        The figure as its file writes it.
+        The replaced figure as the file of the part writes it.
     frequency : str
-        Frequency of the part, if the file states a mask without a frequency and so uses this one.
+        Frequency of the part, if the mission states a phase-noise mask without a frequency. The mask then applies at
+        this frequency. Otherwise empty.
     """
 
     figure: str
@@ -109,7 +110,7 @@ class Imu(NamedTuple):
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file states a figure. A zero counts as stated."""
+        """Whether the file states at least one figure of the sensor. A zero counts as stated."""
         return any(getattr(self, kind) is not None for kind in IMU_KINDS)
 
 
@@ -128,8 +129,8 @@ class GaussMarkov(NamedTuple):
 class LeverArm(NamedTuple):
     """From the navigation's reference to the antenna's phase centre, in the platform's own axes.
 
-    The axes point along the velocity, horizontally across it, and up; they turn with the velocity. For a fixed
-    platform, they are the axes of the scene.
+    The axes point along the velocity, horizontally across it, and up; they turn with the velocity. The axes of a
+    fixed platform are those of the scene.
     """
 
     arm: Annotated[
@@ -155,7 +156,7 @@ class LeverArm(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Reject an empty section."""
+        """Refuse a lever arm with neither `arm` nor `uncertainty`."""
         if values.keys() >= {"arm", "uncertainty"} and values["arm"] is None and values["uncertainty"] is None:
             yield Problem("is empty", "accepted: arm, uncertainty or both")
 
@@ -180,7 +181,7 @@ class _PowerLawReader(Reader[PowerLaw]):
     accepted = "{h-2: 4e-23, h-1: 2e-21, h0: 8e-20} and the like"
 
     def read(self, value: object, path: KeyPath, report: Report) -> PowerLaw | Invalid:
-        """Read each coefficient; a problem is reported at its own path."""
+        """Read the coefficient of each power; a problem is reported at the path of its coefficient."""
         accepted = f"accepted: {', '.join(POWERS)}"
         if not isinstance(value, dict) or not value:
             report(path, Problem("must be a mapping of coefficients", accepted))
@@ -196,11 +197,11 @@ class _PowerLawReader(Reader[PowerLaw]):
         return PowerLaw(*coefficients.values()) if is_valid and has_valid_values(coefficients) else INVALID
 
     def below(self, part: str) -> Reader[object] | None:
-        """Reader of a coefficient."""
+        """Reader of the coefficient of a power such as `h-2`; None for an unknown key."""
         return _COEFFICIENT if part in POWERS else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: object of coefficients."""
+        """JSON Schema: an object with at least one of the keys `h-2` to `h2`, and their coefficients."""
         coefficient = _COEFFICIENT.schema(definitions)
         properties = dict.fromkeys(POWERS, coefficient)
         return {"type": "object", "properties": properties, "additionalProperties": False, "minProperties": 1}
@@ -263,8 +264,8 @@ AccelerationSensitivity = Annotated[
 class Oscillator(NamedTuple):
     """An oscillator and its noise, in one of three forms or as a part of the catalogue.
 
-    `overridden` lists figures of the part that keys of the file replace. `of_parts` has the sources of aging and
-    acceleration sensitivity if these are figures of the part.
+    `overridden` lists the figures of the part that keys of the file replace. `of_parts` has the sources of aging and
+    acceleration sensitivity if these figures come from the part.
     """
 
     frequency: Frequency = None
@@ -319,7 +320,7 @@ class Oscillator(NamedTuple):
 
     @property
     def mask_at_frequency_of_part(self) -> Overridden | None:
-        """Noise figure of a part that a mask in the file replaces, if the mask states no frequency; otherwise None.
+        """Replaced noise figure of a part, if the replacing phase-noise mask states no frequency; otherwise None.
 
         Such a mask applies at the frequency of the part.
         """
@@ -327,14 +328,19 @@ class Oscillator(NamedTuple):
 
     @property
     def noise_alone(self) -> "Oscillator":
-        """The oscillator without its level, aging and vibration, so that only its noise remains."""
+        """Copy of the oscillator without level, aging, acceleration sensitivity and vibration.
+
+        Only its noise and its spurs remain.
+        """
         return self._replace(level=0.0, aging=None, acceleration_sensitivity=None, vibration=None)
 
     @staticmethod
     def problems(values: SectionValues, or_else: str = _OR_SENSOR) -> Iterator[Problem]:
-        """Require exactly one form of noise, and slopes of the mask that an oscillator can have.
+        """Require exactly one form of noise, and a mask with slopes that an oscillator can have.
 
-        `or_else` is added to the message about missing noise, and names other accepted keys.
+        A mask or spurs also need a frequency, and a vibration needs an acceleration sensitivity. A part of the
+        catalogue may supply what is missing. `or_else` is added to the message about missing noise, and names other
+        accepted keys.
         """
         forms = [form for form in OSCILLATOR_NOISE_FORMS if values.get(form) is not None]
         accepted = f"accepted: one of {', '.join(OSCILLATOR_NOISE_FORMS)}"
@@ -432,7 +438,7 @@ class Synchronization(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require the keys of the method, and refuse keys of other methods."""
+        """Require the keys that the method of synchronisation needs, and refuse keys of other methods."""
         method = values.get("method")
         if method is None:
             return

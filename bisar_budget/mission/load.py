@@ -1,4 +1,4 @@
-"""Reader of mission files: it parses a file to a plain tree with positions (see `tree`), and this to a `Mission`.
+"""Reader of mission files: from YAML to a plain tree with file positions (see `tree`), and on to a `Mission`.
 
 For any file, the result is either a `Mission`, or a `MissionError` with all faults and their lines.
 """
@@ -25,8 +25,8 @@ def load_mission(
 ) -> Mission:
     """Read the mission file at `path`; `-` is standard input.
 
-    `model` replaces the model in the file, and `changes` replace values in the file. `is_placed` is as in
-    `parse_mission`.
+    `model` replaces the gating model `allocation.model` of the file, and `changes` replace other values of the file.
+    `is_placed` is the same as in `parse_mission`.
 
     Raises
     ------
@@ -58,7 +58,10 @@ def _content(path: str) -> bytes:
 
 
 def _bounded(file: BinaryIO) -> bytes:
-    """At most `MAX_BYTES + 1` bytes of a file, read in two steps, because a large buffer would cost page faults."""
+    """Read at most `MAX_BYTES + 1` bytes of a file.
+
+    It is read in two steps, because a large buffer for a small file would cost page faults.
+    """
     data = file.read(1 << 14)
     return data + file.read(MAX_BYTES + 1 - len(data)) if len(data) == 1 << 14 else data
 
@@ -84,13 +87,13 @@ def parse_mission(
     model : str, optional
         Gating model in place of `allocation.model`.
     read_path : callable, optional
-        Returns the content of a file that the mission names, or raises `PathFileError`. By default files are read
-        relative to the folder of the mission file.
+        Takes the name of an orbit, log or other file that the mission names, and returns its content, or raises
+        `PathFileError`. By default files are read relative to the folder of the mission file.
     changes : sequence of SetValue
         Values that replace values of the file or are added to them, in this order.
     find : callable, optional
-        Returns file and content of a part that the mission names, or raises `PartError`. By default parts are
-        searched for in the folders of `parts.folders`.
+        Takes the name of a part that the mission names, and returns the path and the content of its file, or raises
+        `PartError`. By default parts are searched for in the folders of `parts.folders`.
     is_placed : bool
         Whether platforms on the Earth get their paths. Without paths the mission has no geometry, and can be used for
         any `collection.center_time`.
@@ -98,7 +101,7 @@ def parse_mission(
     Raises
     ------
     MissionError
-        Not a usable mission; carries every fault.
+        The content is no usable mission. The error contains every fault.
     """
     return mission_of(read_tree(data, file), data, file, model, read_path, changes, find, is_placed=is_placed)
 
@@ -114,9 +117,10 @@ def mission_of(
     *,
     is_placed: bool = True,
 ) -> Mission:
-    """Turn the tree of a mission file into a `Mission`; the tree is changed.
+    """Turn the tree of a mission file into a `Mission`; the tree is changed in place.
 
-    The other arguments are the same as in `parse_mission`.
+    `data` is the content of the file that the tree was read from. The other arguments and the errors are the same as
+    in `parse_mission`.
     """
     if changes:
         from bisar_budget.mission.changes import apply_changes
@@ -166,7 +170,7 @@ def mission_of(
 
 
 def _recording(find: _Find, parts: dict[str, PartFile]) -> _Find:
-    """Return a function that finds parts like `find`, and adds the file of each found part to `parts`."""
+    """Return a function that finds parts like `find`, and also stores each found part in `parts` by its name."""
 
     def find_and_record(name: str) -> tuple[str, bytes]:
         file, content = find(name)
@@ -177,12 +181,18 @@ def _recording(find: _Find, parts: dict[str, PartFile]) -> _Find:
 
 
 def folder_of(file: str) -> str:
-    """Folder for relative file names in a mission file; the current folder for a mission from standard input."""
+    """Folder to which the relative file names in a mission file refer; empty for a mission from standard input.
+
+    Empty stands for the current folder.
+    """
     return os.path.dirname(file) if file != "-" else ""
 
 
 def _with_hint(fault: Fault) -> Fault:
-    """Add a hint to the fault of an unknown key: the nearest known key, or the sections that have the key."""
+    """Add a hint to a fault about an unknown key: the nearest known key, or the sections that have the key.
+
+    Any other fault is returned unchanged.
+    """
     is_unknown = fault.problem.endswith("is not a known key")
     if not is_unknown or (fault.hint and not fault.hint.startswith("Did you mean")):
         return fault
@@ -196,7 +206,7 @@ def _with_hint(fault: Fault) -> Fault:
 
 
 def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
-    """Add a hint that names the options to a fault, because the file may have no such fault without them."""
+    """Add a hint to a fault of the file that names the `--set` options, because without them it may not occur."""
     return (
         fault if fault.option else fault._replace(hint=sentences(fault.hint, f"Read with {changes_words(changes)}"))
     )
@@ -219,7 +229,7 @@ class Named:
 
     @property
     def sha256(self) -> str:
-        """Hash of all names and contents; empty if the mission names no files."""
+        """SHA-256 over the names and contents of all files; empty if the mission names no files."""
         from hashlib import sha256  # a check does not need it
 
         files = (*self.paths, *((part_file.name, part_file.data) for part_file in self.parts))
@@ -228,9 +238,9 @@ class Named:
 
 
 def named_by(mission: Mission, also: Sequence[SetValue] = ()) -> Named:
-    """Read all files that a mission names, and also the files that it names with each change in `also`.
+    """Read all files that a mission names, with its own values and with each change in `also`.
 
-    Each change is applied alone.
+    Each change is applied alone. A change that makes the mission invalid is skipped.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""The mission file, schema_version 1: every key with its type and meaning. Values are in SI units and radians."""
+"""The mission file, `schema_version` 1: all sections and keys with their types and meanings.
+
+Values are in SI units and radians.
+"""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -73,7 +76,7 @@ class Radar(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require the lower edge of the band to be above 0 Hz."""
+        """Require a lower edge of the band above 0 Hz, that is, a bandwidth below twice the centre frequency."""
         if (
             values.keys() >= {"bandwidth", "center_frequency"}
             and values["bandwidth"] >= 2 * values["center_frequency"]
@@ -112,7 +115,7 @@ class Scene(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require all three coordinates of the scene, or none."""
+        """Require either all three coordinates of the scene centre on the Earth, or none."""
         if values.keys() >= set(PLACE_KEYS):
             missing = [key for key in PLACE_KEYS if values[key] is None]
             if 0 < len(missing) < len(PLACE_KEYS):
@@ -125,7 +128,7 @@ class Scene(NamedTuple):
 
     @property
     def axes(self) -> SceneAxes | None:
-        """East, north and up of the scene in Earth-fixed axes; None if the file states no position on the Earth."""
+        """East, north and up of the scene in Earth-fixed axes; None if the scene has no position on the Earth."""
         if self.latitude is None or self.longitude is None or self.height is None:
             return None
         return axes_at(Geodetic(self.latitude, self.longitude, self.height))
@@ -151,7 +154,7 @@ class EarthOrientation(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require either a table, or UT1 - UTC with both coordinates of the polar motion or neither."""
+        """Require either a table, or UT1 - UTC with both coordinates of the polar motion or none of them."""
         figures = [key for key in values if key != "file" and values[key] is not None]
         if values.get("file") is not None:
             if figures:
@@ -163,7 +166,10 @@ class EarthOrientation(NamedTuple):
 
     @property
     def orientation(self) -> Orientation:
-        """Orientation of the Earth from the stated values; an unknown pole has its usual uncertainty."""
+        """Orientation of the Earth from the stated values.
+
+        If the file states no polar motion, the pole is at (0, 0), and has its usual uncertainty.
+        """
         x, y = self.polar_motion_x, self.polar_motion_y
         pole, doubt = UNKNOWN.pole, UNKNOWN.pole_doubt
         if x is not None and y is not None:
@@ -203,7 +209,7 @@ class OtherError(NamedTuple):
 
     @property
     def stated(self) -> dict[str, float]:
-        """Size of each effect that the file states, by the id of its row."""
+        """Map the row id of each stated effect to its size: phases [rad], location error [m], ISLR [dB]."""
         first, *further = OTHER_EFFECTS
         sizes = {f"other.{self.name}": getattr(self, first)}
         sizes |= {f"other.{self.name}.{effect}": getattr(self, effect) for effect in further}
@@ -262,7 +268,8 @@ def least_age(averaging: PerCase, aperture_time: PerCase) -> PerCase:
 def _unset_clocks(values: SectionValues) -> Iterator[Problem]:
     """Yield problems of a synchronisation without a direct path.
 
-    The problems are an averaging time that overlaps with the aperture, and clock errors that are stated twice.
+    One problem is a holdover whose averaging time overlaps with the aperture. The other is a clock error that is
+    stated in both `timing_error` and `synchronization`.
     """
     sync, collection, timing = (values.get(key) for key in ("synchronization", "collection", "timing_error"))
     if sync is None or sync.is_direct_path:
@@ -293,15 +300,15 @@ def _unset_clocks(values: SectionValues) -> Iterator[Problem]:
 
 
 def least_bandwidth(aperture_time: PerCase) -> PerCase:
-    """Smallest useful bandwidth of an oscillator's noise: one cycle per aperture. [Hz]
+    """Smallest useful bandwidth of an oscillator's noise: one cycle per aperture, 1/T. [Hz]
 
-    A smaller bandwidth would exclude all noise of the oscillator.
+    A smaller bandwidth would exclude all noise that changes within the aperture.
     """
     return 1 / aperture_time
 
 
 def _noise_cut_off(values: SectionValues) -> Iterator[Problem]:
-    """Yield a problem for each oscillator whose bandwidth excludes all noise within the aperture."""
+    """Yield a problem for each oscillator whose `bandwidth` excludes all noise that changes within the aperture."""
     platforms, collection = values.get("platforms"), values.get("collection")
     if platforms is None or collection is None:
         return
@@ -328,7 +335,10 @@ class Shares(NamedTuple):
     reserve: Annotated[float, Key(Quantity(units.RATIO, ge=0, lt=1))] = 0.0
 
     def of(self, owner: str) -> float:
-        """Share of an owner. It is 1 for the owner `mission`, which stands for errors without an owner."""
+        """Share of an owner, such as `receiver`; 1 for the owner `mission`, which has the errors without an owner.
+
+        A clock without a share of its own has the receiver's share.
+        """
         if owner == "clock":
             return self.receiver if self.clock is None else self.clock
         if owner == "mission":
@@ -336,12 +346,16 @@ class Shares(NamedTuple):
         return self.transmitter if owner == "transmitter" else self.receiver
 
     def includes(self, owner: str, of: str) -> bool:
-        """Whether the errors of `owner` count against the share of `of`; all errors count if `of` is `mission`."""
+        """Whether the errors of `owner` count against the share of the owner `of`.
+
+        All errors count if `of` is `mission`. The clock's errors count against the receiver's share if the clock has
+        no share of its own.
+        """
         return of in ("mission", owner) or (owner == "clock" and of == "receiver" and self.clock is None)
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require shares that sum to 1."""
+        """Require shares, including the reserve, that sum to 1."""
         if not values.keys() >= set(Shares._fields):
             return
         total = sum(values[name] or 0.0 for name in Shares._fields)
@@ -366,7 +380,7 @@ METRIC_SPLITS = Section(MetricSplits)
 
 
 def _form_of_split(value: object) -> Reader[str | Shares | MetricSplits]:
-    """Reader of a split, which is a rule, shares, or splits by metric."""
+    """Reader for a value of `allocation.split`: a rule in one word, shares, or a split for each metric."""
     if not isinstance(value, dict):
         return RULE
     return SHARES if value.keys().isdisjoint(METRIC_SPLITS.keys) else METRIC_SPLITS
@@ -456,22 +470,22 @@ class PartFile(NamedTuple):
 class Mission(NamedTuple):
     """A mission file that can be used.
 
-    Fields that are no keys of the file:
+    The following fields are no keys of the file.
 
     Attributes
     ----------
     file : str
         Path of the file.
     places : mapping of KeyPath to event
-        The parser's event of each value, with its position in the file.
+        The YAML parser's event of each value, which has its position in the file.
     data : bytes
         Content of the file, byte for byte.
     changes : tuple of SetValue
-        Values that options put in place of the file's values.
+        Values that `--set` options put in place of the file's values.
     parts : tuple of PartFile
         Files of the parts that the mission names.
     taken : tuple of TakenFigure
-        Figures that the mission takes from parts. A file that states these figures gives the same mission.
+        Figures that the mission takes from parts. A file that states these figures itself gives the same mission.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -519,11 +533,11 @@ class Mission(NamedTuple):
     taken: tuple[TakenFigure, ...] = ()
 
     def __repr__(self) -> str:
-        """Text of one line with the file and the name of the mission."""
+        """One line of text with the path of the file and the name of the mission."""
         return f"Mission({self.file!r}, {shown(self.name)!r})"
 
     def _repr_html_(self) -> str:
-        """Table for a notebook: radar, aperture, positions and motion of the platforms."""
+        """HTML table for a notebook: radar, aperture, place and motion of each platform, bistatic angle, rules."""
         from html import escape  # a check does not need it
 
         from bisar_budget import notebook
@@ -547,18 +561,22 @@ class Mission(NamedTuple):
         return isinstance(other, Mission) and tuple(self._replace(places={})) == tuple(other._replace(places={}))
 
     def __ne__(self, other: object) -> bool:
-        """Whether two missions differ; defined because the comparison of a tuple would be used otherwise."""
+        """Whether two missions differ; without this method, Python would compare them as tuples."""
         return not self == other
 
     def replace(self, values: Mapping[str, object]) -> "Mission":
-        """A mission with some values changed; see `quantities.changed`."""
+        """Return a mission with some values changed; the argument is the same as in `quantities.changed`."""
         from bisar_budget.mission.quantities import changed  # that module imports this one
 
         return changed(self, values)
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require paths and a collection that form an image, and distinct names in `other_errors`."""
+        """Require consistent sections.
+
+        Paths and collection have to form an image, and the settings of clocks and oscillators have to fit the
+        aperture. No name and no row id may occur twice in `other_errors`.
+        """
         platforms: Platforms | None = values.get("platforms")
         if platforms is not None and not any(platform.is_of_the_earth for platform in platforms):
             collection, synchronization = values.get("collection"), values.get("synchronization")
@@ -586,39 +604,39 @@ class Mission(NamedTuple):
 
     @property
     def geometry(self) -> BistaticGeometry:
-        """Both platforms in the frame of the scene."""
+        """Paths of transmitter and receiver in the frame of the scene."""
         return self.platforms.geometry
 
     @property
     def has_direct_path(self) -> bool:
-        """Whether the receiver receives the transmitter directly and uses it as its clock."""
+        """Whether the receiver receives the transmitter's signal directly and uses it as its clock."""
         return self.synchronization is not None and self.synchronization.is_direct_path
 
     @property
     def gating_model(self) -> str:
         """Name of the model whose results decide whether rows pass.
 
-        If there is a direct path, it is the full model, because the published model does not include a direct path.
+        With a direct path it is always the full model, because the published model does not include a direct path.
         """
         return "full" if self.has_direct_path else self.allocation.model
 
     def line(self, path: KeyPath) -> Place | None:
-        """Place of a value in the mission file, or of the nearest key above it that exists; lines count from 1.
+        """Line of a value in the mission file, counted from 1, with the region of the value.
 
-        If there is no such key, the first key of the file is used. The result is None for a mission without a file,
-        and for a value that an option set.
+        If the file does not have the value, the nearest key above it is used, or else the first key of the file. The
+        result is None for a mission without a file, and for a value that an option set.
         """
         event = next(filter(None, map(self.places.get, (*upwards(path), ()))), None)
         return None if event is None or isinstance(event, Changed) else Place.of(event)
 
     def is_changed(self, path: KeyPath) -> bool:
-        """Whether an option set a value, or a section or list that contains it."""
+        """Whether an option has set the value at a path, or a section or list that contains it."""
         event = next(filter(None, map(self.places.get, upwards(path))), None)
         return bool(self.changes) and isinstance(event, Changed)
 
 
 def _at_a_glance(state: PlatformState) -> str:
-    """Text of one line with a platform's slant range, elevation and speed."""
+    """One line of text with a platform's slant range, elevation and speed."""
     speed = math.hypot(*state.velocity)
     moves = "stands still" if state.is_still else f"moves at {format_quantity(speed, 'm/s', 4)}"
     slant_range = format_quantity(float(state.slant_range), "m", 4)
@@ -626,7 +644,10 @@ def _at_a_glance(state: PlatformState) -> str:
 
 
 def has_instruments(mission: Mission) -> bool:
-    """Whether a mission has sensors, lever arms, clocks or spectra, whose errors vary randomly over an aperture."""
+    """Whether a mission states sensors, lever arms, clocks, vibration spectra or raw logs.
+
+    Their errors vary randomly over an aperture.
+    """
     return (
         mission.synchronization is not None
         or any(
@@ -643,7 +664,10 @@ def has_instruments(mission: Mission) -> bool:
 
 
 def has_random_errors(mission: Mission) -> bool:
-    """Whether a mission has sensors, clocks or propagation delays, or other errors beyond a quadratic phase."""
+    """Whether a mission has errors that vary randomly, or effects other than a quadratic phase.
+
+    These are the errors of `has_instruments`, propagation delays, and other effects in `other_errors`.
+    """
     return (
         has_instruments(mission)
         or mission.propagation is not None
@@ -652,7 +676,11 @@ def has_random_errors(mission: Mission) -> bool:
 
 
 def flies_on_earth(mission: Mission) -> bool:
-    """Whether a mission has a scene on the Earth, paths that need one or come from files, or errors in `ric` axes."""
+    """Whether a mission needs positions on the Earth.
+
+    It does if its scene has such a position, if a path needs one or comes from a file, or if errors are in `ric`
+    axes.
+    """
     common = mission.common_motion_error
     return (
         mission.scene.is_on_earth
@@ -670,7 +698,7 @@ def names_parts(mission: Mission) -> bool:
 
 
 def names_files(root: Mapping[str, object]) -> bool:
-    """Whether the content of a file, valid or not, names a part, an orbit or a log."""
+    """Whether the content of a mission file, valid or not, names a part, an orbit or a log."""
     platforms = root.get("platforms")
     sections = platforms.values() if isinstance(platforms, dict) else ()
     return any(
@@ -687,7 +715,10 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 
 
 def mission_schema() -> JsonObject:
-    """JSON Schema of a mission. A quantity is a bare number, or text with a unit; only the tool checks the unit."""
+    """JSON Schema of a mission file.
+
+    A quantity is a bare number, or text with a unit. Only the tool checks the unit completely.
+    """
     definitions: Definitions = {}
     return {
         "$schema": DRAFT,

@@ -1,7 +1,8 @@
 """Parts of the catalogue: inertial sensors, GNSS receivers and oscillators, with their figures and sources.
 
-Each part has one YAML file. The file is in `specs/sensors/`, in a folder that a project names, or anywhere if it is
-named by its path. A mission names parts. A figure that the mission states itself overrides the figure of the part.
+A figure is a number of a data sheet, such as a bias or a phase-noise mask. Each part has one YAML file. The file is
+in `specs/sensors/`, in a folder that the settings of a project name, or anywhere if the mission names its path. A
+mission names parts. A figure that the mission states itself overrides the figure of the part.
 """
 
 import os
@@ -108,7 +109,7 @@ class ImuPart(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require a figure that is not zero."""
+        """Require at least one figure that is not zero."""
         yield from _without_figure(values, IMU_KINDS)
 
 
@@ -126,7 +127,7 @@ class GnssPart(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require a figure that is not zero, and check the noise as in a mission."""
+        """Require at least one figure that is not zero, and distinct names of the position errors in `random`."""
         yield from MotionError.problems({"random": values.get("random", ())})
         yield from _without_figure(values, _GNSS_KINDS)
 
@@ -147,7 +148,7 @@ class OscillatorPart(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Check the part like an oscillator of a mission, and require noise that is not zero."""
+        """Check the figures as those of an oscillator in a mission, and require noise that is not zero."""
         yield from Oscillator.problems({**values, "sensor": None}, or_else="")
         if any(values.get(form) is not None for form in OSCILLATOR_NOISE_FORMS):
             yield from _without_figure(values, OSCILLATOR_NOISE_FORMS)
@@ -180,16 +181,16 @@ class PartError(Exception):
 
     @classmethod
     def of(cls, file: str, faults: Sequence[Fault]) -> "PartError":
-        """An error with one line for each fault of a file."""
+        """Make an error from the faults of a part's file, with one reason for each fault."""
         return cls(*MissionError(file, tuple(faults)).lines(), faults=faults)
 
     def __str__(self) -> str:
-        """All reasons, joined by semicolons."""
+        """All reasons in one line, joined by semicolons."""
         return "; ".join(map(str, self.args))
 
 
 def evidence(part: Part, figure: str) -> str:
-    """Evidence for a figure of a part: the name of the part, and the source of the figure."""
+    """Evidence for a figure of a part, as reports show it: the name of the part, and the source of the figure."""
     source = part.source if isinstance(part.source, str) else part.source.get(figure, "")
     return f"{part.name}: {source}"
 
@@ -204,17 +205,17 @@ class Entry:
 
     @property
     def id(self) -> str:
-        """The name by which a mission names the part."""
+        """Name by which a mission names the part: its file name without folder and suffix."""
         return os.path.splitext(os.path.basename(self.file))[0]
 
     @property
     def figures(self) -> Mapping[str, str]:
-        """Figures of the part by their keys, as the file writes them."""
+        """Figures of the part as the file writes them, in one line of text each, by their keys."""
         return {key: figure_text(self.written[key]) for key in FIGURES[self.part.kind] if key in self.written}
 
 
 def entries(places: Sequence[str]) -> Iterator[Entry]:
-    """Yield all parts of the catalogue, ordered by kind and name.
+    """Yield all parts in the folders `places` of the catalogue, ordered by kind and name.
 
     Raises
     ------
@@ -226,7 +227,7 @@ def entries(places: Sequence[str]) -> Iterator[Entry]:
 
 
 def figure_text(value: object) -> str:
-    """Text of one line with a figure as the file of its part writes it."""
+    """Write a figure of a part, which may be a list or a mapping, as one line of text."""
     if isinstance(value, dict):
         return ", ".join(f"{key}: {figure_text(item)}" for key, item in value.items())
     if isinstance(value, list):
@@ -235,7 +236,9 @@ def figure_text(value: object) -> str:
 
 
 def read_entry(file: str) -> Entry:
-    """Read the file of a part as for a mission that names it; `-` is standard input. The file name is checked too.
+    """Read the file of a part and check it, including the file name, as a mission that names the part would.
+
+    `-` is standard input, whose name is not checked.
 
     Raises
     ------
@@ -254,7 +257,7 @@ def read_entry(file: str) -> Entry:
 
 
 def _name_faults(file: str) -> Iterator[Fault]:
-    """Yield faults of a file name that no mission can use to name the part."""
+    """Yield a fault if the name of a part's file is such that no mission can name the part by it."""
     name = os.path.basename(file)
     if not name.endswith(_SUFFIXES):
         accepted = f"accepted: one that ends in {' or '.join(_SUFFIXES)}"
@@ -266,7 +269,7 @@ def _name_faults(file: str) -> Iterator[Fault]:
 
 
 def _content(file: str, files: Files) -> bytes:
-    """Content of the file of a part; raises `PartError`."""
+    """Content of the file of a part; raises `PartError` if it cannot be read."""
     try:
         return files.content(file, MAX_BYTES)
     except UnreadableError as error:
@@ -275,7 +278,7 @@ def _content(file: str, files: Files) -> bytes:
 
 
 def _standard_input() -> bytes:
-    """Content of standard input, at most one byte more than `MAX_BYTES`; raises `PartError`."""
+    """Content of standard input, at most `MAX_BYTES + 1` bytes; raises `PartError` if it cannot be read."""
     try:
         return standard_input().read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
@@ -285,7 +288,7 @@ def _standard_input() -> bytes:
 
 @lru_cache(maxsize=64)  # a thousand missions name the same parts
 def _entry(file: str, data: bytes) -> Entry:
-    """Read a part from the content of its file; parts that were read before come from a cache."""
+    """Read a part from the content of its file, or take it from the cache; raises `PartError` for an invalid part."""
     part: Part | Invalid = INVALID
     try:
         tree = read_tree(data, file, "part")
@@ -299,10 +302,10 @@ def _entry(file: str, data: bytes) -> Entry:
 
 
 def _part_of(tree: Tree) -> Part | Invalid:
-    """Read the part in the tree of its file; returns `INVALID` after a report.
+    """Read the part from the tree of its file; returns `INVALID` after a report.
 
-    A file without a valid kind is read as the kind that has most of the file's figures, so that all faults are
-    reported at once.
+    If the file has no valid kind, the part is read as the kind to which most of its figures belong, so that all
+    faults are reported at once.
     """
     root = tree.root
     kind = root.get("kind")
@@ -320,7 +323,10 @@ def _part_of(tree: Tree) -> Part | Invalid:
 
 
 def _no_kind(root: Mapping[str, object], likely: str) -> Problem:
-    """Problem for a missing or unknown kind; `likely` is the kind to which the figures belong, or empty."""
+    """Problem of a part whose kind is missing or unknown.
+
+    `likely` is the kind to which its figures belong; empty if they belong to none.
+    """
     hint = did_you_mean(root.get("kind", ""), tuple(PART_SECTIONS))
     if likely:
         hint = f"Its figures are those of kind: {likely}"
@@ -333,14 +339,15 @@ def _no_kind(root: Mapping[str, object], likely: str) -> Problem:
 def _without_figure(values: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
     """Yield a problem if all figures of a part are missing or zero.
 
-    There is no problem if `values` lacks a figure, because an invalid figure is reported elsewhere.
+    `values` has no entry for an invalid figure. There is then no problem here, because the figure is reported
+    elsewhere.
     """
     if values.keys() >= set(figures) and not any(_is_not_zero(values[figure]) for figure in figures):
         yield Problem("states no figure", f"accepted: one of {', '.join(figures)} that is not zero")
 
 
 def _without_source(root: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
-    """Yield a problem if the file states a source for each figure, but not for all figures.
+    """Yield a problem if a part's `source` is a mapping by figure that lacks some of the stated figures.
 
     Invalid figures need a source too. `root` is the content of the file.
     """
@@ -357,7 +364,10 @@ def _without_source(root: Mapping[str, object], figures: Sequence[str]) -> Itera
 
 
 def _is_not_zero(figure: object) -> bool:
-    """Whether a figure is stated and is not zero. A part needs such a figure, because every sensor has errors."""
+    """Whether a figure is stated and any of its numbers is not zero.
+
+    A part needs such a figure, because every sensor has errors.
+    """
     if isinstance(figure, GaussMarkov):
         return _is_not_zero(figure.sigma)
     if isinstance(figure, tuple | list):
@@ -366,7 +376,9 @@ def _is_not_zero(figure: object) -> bool:
 
 
 def folders(beside: str, files: Files = DISK) -> list[str]:
-    """Folders that are searched for parts: the folders in the project's settings, then the catalogue of this package.
+    """Folders in which parts are searched: those in the settings of the project, then the catalogue of this package.
+
+    The project is that of the folder `beside`; empty stands for the current folder.
 
     Raises
     ------
@@ -384,7 +396,7 @@ def folders(beside: str, files: Files = DISK) -> list[str]:
 
 
 def catalogue(places: Sequence[str], files: Files = DISK) -> dict[str, str]:
-    """Map the name of each part in the given folders to its file; the first folder that has the name counts."""
+    """Map the name of each part in the folders `places` to its file; of equal names, the first folder's counts."""
     part_file_by_name: dict[str, str] = {}
     for folder in places:
         for file in part_files(folder, files)[:_MAX_FOLDER_FILES]:
@@ -393,7 +405,7 @@ def catalogue(places: Sequence[str], files: Files = DISK) -> dict[str, str]:
 
 
 def part_files(folder: str, files: Files = DISK) -> list[str]:
-    """Files in a folder whose suffix is that of a part; raises `PartError` if the folder cannot be listed."""
+    """Paths of the YAML files in a folder of parts; raises `PartError` if the folder cannot be listed."""
     try:
         names = files.names(folder)
     except OSError as error:
@@ -403,9 +415,10 @@ def part_files(folder: str, files: Files = DISK) -> list[str]:
 
 
 def finder_of(folder: str, files: Files = DISK) -> Find:
-    """Return a function that finds the parts that a mission file in a folder names.
+    """Return a function that takes the name of a part in a mission, and returns the path and the content of its file.
 
-    The function raises `PartError` if no part has the name, or if its file cannot be read.
+    `folder` is that of the mission file. The function raises `PartError` if no part has the name, or if its file
+    cannot be read.
     """
 
     def find(name: str) -> tuple[str, bytes]:
@@ -416,23 +429,28 @@ def finder_of(folder: str, files: Files = DISK) -> Find:
 
 
 def find_part(name: str, beside: str) -> Part:
-    """Read the part that a mission names: a part of the catalogue, or a file relative to the mission's folder.
+    """Read the part that a mission in the folder `beside` names.
+
+    `name` is the name of a part of the catalogue, or the path of a file relative to that folder.
 
     Raises
     ------
     PartError
-        No part has the name, or the file is no part.
+        No part has the name, or the file is no valid part.
     """
     return _entry(*finder_of(beside)(name)).part
 
 
 def is_file(name: str) -> bool:
-    """Whether a mission names a part by the path of a file, and not by its name in the catalogue."""
+    """Whether the name of a part in a mission is the path of a file; otherwise it is a name in the catalogue."""
     return name.endswith(_SUFFIXES)
 
 
 def _file_of(name: str, beside: str, files: Files) -> str:
-    """Path of the file of a part; raises `PartError` if no folder has the part."""
+    """Path of the file of a part that a mission names; raises `PartError` if no folder has the part.
+
+    `beside` is the folder of the mission.
+    """
     if is_file(name):
         return os.path.join(beside, name)
     searched_folders = folders(beside, files)
@@ -447,7 +465,7 @@ def _file_of(name: str, beside: str, files: Files) -> str:
 
 
 def with_parts(mission: Mission, find: Find, report: Report) -> Mission | Invalid:
-    """Add the figures of the named parts to a mission; returns `INVALID` after a report.
+    """Return a mission completed with the figures of the parts that it names, or `INVALID` after a report.
 
     `find` finds the file of a part, and may raise `PartError`.
     """
@@ -467,7 +485,7 @@ def with_parts(mission: Mission, find: Find, report: Report) -> Mission | Invali
 
 
 def report_parts(root: Mapping[str, object], find: Find, report: Report) -> None:
-    """Report problems with the parts that an otherwise invalid mission file names.
+    """Report problems of the parts that a mission file names, if the file itself is invalid.
 
     A valid section is checked together with its parts as in a mission. For an invalid section, only the names of its
     parts are checked. `root` is the content of the file.
@@ -485,7 +503,10 @@ def report_parts(root: Mapping[str, object], find: Find, report: Report) -> None
 
 
 def _stand_in(section: Section[object], value: object) -> SectionValues:
-    """Values of a section if all of them are valid; otherwise only the names of its parts."""
+    """Values of a section with which its parts are checked.
+
+    These are all its values if they are valid, and otherwise only the names of its parts.
+    """
     values = section.each(value)
     if INVALID not in values.values():
         return values
@@ -495,7 +516,10 @@ def _stand_in(section: Section[object], value: object) -> SectionValues:
 def _parts_of(
     names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequence[str], find: Find, report: Report
 ) -> dict[str, Entry] | Invalid:
-    """Find parts by their names, and read them; returns their entries by name, or `INVALID` after a report."""
+    """Find and read the parts that the key at `path` names, at most one of each kind in `kinds`.
+
+    Returns their entries by name, or `INVALID` after a report.
+    """
     is_list = isinstance(names, tuple)
     entry_by_name: dict[str, Entry] = {}
     is_valid = True
@@ -562,14 +586,17 @@ def _with_sensors(
 
 
 def _taken(name: str, entry: Entry, section: KeyPath, figures: Collection[str]) -> Iterator[TakenFigure]:
-    """Yield the figures that a section takes from a part, in the order of the part's file."""
+    """Yield the figures in `figures` that a section takes from a part, in the order of the part's file."""
     for figure in entry.figures:
         if figure in figures:
             yield TakenFigure(".".join(map(str, (*section, figure))), entry.written[figure], name)
 
 
 def _own_key(error: MotionError, stating: MotionError | Imu, figure: str) -> str:
-    """Key below the platform that states a figure which a part also states; empty if only the part states it."""
+    """Key, relative to the platform, that states a figure of a part too; empty if only the part states it.
+
+    `stating` is the section in which the mission could state the figure: the motion error itself, or its `imu`.
+    """
     if figure in ("position", "velocity"):
         if error.covariance is not None:
             return "motion_error.covariance"
@@ -583,12 +610,13 @@ def _own_key(error: MotionError, stating: MotionError | Imu, figure: str) -> str
 def _with_sensor(
     oscillator: Oscillator, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]
 ) -> Oscillator | Invalid:
-    """Add the figures of its part to an oscillator; returns `INVALID` after a report.
+    """Complete an oscillator with the figures of the part that it names; returns `INVALID` after a report.
 
-    Figures that come from the part are appended to `taken`. A figure in the file overrides the same figure of the
-    part, and the oscillator lists it as overridden. A mask is valid at the frequency at which it was measured. With
-    another frequency, the same decibels would describe a better or a worse oscillator. So the file has to state both,
-    or neither.
+    Figures that come from the part are appended to `taken`. If the file states a figure that the part also states,
+    the figure of the file is kept, and the oscillator lists that of the part as overridden. A phase-noise mask is
+    valid only at the frequency at which it was measured. At another frequency, the same decibels would describe a
+    better or a worse oscillator. So, if the noise of the part is a mask, a file that states another frequency also
+    has to state the noise.
     """
     if oscillator.sensor is None:
         return oscillator
@@ -643,7 +671,10 @@ _NOT_EMPTY: JsonObject = {"not": {"const": []}}  # an empty list states no figur
 
 
 def part_schema() -> JsonObject:
-    """JSON Schema of the file of a part, with an alternative for each kind; quantities are as in `mission_schema`."""
+    """JSON Schema of the file of a part, with one alternative for each kind.
+
+    Quantities are described as in `mission_schema`.
+    """
     definitions: Definitions = {}
     kinds = []
     for kind, section in PART_SECTIONS.items():
@@ -662,10 +693,10 @@ def part_schema() -> JsonObject:
 
 
 def _rules(figures: Sequence[str]) -> JsonObject:
-    """Schema rules for the figures of a part: at least one is stated, and each has a source.
+    """Rules of the JSON Schema for the figures of a part.
 
-    An oscillator has exactly one form of noise, and a mask has its frequency. The rules cannot detect figures that
-    are zero; the reader does.
+    At least one figure is stated. If sources are stated by figure, each figure has one. An oscillator has exactly one
+    form of noise, and a mask has its frequency. The rules cannot detect figures that are zero; the reader does.
     """
     by_itself = [figure for figure in figures if figure not in ("frequency", *BESIDE_NOISE)]
     alternatives = [{"required": [figure], "properties": {figure: _NOT_EMPTY}} for figure in by_itself]

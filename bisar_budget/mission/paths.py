@@ -1,4 +1,4 @@
-"""Paths of the platforms of a mission, from an orbit, from a flight log, or from a geodetic position."""
+"""Paths of a mission's platforms over the aperture: from an orbit, a flight log, or a geodetic position."""
 
 import hashlib
 import math
@@ -94,7 +94,7 @@ class _UnusablePathError(Exception):
 
 
 def reader_of(folder: str, files: Files = DISK) -> Beside:
-    """Return a function that reads files relative to a folder.
+    """Return a function that reads a file by its name relative to a folder, and returns its content.
 
     The function raises `PathFileError` if a file cannot be read, is no regular file, or is larger than 500 MB.
     """
@@ -112,7 +112,7 @@ def reader_of(folder: str, files: Files = DISK) -> Beside:
 
 
 def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
-    """Yield the keys under which a mission names files of paths or of the Earth's orientation, and the names."""
+    """Yield the key and the name of each file that a mission names for a path or for the Earth's orientation."""
     for name, platform in mission.platforms._asdict().items():
         for key, section in (("orbit", platform.orbit), ("trajectory", platform.trajectory)):
             for form in _FILE_KEYS:
@@ -123,7 +123,7 @@ def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
 
 
 def report_files(root: Mapping[str, object], read: Beside, report: Report) -> None:
-    """Report orbits and logs that cannot be read, for a mission file that is invalid for other reasons.
+    """Report orbits, logs and orientation tables that cannot be read, for an otherwise invalid mission file.
 
     Their content is not checked here, because a path depends on the scene, time and aperture of a valid mission.
     `root` is the content of the mission file.
@@ -145,9 +145,9 @@ def report_files(root: Mapping[str, object], read: Beside, report: Report) -> No
 
 
 def with_paths(mission: Mission, read: Beside, report: Report) -> Mission | Invalid:
-    """Add the paths of the platforms to a mission; returns `INVALID` after a report.
+    """Return a mission with the paths of its platforms, or `INVALID` after a report.
 
-    `read` may raise `PathFileError`.
+    `read` returns the content of a file, and may raise `PathFileError`.
     """
     axes, platforms, is_valid = mission.scene.axes, mission.platforms, True
     if (orientation_problem := _unusable_orientation(mission, read)) is not None:
@@ -178,9 +178,9 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Mission | Inva
 
 
 def _unusable_orientation(mission: Mission, read: Beside) -> Problem | None:
-    """Problem with the table of the Earth's orientation; None if the table can be used.
+    """Problem of the file with the Earth's orientation that a mission names; None if it names none or a usable one.
 
-    The table is checked even if no path needs it.
+    The file is checked even if no path needs it.
     """
     section, center = mission.earth_orientation, mission.collection.center_time
     if section is None or section.file is None:
@@ -195,7 +195,10 @@ def _unusable_orientation(mission: Mission, read: Beside) -> Problem | None:
 
 
 def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | None, read: Beside) -> Platform:
-    """Add its path to a platform, and the errors that the source of the path states."""
+    """Return a platform with its path, and with the errors that the source of the path states.
+
+    Raises `_UnusablePathError` if there is no usable path.
+    """
     if platform.orbit is not None:
         path = _of_orbit(mission, platform.orbit, _required_axes(axes, "orbit"), read)
     elif platform.trajectory is not None:
@@ -220,21 +223,27 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
 
 
 def _file_problem(file: str | None, error: PathFileError) -> Problem:
-    """Problem with a path file that a key may name; the text of the problem names the file only once."""
+    """Problem of a path file from the error of its reader; the text of the problem names the file exactly once.
+
+    `file` is the name that a key of the mission states; None if the problem belongs to another key.
+    """
     words = str(error)
     words = f"{file} {words}" if file is not None and words.startswith("has ") else words
     return Problem(words, error.accepted, error.hint, names_value=file is not None and words.startswith(file))
 
 
 def _required_axes(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
-    """Axes of a scene on the Earth; raises `_UnusablePathError` if the scene has no position on the Earth."""
+    """Axes of a scene; raises `_UnusablePathError` for `key` if the scene has no position on the Earth."""
     if axes is None:
         raise _UnusablePathError((key,), Problem("needs the scene's position on the Earth", _ACCEPTED_SCENE))
     return axes
 
 
 def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
-    """Add the axes of the `ric` frame to a path, for a scene on the Earth; unchanged if these axes are undefined."""
+    """Add the axes of the `ric` frame (radial, in-track, cross-track) to a path, for a scene on the Earth.
+
+    The path is returned unchanged if these axes are undefined, that is, if there is no motion relative to the stars.
+    """
     try:
         return replace(state, radial=axes.radial(state.position, state.velocity))
     except ZeroDivisionError:  # without motion relative to the stars there is no orbital plane
@@ -242,7 +251,7 @@ def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
 
 
 def with_dynamics(state: PlatformState, axes: earth.SceneAxes | None, *, is_orbit: bool = False) -> PlatformState:
-    """Add the free-fall dynamics of state errors to a path, if it is an orbit or is in free fall."""
+    """Add to a path how errors of its state grow in free fall, if the path is an orbit or is itself in free fall."""
     return replace(state, fall=of_scene(axes) if is_orbit else fall_of(state, axes))
 
 
@@ -271,7 +280,7 @@ class _OrbitFile(NamedTuple):
 
     @classmethod
     def of(cls, route: OrbitSource, read: Beside) -> "_OrbitFile":
-        """Read the file of an orbit; raises `PathFileError`."""
+        """Read the file of an orbit, or its element set in the mission file; raises `PathFileError`."""
         form = _form_of(route)
         source = getattr(route, form)
         if isinstance(source, str):
@@ -279,7 +288,7 @@ class _OrbitFile(NamedTuple):
         return cls(form, None, "\n".join(source).encode(), route.object, bool(route.planned))
 
     def orbit(self, center: Instant, orientation: Orientation) -> Orbit:
-        """The orbit at an instant; raises `PathFileError` if the file has no orbit then."""
+        """Orbit at the instant `center`; raises `PathFileError` if the file has no orbit at that time."""
         name = self.name or "the element set"
         hold_to_format(self.data, name, self.form)
         orbit = ORBIT_FORMATS[self.form].read(self.data, name, self.object, center, orientation)
@@ -287,15 +296,16 @@ class _OrbitFile(NamedTuple):
 
 
 def _form_of(route: OrbitSource) -> str:
-    """Key of the mission file that states the orbit."""
+    """Key of the orbit format that the mission file uses, such as `tle`."""
     return next(form for form in ORBIT_FORMATS if getattr(route, form) is not None)
 
 
 def orbits_of(mission: Mission, route: OrbitSource, read: Beside) -> Callable[[Instant], Orbit]:
-    """Return a function that takes the instant of mid-aperture and returns the orbit of a mission.
+    """Return a function that takes an instant of mid-aperture, and returns the orbit of a mission at that instant.
 
-    If a file has several element sets or segments, the nearest one is used. Both functions may raise `PathFileError`.
-    The orientation of the Earth is taken at noon of the day, because UT1 - UTC changes by only a millisecond per day.
+    If a file has several element sets or segments, the one nearest to the instant is used. Both functions may raise
+    `PathFileError`. The orientation of the Earth is taken at noon of the day, because UT1 - UTC changes by only a
+    millisecond per day.
     """
     orbit_file = _OrbitFile.of(route, read)
 
@@ -307,7 +317,7 @@ def orbits_of(mission: Mission, route: OrbitSource, read: Beside) -> Callable[[I
 
 
 def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read: Beside) -> FlownPath:
-    """Path of a platform that has an orbit."""
+    """Path of a platform over the aperture from the orbit that the mission names."""
     center = mission.collection.center_time
     if center is None:
         raise _UnusablePathError(("orbit",), Problem("needs an instant", "accepted: collection.center_time"))
@@ -331,7 +341,10 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
 
 
 def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orientation, tuple[str, str] | None]:
-    """Orientation of the Earth at mid-aperture, and its table with the SHA-256, or None without a table."""
+    """Orientation of the Earth at mid-aperture, and the name and SHA-256 of the table that states it.
+
+    The second value is None if no table is used.
+    """
     section = mission.earth_orientation
     if section is None:
         return UNKNOWN._replace(day=center.day), None
@@ -343,7 +356,10 @@ def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orien
 
 
 def _kept(cache: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...], make: Callable[[], _T]) -> _T:
-    """Value of a key from a cache, or made by `make`; the cache keeps the `most` recently used values."""
+    """Value of `key` in a cache; if there is none, it is made by `make` and stored.
+
+    The cache keeps the `most` values that were used last.
+    """
     value = cache.pop(key, None) or make()
     cache[key] = value
     for old in list(cache)[:-most]:
@@ -354,7 +370,10 @@ def _kept(cache: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...
 def _orbit_path(
     orbit: Orbit, file: str | None, center: Instant, axes: earth.SceneAxes, aperture_time_s: float
 ) -> FlownPath:
-    """Path over an aperture that interpolates an orbit."""
+    """Path over an aperture by interpolation of an orbit, with its doubts and stated accuracy.
+
+    Raises `PathFileError` if the orbit does not cover the aperture or is too uncertain.
+    """
     name, half, widest = file or "the element set", aperture_time_s / 2, math.inf
     if orbit.span is not None:
         before, after = center.since(orbit.span[0]), orbit.span[1].since(center)
@@ -391,7 +410,7 @@ def _orbit_path(
 
 
 def _stated_of_orbit(orbit: Orbit, center: Instant, axes: earth.SceneAxes, name: str) -> Iterator[StatedAccuracy]:
-    """Accuracy that the file of an orbit states for mid-aperture, along the axes of the scene."""
+    """Yield the accuracy that the file of an orbit states for mid-aperture, if any, along the axes of the scene."""
     accuracy = orbit.stated(center)
     if accuracy is not None:
         covariance = accuracy.covariance
@@ -400,7 +419,10 @@ def _stated_of_orbit(orbit: Orbit, center: Instant, axes: earth.SceneAxes, name:
 
 
 def _hold_to_range(doubt: PathDoubt, slant_range: float, doubts: Sequence[str], remedy: str, name: str) -> None:
-    """Refuse an orbit whose uncertainty exceeds a tenth of the slant range [m], because its geometry is unknown."""
+    """Refuse an orbit whose uncertainty exceeds a tenth of the slant range [m], because its geometry is unknown.
+
+    Raises `PathFileError`. `doubts`, `remedy` and `name` are texts for its message.
+    """
     if not doubt.size <= _MAX_DOUBT_FRACTION * slant_range:
         lengths = (slant_range, _MAX_DOUBT_FRACTION * slant_range, doubt.size)
         slant_range_text, largest, size = (format_quantity(length, "m", 4) for length in lengths)
@@ -413,7 +435,7 @@ def _hold_to_range(doubt: PathDoubt, slant_range: float, doubts: Sequence[str], 
 
 
 def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, read: Beside) -> FlownPath:
-    """Path of a platform that has a flight log."""
+    """Path of a platform over the aperture from the flight log that the mission names, or from the cache."""
     aperture_time = mission.collection.aperture_time
     try:
         data = read(route.file)
@@ -428,7 +450,7 @@ def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | N
 def _log_path(
     mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, data: bytes, digest: str
 ) -> FlownPath:
-    """Path over an aperture that smooths a flight log."""
+    """Path over an aperture by smoothing of a flight log, with its noise, doubts and stated accuracy."""
     center, aperture_time = mission.collection.center_time, mission.collection.aperture_time
     log = dated(track_around(_log(route, data, digest), center, route.center, aperture_time, route.file), center)
     if log.is_earth_fixed:
@@ -465,7 +487,7 @@ def _log_path(
 
 
 def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
-    """Read a log, or take it from the cache."""
+    """Read a flight log from the content of its file, or take it from the cache."""
     keys = LogKeys(route.week, route.time_scale, route.geoid_separation, route.talker, route.track, route.instance)
     key = (route.file, route.format, keys, digest)
 
@@ -479,7 +501,7 @@ def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
 def _by_accuracy(
     mission: Mission, route: TrajectorySource, error: MotionError, read: Beside
 ) -> tuple[StatedAccuracy, str]:
-    """Errors that the accuracy file of a log states for the aperture, and the SHA-256 of this file."""
+    """Accuracy that the accuracy file of a log states for the aperture, and the SHA-256 of this file."""
     file = route.accuracy or ""
     key = ("trajectory", "accuracy")
     if error.frame != "scene":
@@ -499,10 +521,11 @@ def _by_accuracy(
 
 
 def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]:
-    """Accuracy of a log around the aperture: the largest stated sigmas, and the largest usual sigma.
+    """Yield the accuracies of a log around the aperture: the largest stated sigmas, and the largest usual sigma.
 
-    If no sigma is stated along an axis, the largest sigma of the other axes is used. The usual sigma of a fix follows
-    from its quality. It is used for fixes without a complete set of stated sigmas.
+    If no sigma is stated along an axis, the largest sigma of the other axes is used there. The usual sigma of a fix
+    follows from its quality. It is used for fixes without a complete set of stated sigmas. `near` is the range of the
+    fixes around the aperture.
     """
     unstated: Booleans = np.ones(log.times[near].shape, dtype=bool)
     if log.sigmas is not None:
@@ -521,10 +544,11 @@ def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]
 
 
 def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) -> MotionError:
-    """Add the figures of a path's source to a motion error that lacks them.
+    """Complete a motion error with the accuracy that the source of a path states.
 
-    The figures are along the axes of the motion error. A figure without a direction is used on each axis, because the
-    error may have any direction. A figure of the mission file overrides the source, and is listed in `overridden`.
+    The accuracy is turned to the axes of the motion error. An accuracy without a direction is used on each axis,
+    because the error may have any direction. A figure of the mission file is kept, and that of the source is then
+    listed in `overridden`.
     """
     if stated.is_typical:
         return error
@@ -561,13 +585,16 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
 
 
 def _is_correlated(covariance: Floats) -> bool:
-    """Whether the errors of a covariance are correlated by more than rounding."""
+    """Whether any two errors of a covariance matrix are correlated by more than rounding explains."""
     off_diagonal = np.array(correlations(covariance)) - np.eye(len(covariance))
     return bool(np.abs(off_diagonal).max() > _ROUNDED_CORRELATION_FRACTION)
 
 
 def _of_position(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float) -> FlownPath:
-    """Path along a geodesic from a geodetic position, with the platform's speed over ground and its climb rate."""
+    """Path over the aperture from a geodetic position: flight along a geodesic with the stated speed and climb rate.
+
+    A platform without speed and climb rate stays at the position.
+    """
     position = earth.Geodetic(platform.latitude or 0.0, platform.longitude or 0.0, platform.altitude or 0.0)
     speed, heading, climb = platform.speed or 0.0, platform.heading or 0.0, platform.climb or 0.0
     if not speed and not climb:
@@ -586,7 +613,11 @@ def _of_position(platform: Platform, axes: earth.SceneAxes, aperture_time_s: flo
 
 
 def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | None = None) -> FlownPath:
-    """Flown path from a fit, with its residuals and doubts; `words` name the source of the path."""
+    """Make a `FlownPath` from a fit, with its residuals and doubts.
+
+    `words` name the source of the path. `file` and `digest` are the name and the SHA-256 of its file, if there is
+    one.
+    """
     return FlownPath(
         fitted.state,
         source=words,

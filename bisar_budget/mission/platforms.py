@@ -1,4 +1,7 @@
-"""Platforms of a mission file: their paths, stated in one of five ways, and the errors of their measured motion."""
+"""Platforms of a mission file: their paths, which the file states in one of five ways, and their motion errors.
+
+A motion error is the error of the measured motion of a platform.
+"""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -96,8 +99,8 @@ PART_REFERENCES = either(list, TextList(), Reference())
 class MotionError(NamedTuple):
     """Error of the measured motion of one platform. A scalar means each axis.
 
-    `of_parts` names the figures that come from parts of the catalogue, and the source of each. `overridden` lists the
-    figures of parts that another key of the file replaces.
+    `of_parts` has the names of the figures that come from parts of the catalogue or from the source of the path, each
+    with its source. `overridden` lists the figures of parts and of the path's source that keys of the file replace.
     """
 
     frame: Annotated[
@@ -152,9 +155,9 @@ class MotionError(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require a covariance to be stated alone, to fit its frame, and to have a normal distribution.
+        """Require a covariance to be stated alone, to fit the axes of the frame, and to have a normal distribution.
 
-        Names of errors have to be distinct.
+        The names of the errors in `random` have to be distinct.
         """
         yield from _names_twice(values.get("random", ()))
         covariance: Covariance | None = values.get("covariance")
@@ -169,7 +172,7 @@ class MotionError(NamedTuple):
             yield from misplaced_axes(covariance, values["frame"])
 
     def stated(self, kind: str) -> Vector | None:
-        """Stated error of a `kind` along the axes of the frame, or the sigmas of the covariance; None if not stated.
+        """Error of a `kind` along the axes of the frame, or the sigmas of the covariance; None if neither is stated.
 
         `kind` is "position" [m], "velocity" [m/s] or "acceleration" [m/s²].
         """
@@ -179,16 +182,19 @@ class MotionError(NamedTuple):
         return error
 
     def evidence(self, figure: str) -> str | None:
-        """Source of a figure: its part of the catalogue, or else the source that the file states for all figures."""
+        """Source of a figure; None if no source is stated.
+
+        This is the source of its part, or else the source that the file states for all figures of the section.
+        """
         return dict(self.of_parts).get(figure, self.source)
 
     def key_of(self, figure: str) -> str:
-        """Key under which the file states a figure, or names the part that has the figure."""
+        """Key under which the file states a figure; `sensor` if the figure does not come from the file itself."""
         return "sensor" if figure in dict(self.of_parts) else figure
 
 
 def _names_twice(random: Sequence[GaussMarkov]) -> Iterator[Problem]:
-    """Yield a problem for each error that has the name of an earlier error."""
+    """Yield a problem for each random position error that has the name of an earlier one."""
     seen: set[str] = set()
     for index, error in enumerate(random):
         if error.name in seen:
@@ -199,8 +205,9 @@ def _names_twice(random: Sequence[GaussMarkov]) -> Iterator[Problem]:
 class CommonMotionError(NamedTuple):
     """The same error on both platforms, such as the bias of one GNSS service. A scalar means each axis.
 
-    Along the scene's axes both platforms are displaced by one vector. In another frame each platform is displaced by
-    the same components along its own axes: both too far along their tracks, or too far from the scene.
+    In the frame `scene` both platforms are displaced by one vector. In another frame each platform is displaced by
+    the same components along its own axes: for example, both are too far along their tracks, or too far from the
+    scene.
     """
 
     frame: Annotated[
@@ -231,16 +238,16 @@ class CommonMotionError(NamedTuple):
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file states an error.
+        """Whether the file states a common error.
 
-        A zero counts as a stated error. Axes or a source without an error do not.
+        An error of zero counts as stated. Axes or a source without an error do not count.
         """
         figures = (self.position, self.velocity, self.acceleration, self.time_tag)
         return bool(self.random) or any(figure is not None for figure in figures)
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Check that names of errors are distinct."""
+        """Require distinct names of the errors in `random`."""
         yield from _names_twice(values.get("random", ()))
 
 
@@ -256,14 +263,14 @@ class _Lines(Reader[tuple[str, ...]]):
     accepted = "[line 1, line 2]"
 
     def read(self, value: object, path: KeyPath, report: Report) -> tuple[str, ...] | Invalid:
-        """Read both lines."""
+        """Read the two lines of an element set; their content is not checked here."""
         if not isinstance(value, list) or len(value) != 2 or not all(isinstance(line, str) for line in value):
             report(path, Problem("must be the name of a file, or the two lines of an element set"))
             return INVALID
         return tuple(value)
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: array of two lines."""
+        """JSON Schema: an array of the two lines as text."""
         return {"type": "array", "items": Reference().schema(definitions), "minItems": 2, "maxItems": 2}
 
 
@@ -295,12 +302,12 @@ class OrbitSource(NamedTuple):
 
     @staticmethod
     def any_of() -> tuple[str, ...]:
-        """Keys of the formats of orbits."""
+        """Keys of the orbit formats, of which one is required."""
         return tuple(key for key in OrbitSource._fields if key not in ("object", "planned"))
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require exactly one format."""
+        """Require exactly one orbit format."""
         formats = OrbitSource.any_of()
         stated = [key for key in formats if values.get(key) is not None]
         if len(stated) != 1 and values.keys() >= set(formats):
@@ -315,7 +322,7 @@ class _Instant(Reader[Instant]):
     accepted = "2026-06-01T05:20:31.250Z and the like"
 
     def leaf(self, value: object) -> Instant:
-        """Read an instant like 2026-06-01T05:20:31.250Z, or with an offset from UTC."""
+        """Read an instant of UTC, such as 2026-06-01T05:20:31.250Z, or an instant with an offset from UTC."""
         instant = parse_instant(value) if isinstance(value, str) else None
         if instant is None:
             is_zoneless = isinstance(value, str) and parse_instant(value, needs_zone=False) is not None
@@ -325,7 +332,7 @@ class _Instant(Reader[Instant]):
         return instant
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: date and time."""
+        """JSON Schema: a date and time as text, or as the date type that YAML readers return."""
         return date_schema(r"^\s*\d{4}-\d\d-\d\d[T ]")
 
 
@@ -335,13 +342,13 @@ class _Talker(Text):
     is_word = True
 
     def leaf(self, value: object) -> str:
-        """Return the text; refuse a text that is no talker."""
+        """Return the talker, which is two capital letters such as GP; refuse any other text."""
         if not isinstance(value, str) or not re.fullmatch(_TALKER, value, re.ASCII):
             raise InvalidValueError("must be two capital letters", "accepted: GN, GP and the like")
         return value
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: two capital letters."""
+        """JSON Schema: a text of two capital letters."""
         return {"type": "string", "pattern": f"^{_TALKER}$"}
 
 
@@ -408,7 +415,7 @@ ORBIT, TRAJECTORY, INSTANT = Section(OrbitSource), Section(TrajectorySource), _I
 class Way:
     """A way to state the path of a platform: required keys, optional keys, and the key of the direction of motion.
 
-    A fixed platform has no direction.
+    A fixed platform does not need the key of the direction, because it has no direction.
     """
 
     keys: tuple[str, ...]
@@ -417,7 +424,7 @@ class Way:
 
     @property
     def own(self) -> tuple[str, ...]:
-        """Required keys that no other way of stating a path has."""
+        """Required keys of this way that no other way of stating a path has."""
         return tuple(key for key in self.keys if key != "speed")
 
 
@@ -451,7 +458,7 @@ class LogNoise(NamedTuple):
     correlation_time : float
         Correlation time of a Gauss-Markov process with the correlation of the residuals. [s]
     grid : Matrix
-        One step of each coordinate that the log writes. [m]
+        For each coordinate of the log, the vector of one step of its decimal grid; zero without such a grid. [m]
     processed : str, optional
         Value of `trajectory.processed`; None if the file does not state it.
     """
@@ -470,19 +477,19 @@ class FlownPath(NamedTuple):
     state : PlatformState
         The path in the frame of the scene.
     source : str
-        Words for the source of the path; empty if the mission file states the path itself.
+        Text for reports that names the source of the path; empty if the mission file states the path itself.
     file, sha256 : str, optional
-        File that the path was read from, and its SHA-256.
+        File from which the path was read, and its SHA-256.
     age : float, optional
-        Age of orbital elements. [s]
+        Age of the orbital elements at mid-aperture. [s]
     order, pieces : int, optional
         Order of the fitted polynomial, and number of its pieces.
     farthest, rms : float, optional
         Largest and root-mean-square residual of the fit. [m]
     samples, stretch : int, float, optional
-        Number of fixes of a log, and the time that they cover. [s]
+        Number of the fitted fixes of a log, and the time that they cover. [s]
     doubts : tuple of str
-        Warnings for reports.
+        Warnings about the path, for reports.
     doubt_m, doubt_of : float, str
         Uncertainty of the path, which is the distance of the true path from it [m], and its cause: the age of
         elements, the interpolation of an ephemeris, or the residual of a smoothed log.
@@ -497,11 +504,11 @@ class FlownPath(NamedTuple):
     stated : tuple of StatedAccuracy
         Accuracy that the source of the path states, along the scene's axes.
     log_noise : LogNoise, optional
-        Noise of a log.
+        Noise of the log from which the path comes.
     acceleration_noise : Matrix, optional
-        Covariance of the acceleration error of a fit. [m²/s⁴]
+        Covariance of the error of the fitted acceleration. [m²/s⁴]
     path_noise : PathNoise, optional
-        Noise of a smoothed path.
+        Noise that remains in a smoothed path.
     """
 
     state: PlatformState
@@ -529,7 +536,7 @@ class FlownPath(NamedTuple):
 
     @property
     def is_raw(self) -> bool:
-        """Whether the path comes from a log whose fixes the processor uses without smoothing."""
+        """Whether the path comes from a flight log whose fixes the processor uses without smoothing."""
         return self.log_noise is not None and self.log_noise.processed == RAW
 
     @property
@@ -539,7 +546,7 @@ class FlownPath(NamedTuple):
 
     @property
     def beside(self) -> Mapping[str, tuple[str, str] | None]:
-        """Names and SHA-256 of the accuracy file and the Earth orientation table; None for an unused file."""
+        """Map "accuracy" and "earth_orientation" to the name and SHA-256 of that file; None for an unused file."""
         return {"accuracy": self.accuracy, "earth_orientation": self.orientation}
 
 
@@ -573,7 +580,10 @@ class Platform(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require one complete way to state the path, above the ground and away from the scene centre."""
+        """Require one complete way to state the path, above the ground and at least 1 m from the scene centre.
+
+        The distance is checked later if the path depends on a file or on the Earth.
+        """
         wrong = [key for key in _PATH_KEYS if key not in values]  # stated with an invalid value
         given = [key for key in _PATH_KEYS if key in wrong or values[key] is not None]
         unclear = _unclear_geometry(given, is_fixed=values.get("speed") == 0, may_be_fixed="speed" in wrong)
@@ -588,7 +598,7 @@ class Platform(NamedTuple):
                 yield from platform.without_image(values.get("motion_error"))
 
     def without_image(self, error: MotionError | None) -> Iterator[Problem]:
-        """Yield a problem for a platform within 1 m of the scene centre, or for an error whose frame is undefined."""
+        """Yield a problem for a platform within 1 m of the scene centre, or for an `error` in undefined axes."""
         state = self.state
         if state.slant_range < 1:
             at_key: KeyPath = ("slant_range",) if self.slant_range is not None else (self.way,)
@@ -601,20 +611,23 @@ class Platform(NamedTuple):
 
     @property
     def way(self) -> str:
-        """Key that identifies how the file states the path, such as `orbit` or `slant_range`."""
+        """First key of the way in which the file states the path, such as `orbit` or `slant_range`."""
         firsts = [way.keys[0] for way in WAYS]
         return next((key for key in firsts if getattr(self, key) is not None), firsts[-1])
 
     @property
     def is_of_the_earth(self) -> bool:
-        """Whether the path follows from a file, or from the position of the scene on the Earth."""
+        """Whether the path comes from an orbit, a flight log or a geodetic position.
+
+        Such a path depends on a file or on the position of the scene on the Earth.
+        """
         return self.way in ("orbit", "trajectory", "latitude")
 
     @property
     def state(self) -> PlatformState:
-        """The path in the frame of the scene. If it `is_of_the_earth`, it is known only once `path` is set.
+        """Path of the platform in the frame of the scene.
 
-        Numbers may be arrays (cases,).
+        If the platform `is_of_the_earth`, the path is known only once `path` is set. Numbers may be arrays (cases,).
         """
         if self.path is not None:
             return self.path.state
@@ -643,7 +656,10 @@ class Platform(NamedTuple):
 
 
 def _with_fall(state: PlatformState) -> PlatformState:
-    """Add free-fall dynamics of state errors to a path in free fall, for a scene without a place on the Earth."""
+    """Add to a path in free fall how errors of its state grow, for a scene without a position on the Earth.
+
+    Any other path is returned unchanged.
+    """
     if not np.any(np.asarray(state.position[2]) > LEAST_FALLING_HEIGHT_M):
         return state
     from bisar_budget.paths.free_fall import fall_of  # takes 8 ms; most missions have no satellite
@@ -652,7 +668,10 @@ def _with_fall(state: PlatformState) -> PlatformState:
 
 
 def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: bool) -> Problem | None:
-    """Problem if the given keys are not exactly one complete way to state a path; otherwise None."""
+    """Problem if the path keys that a file gives are not exactly one complete way to state a path; otherwise None.
+
+    `is_fixed` tells whether the speed is 0, and `may_be_fixed` whether the speed is stated with an invalid value.
+    """
     ways = [way for way in WAYS if any(key in way.own for key in given)] or WAYS[-1:]
     known_keys = (*ways[0].keys, *ways[0].optional)
     foreign = [key for key in given if key not in known_keys]
@@ -669,7 +688,10 @@ def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: boo
 
 
 def _bends(jerk: Vector | None, snap: Vector | None) -> tuple[Vector, ...]:
-    """Coefficients of τ³ [m/s³] and τ⁴ [m/s⁴] of a path, from its jerk and snap; empty without both."""
+    """Coefficients of τ³ [m/s³] and τ⁴ [m/s⁴] of a path from its jerk [m/s³] and snap [m/s⁴]: jerk/6 and snap/24.
+
+    A single missing value counts as zero. The result is empty if both are missing.
+    """
     if jerk is None and snap is None:
         return ()
     (a, b, c), (x, y, z) = jerk or STRAIGHT, snap or STRAIGHT
@@ -684,7 +706,7 @@ class Platforms(NamedTuple):
 
     @property
     def geometry(self) -> BistaticGeometry:
-        """Both platforms in the frame of the scene."""
+        """Paths of transmitter and receiver in the frame of the scene."""
         return BistaticGeometry(transmitter=self.transmitter.state, receiver=self.receiver.state)
 
 
@@ -696,9 +718,10 @@ def without_image(
     *,
     has_direct_path: bool,
 ) -> Iterator[Problem]:
-    """Yield problems of paths that form no image, and of errors whose axes are undefined.
+    """Yield problems of paths that form no image, and of motion errors and lever arms whose axes are undefined.
 
-    `aperture_time_s` is None if the aperture time is invalid.
+    `common` is the common motion error. `aperture_time_s` is None if the aperture time is invalid; problems that
+    depend on it are then not found.
     """
     geometry = platforms.geometry
     yield from _no_image(geometry, radar, aperture_time_s)
@@ -720,7 +743,7 @@ def _no_image(geometry: BistaticGeometry, radar: "Radar | None", aperture_time_s
 
 
 def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
-    """Yield a problem for each platform on which the frame of the common motion error is undefined."""
+    """Yield a problem for each platform on which the axes of the common motion error are undefined."""
     for name, platform in platforms._asdict().items():
         if frame == "ric" and platform.path is None:  # its radial direction follows with the path
             continue
@@ -731,10 +754,10 @@ def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
 
 
 def has_body_axes(state: PlatformState, half: PerCase, margin: float = 1.0) -> Booleans:
-    """Whether a velocity keeps a horizontal direction over apertures of half-length `half` (cases,) [s].
+    """Whether a platform keeps a horizontal direction of motion over apertures of half-length `half` (cases,) [s].
 
-    It does not if it becomes vertical, stops or turns back. True for a fixed platform, whose direction does not
-    matter.
+    It does not if its velocity becomes vertical, stops or turns back. The result is true for a fixed platform, whose
+    direction does not matter. `margin` multiplies the smallest horizontal speed that is required.
     """
     times = half * _FINE_APERTURE_TIMES
     u, v, w = (np.broadcast_to(component, times.shape) for component in state.at(times)[1])
@@ -747,7 +770,10 @@ def has_body_axes(state: PlatformState, half: PerCase, margin: float = 1.0) -> B
 
 
 def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
-    """Yield a problem for each lever arm on a platform whose velocity does not keep a horizontal direction."""
+    """Yield a problem for each lever arm on a platform that does not keep a horizontal direction over the aperture.
+
+    `half` is half the aperture time. [s]
+    """
     for name, platform in platforms._asdict().items():
         if platform.motion_error.lever_arm is None or platform.state.is_still:
             continue
@@ -760,7 +786,7 @@ def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
 
 
 def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: float) -> Iterator[Problem]:
-    """Yield a problem for each platform that goes below the ground during the aperture."""
+    """Yield a problem for each platform that goes below the ground, z < 0, during the aperture."""
     for (name, platform), state in zip(platforms._asdict().items(), geometry.both, strict=True):
         lowest = min(state.place(tau)[2] for tau in _turning_points(state, aperture_time / 2))
         if lowest < 0 <= state.position[2]:
@@ -784,7 +810,10 @@ def least_baseline(apart: PlatformState, half: PerCase) -> Floats:
 
 
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
-    """Yield a problem if the platforms come too close to each other for a direct path."""
+    """Yield a problem if the platforms come too close to each other within the aperture for a direct path.
+
+    `apart` is the path of one platform relative to the other, and `half` is half the aperture time. [s]
+    """
     least, travelled = float(least_baseline(apart, half)[0]), apart.travelled(half)
     if least < max(MIN_BASELINE_M, travelled / MAX_TRAVEL_RATIO):
         yield Problem(
@@ -796,7 +825,7 @@ def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
 
 
 def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
-    """Yield slow times in the aperture at which the height of a platform can be smallest. [s]
+    """Yield the slow times in the aperture at which the height of a platform may be smallest. [s]
 
     For a quadratic path, these are the ends of the aperture, and the time at which the platform stops sinking. For
     any other path, they are times over the whole aperture, in steps of 1/64 of it. `half` is half the aperture time.

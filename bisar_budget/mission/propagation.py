@@ -1,4 +1,8 @@
-"""Propagation delays that remain after correction, on the leg of each platform. Values are SI, 1 sigma."""
+"""Section of a mission file with the propagation delays that remain after correction.
+
+A leg is the way of the signal between one platform and the scene. Delays are at the zenith; a leg at a low elevation
+has a longer delay. Values are in SI units, 1 sigma.
+"""
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, NamedTuple
@@ -39,7 +43,7 @@ class LegDelay(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Refuse a leg without a delay."""
+        """Refuse a leg that states no delay."""
         if not values.keys() >= {*DELAYS, _CORRELATION_TIME_KEY} or any(
             values[delay] is not None for delay in DELAYS
         ):
@@ -81,7 +85,7 @@ class Propagation(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Refuse common delays beside separate delays, no delay at all, and a correlation time without a delay."""
+        """Refuse delays of both legs beside delays of one leg, missing delays, and an unused correlation time."""
         if not values.keys() >= {*DELAYS, _CORRELATION_TIME_KEY, *Platforms._fields}:
             return
         of_both = [delay for delay in DELAYS if values[delay] is not None]
@@ -110,21 +114,24 @@ class Propagation(NamedTuple):
 
     @property
     def is_one_air(self) -> bool:
-        """Whether the delays are stated once for both legs, which then share the same air."""
+        """Whether the file states the delays once for both legs, whose signals then cross the same air."""
         return self.transmitter is None and self.receiver is None
 
     def content(self, platform: str) -> float | None:
-        """Zenith electron content for the leg of a platform; None if the file states none. [1/m²]"""
+        """Zenith electron content on the leg of a platform; None if the file states none for this leg. [1/m²]"""
         leg = self.leg(platform)
         return None if leg is None else leg.zenith_electron_content
 
     def source_of(self, platform: str) -> str | None:
-        """Source that the file cites for the delays on the leg of a platform; None if it cites none."""
+        """Source that the file states for the delays on the leg of a platform; None if it states none."""
         leg = self.leg(platform)
         return None if leg is None else leg.source
 
     def leg(self, platform: str) -> LegDelay | None:
-        """Delays on the leg of a platform; None if the file states only the leg of the other platform."""
+        """Delays on the leg of a platform, with the correlation time and source that apply to it.
+
+        None if the file states delays only for the leg of the other platform.
+        """
         if self.is_one_air:
             return LegDelay(self.zenith_delay, self.zenith_electron_content, self.correlation_time, self.source)
         platform_leg: LegDelay | None = getattr(self, platform)
@@ -134,7 +141,7 @@ class Propagation(NamedTuple):
         return platform_leg._replace(correlation_time=time, source=platform_leg.source or self.source)
 
     def path(self, platform: str, delay: str) -> KeyPath:
-        """Path of keys in the file to a delay of a leg."""
+        """Path of the key that states a `delay`, such as `zenith_delay`, for the leg of a platform."""
         return ("propagation", *(() if self.is_one_air else (platform,)), delay)
 
 
@@ -165,7 +172,11 @@ def least_elevation_deg(path: PlatformState, aperture_time_s: PerCase) -> Floats
 def least_elevations(
     propagation: Propagation, paths: Mapping[str, PlatformState], aperture_time_s: PerCase
 ) -> Iterator[tuple[str, str, Floats]]:
-    """Yield platform, figure and smallest elevation during the aperture [deg] for each stated delay of a leg."""
+    """Yield the smallest elevation during the aperture [deg] for each stated delay of each leg.
+
+    Each item is the platform, the key of the delay, and the elevation. A leg below the ionosphere has 90° for the
+    electron content.
+    """
     for name, path in paths.items():
         leg = propagation.leg(name)
         if leg is None:
@@ -179,7 +190,7 @@ def least_elevations(
 
 
 def too_low(propagation: Propagation, platforms: Platforms, aperture_time_s: float) -> Iterator[Problem]:
-    """Yield a problem for each delay on a leg whose elevation falls below `LEAST_ELEVATION_DEG`."""
+    """Yield a problem for each delay on a leg whose elevation falls below `LEAST_ELEVATION_DEG` in the aperture."""
     paths = dict(zip(Platforms._fields, platforms.geometry.both, strict=True))
     for name, delay, least in least_elevations(propagation, paths, aperture_time_s):
         (degrees,) = least.tolist()

@@ -1,7 +1,6 @@
-"""Access to the numbers of a mission by key: to read a number with its unit from the file, or to replace it.
+"""Access to the numbers of a mission by their keys: a number with its unit is read from the file, or is replaced.
 
-Values may have the forms that a file accepts, which are texts, or be numbers in SI units. Quantities of astropy and
-pint are accepted too.
+A new value may be a text as in a mission file, a number in SI units, or a quantity of astropy or pint.
 """
 
 import functools
@@ -69,12 +68,12 @@ class TableError(QuestionError):
 
     @classmethod
     def of_faults(cls, file: str, faults: Sequence[Fault]) -> "TableError":
-        """An error for faults at positions in a file."""
+        """Make an error from faults that have a line and a column in the file."""
         return cls([f"{printable(file)}:{fault.line}:{fault.column}: {fault}" for fault in faults])
 
     @classmethod
     def of_file(cls, file: str, problem: str) -> "TableError":
-        """An error for a problem of the file as a whole."""
+        """Make an error from a problem of the file as a whole."""
         return cls([f"Error: {printable(file)}: {printable(problem)}"])
 
 
@@ -88,7 +87,7 @@ class Number(NamedTuple):
 
     @property
     def dimension(self) -> Dimension:
-        """Kind of quantity."""
+        """Kind of quantity of the number, such as a length, with its units."""
         return self.reader.dimension
 
     @property
@@ -98,11 +97,11 @@ class Number(NamedTuple):
 
     @property
     def scale(self) -> tuple[float, float]:
-        """Factor and divisor that convert a value in the number's unit to SI."""
+        """Factor and divisor that convert a value from the number's unit to SI: value · factor / divisor."""
         return self.dimension.scales.get(self.unit) or (1.0, 1.0)
 
     def text(self, value: float, *, is_up: bool | None = None) -> str:
-        """Text of a value with `ANSWER_DIGITS` digits in the number's unit; `value` is in SI units.
+        """Write a value, which is in SI units, in the number's unit with `ANSWER_DIGITS` significant digits.
 
         The value is rounded up if `is_up` is true, down if it is false, and to the nearest if it is None.
         """
@@ -114,18 +113,18 @@ class Number(NamedTuple):
         return f"{number:.{ANSWER_DIGITS}g}{' ' if self.unit else ''}{self.unit}"
 
     def said_like(self, between: str | None) -> "Number":
-        """The number with the unit of the end `B` of a range `A..B`.
+        """Copy of the number with the unit in which the end `B` of a range `A..B` is written.
 
-        It is unchanged if the file has a value, or if `B` has no unit of the number.
+        The number is unchanged if the file has a value, or if the unit of `B` does not fit its kind of quantity.
         """
         unit = units.unit_behind((between or "").rpartition("..")[2])
         unit = unit if unit in self.dimension.scales else units.normal_unit(unit)
         return self._replace(unit=unit) if self.value is None and unit in self.dimension.scales and unit else self
 
     def read(self, text: str) -> float:
-        """Read a text that `text` wrote, and return its value in SI.
+        """Convert a text that the method `text` has written back to a value in SI.
 
-        Within rounding, the value is the same as that of the file's reader.
+        Within rounding, the value is the same as that of the reader of the file.
         """
         return parse_quantity(text, self.dimension)
 
@@ -147,7 +146,7 @@ Varied = Number | Choices
 
 
 def tree_of(mission: Mission) -> JsonObject:
-    """Content of a mission's file after its options are applied: texts, lists and mappings."""
+    """Content of a mission's file with the values of its `--set` options: texts, lists and mappings."""
     tree = read_tree(mission.data or b"", mission.file)
     apply_changes(tree, mission.changes)
     root: JsonObject = tree.root
@@ -155,7 +154,7 @@ def tree_of(mission: Mission) -> JsonObject:
 
 
 def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool = False) -> Number:
-    """Find the number that a key names; a single value for all three axes counts as a number.
+    """Find the number that a key names, with its unit; a single value for all three axes counts as a number.
 
     Parameters
     ----------
@@ -164,9 +163,9 @@ def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool
     key : str
         Path of the key.
     of_all : str
-        Words for other accepted keys, which are added to the message about a key with three numbers.
+        Text about other accepted keys, which is added to the message about a key with three numbers.
     is_for_each : bool
-        Whether the number is meant for each axis. The value is then the largest of the three in the file.
+        Whether the number is meant for each axis. If the file has three values, the largest absolute value is used.
 
     Raises
     ------
@@ -195,9 +194,9 @@ def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool
 def choices_of(tree: JsonObject, key: str, text: str) -> Choices | None:
     """Description of a key that accepts words, with its present value; None for a key that accepts no word.
 
-    `text` is the new value, which decides between the forms of a key: shares of a budget may also be a rule, which
-    is a word, and parts may be a list. Raises `QuestionError` if the key does not exist, or if the file has a list
-    and `text` is a single word.
+    `text` is the new value. It decides between the forms of a key: the split of a budget may be a rule, which is a
+    word, or shares, and the parts may be one name or a list. Raises `QuestionError` if the key does not exist, or if
+    the file has a list and `text` is a single word.
     """
     reader, value = _reader_and_value(tree, key)
     reader = form_of(reader, [] if text.startswith("[") else text)
@@ -213,7 +212,7 @@ def choices_of(tree: JsonObject, key: str, text: str) -> Choices | None:
 
 
 def as_number(key: str, reader: Quantity, value: object) -> Number:
-    """Make the `Number` of a key from its value in the file, with the unit of the file or else the usual unit.
+    """Make the `Number` of a key from its value in the file; its unit is that of the value, or else the usual unit.
 
     `value` is None if the file has no value.
     """
@@ -227,9 +226,9 @@ def as_number(key: str, reader: Quantity, value: object) -> Number:
 
 
 def _reader_and_value(tree: JsonObject, key: str) -> tuple[Reader[object], Content]:
-    """Reader of a key, which may have several forms, and the value in the file or None.
+    """Reader of the value of a key, and this value in the file, or None if the file has none.
 
-    Raises `QuestionError` if the key does not exist.
+    The reader may still have several forms (`form_of`). Raises `QuestionError` if the key does not exist.
     """
     reader: Reader[object] = MISSION
     value: Content = tree
@@ -258,7 +257,7 @@ def _reader_and_value(tree: JsonObject, key: str) -> tuple[Reader[object], Conte
 
 
 def form_of(reader: Reader[object], value: object) -> Reader[object]:
-    """The form of a reader that reads a given value."""
+    """Reader of the form in which a value is written; `reader` itself if it accepts only one form."""
     while isinstance(reader, OneOf):
         reader = reader.pick(value)
     return reader
@@ -273,7 +272,7 @@ class Range(NamedTuple):
     is_circle: bool = False
 
     def places(self, count: int) -> list[float]:
-        """`count` values in the range, including both ends."""
+        """`count` values from end to end of the range, in equal steps or, if `is_log`, in equal ratios."""
         fractions = [index / (count - 1) for index in range(1, count - 1)]
         if self.is_log:
             between = [self.low * (self.high / self.low) ** fraction for fraction in fractions]
@@ -283,10 +282,11 @@ class Range(NamedTuple):
 
 
 def range_of(number: Number, between: str | None) -> Range:
-    """Read a range `A..B`.
+    """Range in which the value of a number is searched, from a text `A..B`.
 
-    If `between` is None, the range extends by one decade, or by 20 dB for a level, to each side of the value in the
-    file. For a direction, it is then the full circle, and for an elevation or a latitude, all accepted values.
+    If `between` is None, the range depends on the number. It extends by one decade, or by 20 dB for a level, to each
+    side of the value in the file. For a direction, it is the full circle. For an elevation or a latitude, it has all
+    accepted values.
 
     Raises
     ------
@@ -351,13 +351,13 @@ _CURVE_ABSCISSAS: Mapping[str, Dimension] = {
 
 
 def with_number(mission: Mission, key: str, number: SectionValue) -> Mission:
-    """Set the value of a key in a mission to a number, or to an array (cases,)."""
+    """Return a mission in which the value of a key is set to a number, or to an array (cases,)."""
     changed_mission: Mission = _with_value(mission, parts_of(key), number)
     return changed_mission
 
 
 def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue) -> SectionValue:
-    """Set the number at a path below a value; a triple gets the number on all three axes."""
+    """Return a section or value with a new number at the path `steps`; a triple gets it on all three axes."""
     if not steps:
         return (number, number, number) if isinstance(value, tuple) else number
     if isinstance(value, Covariance):
@@ -380,7 +380,10 @@ def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue)
 
 
 def _with_point(curve: SectionValue, name: str, point: str, number: SectionValue) -> SectionValue:
-    """Set the ordinate of a curve at the point that a text names."""
+    """Return a curve with a new ordinate at one of its points.
+
+    `name` is the key of the curve, and `point` is the abscissa of the point as text, such as "10 Hz".
+    """
     if isinstance(curve, Spectrum):
         return curve._replace(points=_with_point(curve.points, name, point, number))
     here = parse_quantity(point, _CURVE_ABSCISSAS[name])
@@ -388,9 +391,9 @@ def _with_point(curve: SectionValue, name: str, point: str, number: SectionValue
 
 
 def _with_element(covariance: Covariance, steps: Sequence[str], number: SectionValue) -> Covariance:
-    """Set sigmas or a correlation of a covariance.
+    """Return a covariance with new sigmas or a new correlation.
 
-    `steps` name one axis, a kind of error with all its axes, or a pair of correlated errors.
+    `steps` name one axis, or "position" or "velocity" with all its axes, or a pair of correlated errors.
     """
     kind, *remaining = steps
     if kind in MOTION_KINDS:
@@ -407,15 +410,15 @@ def _with_element(covariance: Covariance, steps: Sequence[str], number: SectionV
 
 
 def value_at(mission: Mission, key: str) -> SectionValue:
-    """Value of a key in a mission, in SI: a number, a tuple of three numbers, or None.
+    """Value of a key in a mission, in SI: a number, a tuple of three numbers, or None if the mission has none.
 
-    For a covariance the value is the sigma. For a figure that comes from a part it is the part's figure.
+    For a covariance the value is the sigma. A figure that comes from a part has the value of the part.
     """
     return _value_below(mission, parts_of(key))
 
 
 def _value_below(value: SectionValue, steps: Sequence[str]) -> SectionValue:
-    """Value at a path below another value; None if there is none."""
+    """Value at the path `steps` inside a section or value; None if there is none."""
     if not steps or value is None:
         return value
     if isinstance(value, Covariance):
@@ -433,14 +436,20 @@ def _value_below(value: SectionValue, steps: Sequence[str]) -> SectionValue:
 
 
 def _point(curve: SectionValue, name: str, point: str) -> PerCase | None:
-    """Ordinate of a curve at the point that a text names; None if the curve has no such point."""
+    """Ordinate of a curve at one of its points; None if the curve has no such point.
+
+    `name` is the key of the curve, and `point` is the abscissa of the point as text, such as "10 Hz".
+    """
     points = curve.points if isinstance(curve, Spectrum) else curve or ()
     here = parse_quantity(point, _CURVE_ABSCISSAS[name])
     return next((ordinate for at, ordinate in points if at == here), None)
 
 
 def _element(covariance: Covariance, steps: Sequence[str]) -> float | Vector | None:
-    """Sigma of one axis, or of all three axes, in a covariance; None for a correlation, which is no size."""
+    """Sigma of a covariance on one axis, or its sigmas on all three axes of a kind of error.
+
+    None for a correlation, because it is not the size of an error.
+    """
     kind, *axis = steps
     if kind not in MOTION_KINDS:
         return None
@@ -449,7 +458,10 @@ def _element(covariance: Covariance, steps: Sequence[str]) -> float | Vector | N
 
 # ---------------------------------------------------------------- specified sizes of errors
 def with_specifications(mission: Mission, tree: Tree) -> Mission:
-    """Convert the `specifications` of a mission to numbers of their keys; problems become faults of the tree."""
+    """Return a mission whose `specifications` are numbers of the keys that they limit.
+
+    Invalid specifications become faults of the tree.
+    """
     read = {}
     for key, text in mission.specifications.items():
         path = ("specifications", key)
@@ -472,11 +484,10 @@ def with_specifications(mission: Mission, tree: Tree) -> Mission:
 
 
 def largest_at(mission: Mission, number: Number) -> PerCase | None:
-    """Size that a mission states for an error; None if it states none.
+    """Size that a mission states for an error at the key of a number, in SI; None if it states none.
 
-    For a triple, the size is the largest absolute value of the three axes.
-
-    If a spectrum has no stated level, its level is 0 dB.
+    For a triple, the size is the largest absolute value of the three axes. A stated spectrum has the level 0 dB if
+    the file states no level.
     """
     value: Vector | PerCase | None = value_at(mission, number.key)
     if value is None and parts_of(number.key)[-1] in ("level", "spectrum_level"):
@@ -495,7 +506,7 @@ def largest_at(mission: Mission, number: Number) -> PerCase | None:
 
 # ---------------------------------------------------------------- values that a caller gives
 def changed(mission: Mission, values: Mapping[str, object]) -> Mission:
-    """Change or add values of a mission, as `--set` does.
+    """Return a mission with some values changed or added, as `--set` does.
 
     Parameters
     ----------
@@ -517,7 +528,7 @@ def changed(mission: Mission, values: Mapping[str, object]) -> Mission:
 
 
 def _si_of(tree: JsonObject, key: str) -> str:
-    """SI unit of the numbers of a key; empty if the key has no number with a unit."""
+    """SI unit of the number, or of the three numbers, that a key has; empty if the key has no number with a unit."""
     for number_key in (key, f"{key}.0"):
         try:
             return number_of(tree, number_key).dimension.si
@@ -527,7 +538,10 @@ def _si_of(tree: JsonObject, key: str) -> str:
 
 
 def text_of(si: str, value: object) -> str:
-    """Text for a mission file from a text, number, quantity, list of them, or None; numbers are in the SI unit.
+    """Text for a mission file from a text, number, truth value, quantity, list of these, or None.
+
+    Numbers are in the SI unit `si`; if it is empty, they are written without a unit. None becomes `null`, which
+    removes a key.
 
     Raises
     ------
@@ -559,13 +573,13 @@ def is_quantity(value: object) -> TypeGuard[Measured]:
 
 
 def magnitude(value: Measured, unit: str) -> Measured:
-    """Number or array of a quantity, converted to a unit."""
+    """Convert a quantity of astropy or pint to a unit, and return its number or array."""
     if hasattr(value, "to_value"):
         return value.to_value(unit)
     return value.to(unit.replace("^", "**") or "dimensionless").magnitude
 
 
 def _unit_of(value: Measured) -> str:
-    """Unit of a quantity in the spelling of a mission file."""
+    """Unit of a quantity of astropy or pint, spelt as in a mission file, such as `m/s^2`."""
     unit = str(value.unit) if hasattr(value, "to_value") else f"{value.units:~}"
     return unit.replace("**", "^").replace(" ", "")

@@ -1,8 +1,8 @@
 """Readers of values in a mission file: one reader per kind of value, which also writes the JSON Schema of the kind.
 
 A section of the file is a `NamedTuple` whose keys are annotated with `Key(reader, description)`; see `model`. A
-reader takes the content of the file, which is a text, list or mapping, or for a case of a sweep a number in SI. It
-reports problems through `report`, and returns `INVALID` after a report.
+reader takes a value of the file, which is a text, list or mapping, or for a case of a sweep a number in SI. It
+passes each problem to the function `report`, and then returns `INVALID`.
 
 A validation library would do the same, but its import takes five times as long. The import time matters because users
 run `check` in every commit of a repository.
@@ -61,7 +61,10 @@ _NOT_SINGLE = {"type": ["array", "object", "null"]}  # JSON Schema: lists, mappi
 
 
 def date_schema(pattern: str) -> JsonObject:
-    """JSON Schema of a date or an instant: a text, or a date type that YAML readers return and JSON does not have."""
+    """JSON Schema of a date or an instant.
+
+    Accepted are a text that fits `pattern`, and a date type, which YAML readers return and JSON does not have.
+    """
     return {"not": {"type": ["array", "object", "null", "boolean", "number"]}, "pattern": pattern}
 
 
@@ -71,7 +74,7 @@ class Reader(Generic[T_co]):
     is_word = False
 
     def read(self, value: object, path: KeyPath, report: Report) -> T_co | Invalid:
-        """Return the value, or `INVALID` after a report of the problem that `leaf` raises."""
+        """Return the read value; if `leaf` raises an error, report its problem at `path` and return `INVALID`."""
         try:
             return self.leaf(value)
         except InvalidValueError as error:
@@ -79,15 +82,15 @@ class Reader(Generic[T_co]):
             return INVALID
 
     def leaf(self, value: object) -> T_co:
-        """Return the value; raises `InvalidValueError` for an invalid value."""
+        """Return the read value; raises `InvalidValueError` for an invalid value."""
         raise NotImplementedError
 
     def below(self, step: str) -> "Reader[object] | None":
-        """Reader of the value at a key or an index within this value; None if there is no such key or index."""
+        """Reader of the value at a key or an index inside this value; None if there is no such key or index."""
         return None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema of accepted values; sections add their own schema to `definitions`."""
+        """JSON Schema of the accepted values; sections and quantities add shared schemas to `definitions`."""
         raise NotImplementedError
 
 
@@ -101,7 +104,9 @@ class Key(NamedTuple):
 class Quantity(Reader[float]):
     """A number with a unit, within bounds; read as a float in SI. Decibels stay decibels.
 
-    The outer bounds keep every later square and quotient finite; nothing real comes near them.
+    `dimension` is the kind of quantity with its units. The bounds are in SI: greater than `gt`, at least `ge`, less
+    than `lt`, at most `le`. They keep every later square and quotient finite, and no real value comes near the outer
+    ones.
     """
 
     def __init__(
@@ -117,7 +122,7 @@ class Quantity(Reader[float]):
         self.bounds = (gt, ge, lt, le)
 
     def leaf(self, value: object) -> float:
-        """Read a number from a text, or take a float in SI, and check the bounds."""
+        """Read a number with its unit from a text, or take a float in SI, and check that it is within the bounds."""
         if type(value) is float and math.isfinite(value):
             number = value
         else:
@@ -141,11 +146,11 @@ class Quantity(Reader[float]):
         raise InvalidValueError(f"must be {words} {bound_text}", hint=self._unit_hint(self._text(value)))
 
     def _text(self, value: object) -> object:
-        """Text of a float as a file would write it; other values are unchanged."""
+        """Text of a float in SI as a mission file would write it; any other value is returned unchanged."""
         return f"{value!r} {self.dimension.si}".rstrip() if type(value) is float else value
 
     def _unit_hint(self, value: object) -> str:
-        """Hint that names the unit which may be missing after a bare number."""
+        """Hint that names the unit of a bare number, for a file that forgot it; empty if no unit can be missing."""
         text = str(value).strip()
         if not text or not text[-1].isdigit():
             return ""
@@ -156,7 +161,10 @@ class Quantity(Reader[float]):
         return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: text with a unit, or a bare number within the bounds; an angle without a unit is zero."""
+        """JSON Schema: text with a unit, or a bare number within the bounds.
+
+        If the quantity needs a unit, as an angle does, the only bare number is zero.
+        """
         name = re.sub(r"\W", "", self.dimension.name.partition(" ")[2].title()) + "Quantity"
         if name not in definitions:
             definitions[name] = _quantity_schema(self.dimension)
@@ -169,7 +177,7 @@ class Quantity(Reader[float]):
         return {"allOf": [accepted], **bounds} if bounds else accepted
 
     def _sides_of_zero(self) -> JsonObject:
-        """JSON Schema for the sign of a number in any unit, if the bounds exclude zero or one sign."""
+        """JSON Schema that refuses zero, positive or negative numbers in any unit, if the bounds exclude these."""
         gt, ge, lt, le = self.bounds
         if self.dimension.offsets:  # a unit shifts the zero
             return {}
@@ -189,7 +197,10 @@ _UNIT_ALIASES = ("dps", "mdps", "dph", "micro-g", "milli-g")  # further spelling
 
 
 def _quantity_schema(dimension: Dimension) -> JsonObject:
-    """JSON Schema of a kind of quantity: text that begins with a number, without a unit of another kind after it."""
+    """JSON Schema of a kind of quantity: a number, or text of a number without a unit of another kind.
+
+    If the kind needs a unit, the only bare number is zero.
+    """
     number = r"[+-]?(?!0\d)(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
     all_units = {unit for dimension_of_unit in units.DIMENSIONS for unit in dimension_of_unit.units if unit}.union(
         _UNIT_ALIASES
@@ -211,7 +222,7 @@ class Triple(Reader[tuple[float, ...]]):
         self.or_scalar = or_scalar
 
     def read(self, value: object, path: KeyPath, report: Report) -> tuple[float, ...] | Invalid:
-        """Read each of the three components; a problem with a component is reported at its own path."""
+        """Read the three components; a problem with a component is reported at the path of the component."""
         bracketed = "" if isinstance(value, list) else self._bracketed(value)
         if self.or_scalar and not isinstance(value, list) and not bracketed:
             scalar = self.component.read(value, path, report)
@@ -227,10 +238,11 @@ class Triple(Reader[tuple[float, ...]]):
         return components if are_valid(components) else INVALID
 
     def _bracketed(self, value: object) -> str:
-        """Hint to put brackets around three values; empty if the text is not three values.
+        """Hint to put brackets around three values in a text; empty if the text is not three values.
 
-        Each of the three values needs a unit, or has to be 0. The reason is that `1,234,567 m` may be one number, and
-        `1, 2, 3 km` is not three lengths.
+        The hint has the corrected text if each of the three values has a unit or is 0. Otherwise it only asks for
+        brackets and units, if blanks follow the commas. The reason is that `1,234,567 m` may be one number, and `1,
+        2, 3 km` is not three lengths.
         """
         if not isinstance(value, str):
             return ""
@@ -248,11 +260,11 @@ class Triple(Reader[tuple[float, ...]]):
         return f"Did you mean [{', '.join(text.strip() for text in texts)}]?"
 
     def below(self, step: str) -> Reader[object] | None:
-        """Reader of one component; None if the step is no index."""
+        """Reader of one component; None if `step` is no index."""
         return self.component if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: array of three, or also a single value."""
+        """JSON Schema: an array of three components, or, with `or_scalar`, also a single value."""
         single = self.component.schema(definitions)
         triple = {"type": "array", "items": single, "minItems": 3, "maxItems": 3}
         return {"anyOf": [single, triple]} if self.or_scalar else triple
@@ -262,7 +274,7 @@ class Text(Reader[str]):
     """One line of printable text."""
 
     def leaf(self, value: object) -> str:
-        """Return the text; refuse empty, long and unprintable texts.
+        """Return the text; refuse a text that is empty, too long or not printable.
 
         Control characters could change a terminal or a report.
         """
@@ -277,7 +289,7 @@ class Text(Reader[str]):
         return value
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema of any single value, because YAML readers convert some texts.
+        """JSON Schema that accepts any single value, because YAML readers of other tools convert some texts.
 
         They read 007 as a number, `yes` as true, and 2026-06-01 as a date.
         """
@@ -309,7 +321,7 @@ class Glob(Text):
 class Choice(Reader[str]):
     """One of a few words; `accepted` lists words for messages, by default all.
 
-    `is_more` tells whether a word that is not in the list is accepted too.
+    `is_more` is a function that tells whether a word that is not in the list is accepted too.
     """
 
     is_word = True
@@ -318,14 +330,14 @@ class Choice(Reader[str]):
         self.names, self.accepted, self.is_more = names, accepted or ", ".join(names), is_more
 
     def leaf(self, value: object) -> str:
-        """Return the word; refuse unknown words, with a hint at the nearest known word."""
+        """Return the word; refuse an unknown word, with a hint that names the nearest known word."""
         if isinstance(value, str) and (value in self.names or self.is_more(value)):
             return value
         near = did_you_mean(value, self.names)
         raise InvalidValueError("is not a known choice", f"accepted: {self.accepted}", near)
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: enumeration."""
+        """JSON Schema: one of the words in the list."""
         return {"enum": list(self.names)}
 
 
@@ -346,7 +358,7 @@ class YesNo(Reader[bool]):
         return boolean
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: boolean, or true or false as text."""
+        """JSON Schema: a boolean, or true or false as text."""
         return {"enum": [True, False, *_YES_NO]}
 
 
@@ -359,7 +371,7 @@ class Words(Reader[tuple[str, ...]]):
         self.fewest, self.most = 0.0, math.inf
 
     def read(self, value: object, path: KeyPath, report: Report) -> tuple[str, ...] | Invalid:
-        """Read each word; a problem is reported at its own path."""
+        """Read the words of the list; a problem with a word is reported at the path of the word."""
         if not isinstance(value, list) or not self.fewest <= len(value) <= self.most:
             report(path, self.problem)
             return INVALID
@@ -371,7 +383,7 @@ class Words(Reader[tuple[str, ...]]):
         return words if are_valid(words) else INVALID
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: array of the words."""
+        """JSON Schema: an array of accepted words, without repetitions."""
         return {"type": "array", "items": self.word.schema(definitions), "uniqueItems": True}
 
 
@@ -386,11 +398,11 @@ class TextList(Words):
         self.fewest, self.most = 1, _MAX_NAME_COUNT
 
     def below(self, step: str) -> Reader[object] | None:
-        """Reader of one name."""
+        """Reader of one name in the list; None if `step` is no index."""
         return self.word if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: array of text."""
+        """JSON Schema: an array of at least one name as text."""
         return {"type": "array", "items": self.word.schema(definitions), "minItems": 1, "maxItems": self.most}
 
 
@@ -411,7 +423,7 @@ class Whole(Reader[int]):
         raise InvalidValueError(f"must be a whole number from {self.low} to {self.high}")
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: integer, or its digits in quotes."""
+        """JSON Schema: an integer within the bounds, or its digits in quotes."""
         number = {"type": "integer", "minimum": self.low, "maximum": self.high}
         return {"anyOf": [number, {"type": "string", "pattern": r"^\s*(?:0|-?[1-9]\d{0,17})\s*$"}]}
 
@@ -426,7 +438,7 @@ class Version(Reader[int]):
         return 1
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: constant, in quotes or not."""
+        """JSON Schema: the number 1, in quotes or not."""
         return {"enum": [1, "1"]}
 
 
@@ -434,7 +446,7 @@ class Day(Reader["date"]):
     """A calendar date."""
 
     def leaf(self, value: object) -> "date":
-        """Read a date like 2027-03-31."""
+        """Read a calendar date such as 2027-03-31."""
         from datetime import date
 
         try:
@@ -445,14 +457,17 @@ class Day(Reader["date"]):
             raise InvalidValueError("must be a calendar date", "accepted: 2027-03-31 and the like") from None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: date as text, or as the date type that YAML readers return."""
+        """JSON Schema: a date as text, or as the date type that YAML readers return."""
         return date_schema(r"^\d{4}-\d\d-\d\d$")
 
 
 def _is_few(
     value: object, kind: type[SizedT] | tuple[type[SizedT], ...], kind_problem: str, path: KeyPath, report: Report
 ) -> TypeGuard[SizedT]:
-    """Whether a value has the given type and at most `_MAX_ID_COUNT` entries; a problem is reported if not."""
+    """Whether a value is of the type `kind` and has at most `_MAX_ID_COUNT` entries; otherwise a problem is reported.
+
+    `kind_problem` is the text of the problem for another type.
+    """
     if not isinstance(value, kind):
         report(path, Problem(kind_problem))
         return False
@@ -469,14 +484,14 @@ class TextMap(Reader[dict[str, str]]):
         self.of = of
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, str] | Invalid:
-        """Read each value; a problem is reported at its own path."""
+        """Read the text of each key; a problem with a text is reported at the path of its key."""
         if not _is_few(value, dict, "must be a mapping of keys to values", path, report):
             return INVALID
         result = {key: read_part(Text(), text, (*path, key), report) for key, text in value.items()}
         return result if has_valid_values(result) else INVALID
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: object."""
+        """JSON Schema: an object with any keys and with texts as values."""
         return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_ID_COUNT}
 
 
@@ -484,7 +499,7 @@ class SizeMap(Reader[dict[str, object]]):
     """A mapping from keys of errors to single sizes. The reader of each key reads the size of that key later."""
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, object] | Invalid:
-        """Read the keys and their sizes without conversion; refuse sizes that are lists or mappings."""
+        """Return the mapping with its sizes unconverted; refuse sizes that are lists or mappings."""
         if not _is_few(value, dict, "must be a mapping of keys of errors to sizes", path, report):
             return INVALID
         nested = [key for key, size in value.items() if isinstance(size, dict | list)]
@@ -493,7 +508,7 @@ class SizeMap(Reader[dict[str, object]]):
         return INVALID if nested or INVALID in value.values() else value
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: object of quantities."""
+        """JSON Schema: an object with any keys and with texts or numbers as sizes."""
         size = {"type": ["string", "number"]}
         return {"type": "object", "additionalProperties": size, "maxProperties": _MAX_ID_COUNT}
 
@@ -502,7 +517,7 @@ class RegisteredSizes(Reader[dict[str, float]]):
     """Sizes of errors whose kinds packages register (`error_kinds.register`), by the name of the kind."""
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, float] | Invalid:
-        """Read the size of each kind; a problem is reported at its own path."""
+        """Read the size of each registered kind of error; a problem is reported at the path of its kind."""
         if not isinstance(value, dict):
             report(path, Problem("must be a mapping of kinds to sizes", f"accepted: {self._accepted()}"))
             return INVALID
@@ -525,12 +540,12 @@ class RegisteredSizes(Reader[dict[str, float]]):
         return ", ".join(motion_kinds()) or "none; no installed package registers a kind of error"
 
     def below(self, step: str) -> Quantity | None:
-        """Reader of the size of a kind; None if no package registers the kind."""
+        """Reader of the size of a kind of error; None if no package registers the kind."""
         kind = motion_kind(step)
         return None if kind is None else _size_of_kind(kind)
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: object of the registered kinds."""
+        """JSON Schema: an object whose keys are the registered kinds of error, with their sizes."""
         properties: JsonObject = {
             name: {"description": kind.description, "allOf": [_size_of_kind(kind).schema(definitions)]}
             for name, kind in motion_kinds().items()
@@ -540,7 +555,7 @@ class RegisteredSizes(Reader[dict[str, float]]):
 
 @cache
 def _size_of_kind(kind: MotionKind) -> Quantity:
-    """Reader of the size of a registered kind of error."""
+    """Reader of the size of an error whose kind a package registers, in the units of the kind."""
     return Quantity(kind.dimension, ge=-1e9, le=1e9)
 
 
@@ -552,7 +567,7 @@ class Weights(Reader[dict[str, float]]):
     """Keys of the file with positive weights, or a list of keys with weights of 1."""
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, float] | Invalid:
-        """Read each key and weight; a problem is reported at its own path."""
+        """Read the keys with their weights; a problem is reported at the path of its key or entry."""
         if not _is_few(value, _WEIGHED_OR_LISTED, "must be keys with their weights, or a list of keys", path, report):
             return INVALID
         if isinstance(value, list):
@@ -565,7 +580,7 @@ class Weights(Reader[dict[str, float]]):
         return weights if has_valid_values(weights) else INVALID
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: object of numbers, or array of text."""
+        """JSON Schema: an object of keys with numbers as weights, or an array of keys."""
         label, weight = Text().schema(definitions), _WEIGHT.schema(definitions)
         return {
             "anyOf": [
@@ -578,10 +593,11 @@ class Weights(Reader[dict[str, float]]):
 class Section(Reader[T_co]):
     """A mapping with known keys, read into a `NamedTuple`; an unknown key is an error.
 
-    The method `problems(values)` of a section yields contradictions between its values. It gets the valid values with
-    defaults, so that a fault in one value does not hide a contradiction between two valid values. An optional section
-    or list that is valid and empty counts as absent. A section needs at least one of the keys that its `any_of()`
-    lists; `problems` and the schema check this.
+    The function `problems(values)` of a `NamedTuple` yields contradictions between the values of its section. It gets
+    the valid values together with the defaults, so that a fault in one value does not hide a contradiction between
+    two valid values. An optional section or list that is valid and empty counts as absent. If the `NamedTuple` has a
+    function `any_of()`, the section needs at least one of the keys that it lists; `problems` and the schema check
+    this.
     """
 
     def __init__(self, kind: Callable[..., T_co]) -> None:
@@ -630,7 +646,7 @@ class Section(Reader[T_co]):
         return self.kind(**values) if is_valid else INVALID
 
     def each(self, value: object) -> dict[str, object]:
-        """Read the value of each known key separately, without a report; an invalid value becomes `INVALID`."""
+        """Read the value of each known key on its own, without reports; an invalid value becomes `INVALID`."""
         items = value.items() if isinstance(value, dict) else ()
         return {
             name: read_part(self.keys[name].reader, item, (), _ignore_problem)
@@ -639,11 +655,11 @@ class Section(Reader[T_co]):
         }
 
     def below(self, step: str) -> Reader[object] | None:
-        """Reader of a key; None for an unknown key."""
+        """Reader of the value of a key; None for an unknown key."""
         return self.keys[step].reader if step in self.keys else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: reference to the definition of the section, which is made on first use."""
+        """JSON Schema: a reference to the definition of the section, which the first call adds to `definitions`."""
         name = self.kind.__name__
         if name not in definitions:
             definitions[name] = {}  # keeps the order of first use
@@ -651,7 +667,7 @@ class Section(Reader[T_co]):
         return {"$ref": f"#/definitions/{name}"}
 
     def definition(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema of the section itself."""
+        """JSON Schema of the section: an object with its keys, their descriptions and their defaults."""
         properties = {}
         for name, key in self.keys.items():
             accepted = key.reader.schema(definitions)
@@ -680,7 +696,7 @@ class ListOf(Reader[tuple[T_co, ...]]):
         self.section: Reader[T_co] = kind if isinstance(kind, Reader) else Section(kind)
 
     def read(self, value: object, path: KeyPath, report: Report) -> tuple[T_co, ...] | Invalid:
-        """Read each entry; a problem is reported at its own path."""
+        """Read the entries of the list; a problem with an entry is reported at the path of the entry."""
         if not isinstance(value, list):
             report(path, Problem("must be a list"))
             return INVALID
@@ -691,11 +707,11 @@ class ListOf(Reader[tuple[T_co, ...]]):
         return entries if are_valid(entries) else INVALID
 
     def below(self, step: str) -> Reader[object] | None:
-        """Reader of one entry."""
+        """Reader of one entry of the list; None if `step` is no index."""
         return self.section if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: array of the section."""
+        """JSON Schema: an array whose items have the schema of the section."""
         return {"type": "array", "items": self.section.schema(definitions), "maxItems": _MAX_ENTRY_COUNT}
 
 
@@ -706,11 +722,11 @@ class OneOf(Reader[T_co]):
         self.pick, self.forms = pick, forms
 
     def read(self, value: object, path: KeyPath, report: Report) -> T_co | Invalid:
-        """Read the value with the reader of its form."""
+        """Read the value with the reader that `pick` returns for it."""
         return self.pick(value).read(value, path, report)
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: any of the forms."""
+        """JSON Schema that accepts each of the forms."""
         return {"anyOf": [form.schema(definitions) for form in self.forms]}
 
 
@@ -728,7 +744,11 @@ class PointsReader(Reader[T_co]):
         self.abscissa, self.ordinate, self.accepted, self.fewest = abscissa, ordinate, accepted, fewest
 
     def points(self, value: object, path: KeyPath, report: Report) -> Points | Invalid:
-        """Read all points, and return them in rising order; a problem is reported at its own path."""
+        """Read the points of a curve, and return them in rising order of the abscissas.
+
+        A problem with a point is reported at the path of its abscissa. The points are `SortedPoints` if the file has
+        them in another order.
+        """
         if not isinstance(value, dict) or not self.fewest <= len(value) <= _MAX_POINTS:
             length_words = f", {len(value)} given" if isinstance(value, dict) else ""
             report(
@@ -756,11 +776,11 @@ class PointsReader(Reader[T_co]):
         return tuple(sorted_points) if sorted_points == list(points.items()) else SortedPoints(sorted_points)
 
     def below(self, part: str) -> Reader[object] | None:
-        """Reader of an ordinate."""
+        """Reader of the ordinate at an abscissa; all points have the same."""
         return self.ordinate
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: object of points."""
+        """JSON Schema: an object with abscissas as keys and ordinates as values."""
         return {
             "type": "object",
             "additionalProperties": self.ordinate.schema(definitions),
@@ -773,32 +793,32 @@ class CurveReader(PointsReader[Points]):
     """A mapping of abscissas to ordinates, read in rising order; `SortedPoints` if the file has another order."""
 
     def read(self, value: object, path: KeyPath, report: Report) -> Points | Invalid:
-        """Read all points of the curve; a problem is reported at its own path."""
+        """Read all points of the curve in rising order; a problem is reported at the path of its point."""
         return self.points(value, path, report)
 
 
 def either(kind: type, form: Reader[Form], other: Reader[OtherForm]) -> OneOf[Form | OtherForm]:
-    """Reader of two forms: `form` for values of type `kind`, and `other` for all other values.
+    """Reader of a value with two forms: `form` reads values of the type `kind`, and `other` reads all other values.
 
-    `kind` is a list or a mapping.
+    `kind` is `list` or `dict`.
     """
     return OneOf(lambda value: form if isinstance(value, kind) else other, (other, form))
 
 
 def is_empty(item: object) -> bool:
-    """Whether an item of a file is an empty section or list, or contains only empty sections and lists."""
+    """Whether an item of a file is an empty section or list, or contains only such empty items."""
     if isinstance(item, dict):
         return all(map(is_empty, item.values()))
     return isinstance(item, list) and all(map(is_empty, item))
 
 
 def is_index(step: str) -> bool:
-    """Whether a step of a path is an index in a list."""
+    """Whether a step of a path has only digits, so that it is an index in a list."""
     return step.isascii() and step.isdigit() and len(step) < 9
 
 
 def read_part(reader: Reader[T], value: object, path: KeyPath, report: Report) -> T | Invalid:
-    """Read an item of a list or a mapping; an item that is `INVALID` already stays `INVALID`."""
+    """Read an item of a list or a mapping; an item that is already `INVALID` is returned without a second report."""
     return INVALID if value is INVALID else reader.read(value, path, report)
 
 
@@ -813,11 +833,11 @@ def has_valid_values(mapping: Mapping[K, T | Invalid]) -> TypeGuard[dict[K, T]]:
 
 
 def _ignore_problem(path: KeyPath, problem: Problem) -> None:
-    """Ignore a problem that is reported elsewhere."""
+    """Do nothing with a problem, because it is reported elsewhere."""
 
 
 def did_you_mean(word: object, known_words: tuple[str, ...]) -> str:
-    """Hint that names the nearest of the known words; empty if no word is near."""
+    """Hint that names the known word nearest to an unknown word; empty if no known word is similar."""
     from difflib import get_close_matches
 
     near = get_close_matches(str(word)[:_MAX_TEXT_CHARACTERS], known_words, 1)

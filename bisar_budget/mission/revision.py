@@ -1,4 +1,4 @@
-"""A mission file from a git revision, with the files that it names: parts, settings, orbits, logs."""
+"""A mission file as committed in a git revision, with the files that it uses: parts, settings, orbits, logs."""
 
 import os
 from collections.abc import Sequence
@@ -27,17 +27,18 @@ class RevisionError(Exception):
 class Revision:
     """The files of a git repository as committed in a branch, tag or commit.
 
-    If the path is in the repository of the current folder, that repository is read, and otherwise the repository of
-    the path. So a folder that has become a submodule since the revision is read from the repository around it. Links
-    are followed within the revision. Submodules are read at the commit that the revision names. A file outside of the
-    repository has only one version, which is on the disk; `outside` lists the outside files that were read.
+    If the path `near` is in the repository of the current folder, that repository is read. Otherwise it is the
+    repository around the path. So a folder that has become a submodule since the revision is read from the repository
+    around it. Links are followed within the revision. Submodules are read at the commit that the revision names. A
+    file outside of the repository has only one version, which is on the disk; `outside` lists the outside files that
+    were read.
 
     Parameters
     ----------
     near : str
         A path within the repository; it need not exist any more.
     name : str
-        The revision.
+        Name of the revision: a branch, a tag or a commit.
 
     Raises
     ------
@@ -66,7 +67,10 @@ class Revision:
         self._names_by_tree: dict[str, list[str]] = {}
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
-        """Content of a file in the revision; arguments and `UnreadableError` are the same as in `resources.Files`."""
+        """Content of a file as committed in the revision.
+
+        Arguments and errors are the same as in `resources.Files`.
+        """
         called = file if called is None else called
         inside = self._inside(file)
         if inside is None:
@@ -79,7 +83,7 @@ class Revision:
         raise UnreadableError(f"{called} {_why_not(git_object)} revision {printable(self.name)}", is_missing=True)
 
     def names(self, folder: str) -> list[str]:
-        """Names of the files of a folder in the revision, sorted; raises `OSError` if it has no such folder."""
+        """Sorted names of the entries of a folder in the revision; raises `OSError` if it has no such folder."""
         inside = self._inside(folder)
         if inside is None:
             return DISK.names(folder)
@@ -92,7 +96,11 @@ class Revision:
         return self._names_by_tree[git_object.hash]
 
     def has(self, file: str) -> bool:
-        """Whether the revision has a file; raises `RevisionError` for a link out of it or a missing submodule."""
+        """Whether the revision has a file at a path.
+
+        Raises `RevisionError` for a link that leads out of the repository, and for a submodule that is not on this
+        machine.
+        """
         inside = self._inside(file)
         git_object = _Object(b"missing") if inside is None else self._object(inside)
         if git_object.kind in (b"symlink", b"submodule"):
@@ -100,7 +108,10 @@ class Revision:
         return git_object.kind == b"blob"
 
     def matching(self, pattern: str) -> list[str]:
-        """Files of the revision that match a name or a glob pattern relative to the current folder, sorted."""
+        """Sorted paths of the files in the revision that match a name or a glob pattern.
+
+        The pattern and the paths are relative to the current folder, or absolute if the pattern is absolute.
+        """
         inside = self._inside(pattern)
         if inside is None:
             return []
@@ -114,7 +125,12 @@ class Revision:
     def _files(
         self, pattern: Sequence[str], tree: "_Object", above: str = "", way: tuple[str, ...] = ()
     ) -> list[str]:
-        """Paths of all files below a tree, also in those submodules and linked folders that a pattern may match."""
+        """List the paths of all files in a folder of the revision.
+
+        A submodule or linked folder is entered if the pattern may match files in it. `pattern` is the pattern split
+        at slashes, and `tree` is the git object of the folder. `above` is the path of the folder with a slash at its
+        end. `way` has the hashes of the folders above it, so that links do not lead in a circle.
+        """
         _, entries, _ = _git(tree.top, "ls-tree", "-r", "-z", tree.hash)
         files = []
         for entry in filter(None, entries.split(b"\0")):
@@ -129,13 +145,16 @@ class Revision:
         return files
 
     def path_of(self, file: str) -> str:
-        """Path of a file from the top of the repository, with forward slashes; unchanged for a file outside of it."""
+        """Path of a file relative to the top of the repository, with forward slashes.
+
+        The path of a file outside of the repository is returned unchanged.
+        """
         return self._inside(file) or file
 
     def _inside(self, path: str) -> str | None:
-        """Path relative to the top of the repository, with forward slashes; None outside of the repository.
+        """Path relative to the top of the repository, with forward slashes; None for a path outside of it.
 
-        Links below the top are not resolved here, because the revision may have other links.
+        Links below the top are not resolved here, because the revision may have other links than the disk.
         """
         folder, remainder = _existing(path)
         real = os.path.join(os.path.realpath(folder), remainder)
@@ -151,10 +170,10 @@ class Revision:
         return None
 
     def _object(self, inside: str) -> "_Object":
-        """The git object at a path of the commit.
+        """Git object at a path relative to the top of the repository.
 
-        If there is no such file or folder, its `kind` tells why. An object with at most `MAX_BYTES` bytes of content
-        is kept for the next call.
+        If the revision has no such file or folder, the `kind` of the object tells why. An object with at most
+        `MAX_BYTES` bytes of content is kept for the next call.
         """
         git_object = self._objects.get(inside)
         if git_object is None:
@@ -165,9 +184,9 @@ class Revision:
 
 
 def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
-    """Whether a path matches a pattern as in `glob.glob`, where `**` is any number of folders.
+    """Whether a path matches a glob pattern as in `glob.glob`, where `**` stands for any number of folders.
 
-    Both are split at slashes.
+    Path and pattern are split at slashes.
     """
     if not pattern:
         return not parts
@@ -179,15 +198,15 @@ def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
 
 
 def _leads_to(folder: Sequence[str], pattern: Sequence[str]) -> bool:
-    """Whether a pattern may match files below a folder."""
+    """Whether a glob pattern may match files below a folder; both are split at slashes."""
     start = pattern[: len(folder)]
     return "**" in start or (len(folder) < len(pattern) and _matches(folder, start))
 
 
 def _top(folder: str) -> tuple[str, str]:
-    """Top folder of the repository around a folder, and the message of git if it refuses.
+    """Top folder of the git repository around a folder; empty if there is none.
 
-    The folder is empty if there is no repository.
+    The second value is the reason if git refuses to read the repository, and otherwise empty.
     """
     is_found, top, refusal = _git(folder, "rev-parse", "--show-toplevel")
     return (os.fsdecode(top).rstrip("\r\n") if is_found else ""), refusal
@@ -207,7 +226,10 @@ _MISSING_OBJECT = _Object(b"missing")
 
 
 def _object(top: str, commit: str, inside: str) -> _Object:
-    """The object at a path in a commit; the path may lead into submodules."""
+    """Git object at a path in a commit of the repository at `top`; the path may lead into submodules.
+
+    If there is no such file or folder, the `kind` of the object tells why.
+    """
     if "\n" in inside:
         return _object_of_lines(top, commit, inside)
     request = os.fsencode(f"{commit}:{'' if inside == os.curdir else inside}")
@@ -231,12 +253,10 @@ def _object(top: str, commit: str, inside: str) -> _Object:
 
 
 def _object_of_lines(top: str, commit: str, inside: str) -> _Object:
-    """The object at a path that contains a line end.
+    """Git object at a path that contains a line break, which `cat-file --batch` does not accept.
 
-    It is found by its hash, because `cat-file --batch` takes no such path.
-
-    Links and submodules are not followed. A path that is a link or a submodule, or is below one, has the kind of the
-    link or submodule.
+    The object is found by its hash. Links and submodules are not followed. If the path is a link or a submodule, or
+    is below one, the object has the kind of the link or submodule.
     """
     parts = inside.split("/")
     for length in range(1, len(parts) + 1):
@@ -259,7 +279,7 @@ def _object_of_lines(top: str, commit: str, inside: str) -> _Object:
 
 
 def _existing(path: str) -> tuple[str, str]:
-    """Nearest existing folder above a path, and the remainder of the path."""
+    """Nearest folder above a path that exists on the disk, and the remainder of the path."""
     folder, remainder = os.path.split(os.path.abspath(path))
     while not os.path.isdir(folder) and folder != os.path.dirname(folder):
         folder, name = os.path.split(folder)
@@ -268,7 +288,7 @@ def _existing(path: str) -> tuple[str, str]:
 
 
 def _why_not(git_object: _Object) -> str:
-    """Reason why git gives no content of a file, as words between the name of the file and the revision."""
+    """Reason why a git object is no readable file, as text between the name of the file and the revision."""
     if git_object.kind == b"symlink":
         return f"is a link out of the repository, to {printable(os.fsdecode(git_object.content))}, in"
     if git_object.kind == b"submodule":
@@ -281,7 +301,7 @@ def _why_not(git_object: _Object) -> str:
 def mission_at(path: str, revision: Revision, model: str | None = None) -> Mission:
     """Read a mission file as committed in `revision`, with the parts, settings, orbits and logs of that revision.
 
-    `model` replaces the model that the file names.
+    `model` replaces the gating model that the file names.
 
     Raises
     ------
@@ -300,7 +320,10 @@ def mission_at(path: str, revision: Revision, model: str | None = None) -> Missi
 
 
 def _git(folder: str, *arguments: str, stdin: bytes = b"") -> tuple[bool, bytes, str]:
-    """Run git in a folder; returns whether it succeeded, its output, and the reason if it refuses the repository."""
+    """Run git in a folder; returns whether it succeeded, its output, and a refusal.
+
+    The refusal is the reason if git does not read the repository because it has another owner, and otherwise empty.
+    """
     # Committed files can look like a bare repository, with revisions and settings; git must not use them.
     command = ["git", "-c", "safe.bareRepository=explicit", "-C", folder, *arguments]
     variables = {name: value for name, value in os.environ.items() if name not in _VARIABLES_OF_HOOKS}

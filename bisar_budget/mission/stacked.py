@@ -1,6 +1,6 @@
-"""Combination of missions with the same shape into one mission of arrays.
+"""Combination of missions that differ only in numbers into one mission of arrays, which is evaluated in one pass.
 
-A number that differs between the missions becomes an array with one element per case.
+A number that differs between the missions becomes an array with one element per mission (case).
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -18,7 +18,7 @@ from bisar_budget.mission.readers import SectionValue, SectionValues
 
 
 def picked(mission: Mission, cases: NDArray[np.intp]) -> Mission:
-    """Select some of the cases in the arrays of a mission; `cases` are their indices."""
+    """Select cases of a mission of arrays: each array keeps the elements with the indices `cases`."""
 
     def of_cases(leaf: object) -> object:
         return leaf[cases] if isinstance(leaf, np.ndarray) and leaf.ndim else leaf
@@ -27,7 +27,7 @@ def picked(mission: Mission, cases: NDArray[np.intp]) -> Mission:
 
 
 def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.intp]]]:
-    """Combine missions of the same shape into one mission of arrays; yield each with the indices of its missions.
+    """Combine missions of the same shape into missions of arrays; yield each with the indices of the missions in it.
 
     Missions have the same shape if they differ only in numbers, not in keys, words or lengths of lists. A number that
     differs between the missions becomes an array (missions,), and a number that is the same in all of them stays a
@@ -46,12 +46,15 @@ def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.i
 
 
 def _next_of(numbers: Iterator[PerCase], leaf: object) -> object:
-    """Replace a leaf that is a number by the next of `numbers`; return any other leaf unchanged."""
+    """Return the next of `numbers` in place of a leaf that is a number; return any other leaf unchanged.
+
+    A leaf is a value that contains no other values.
+    """
     return next(numbers) if isinstance(leaf, float) else leaf
 
 
 def _bare(mission: Mission) -> Mission:
-    """Remove the sources of values and of paths from a mission."""
+    """Copy of a mission without its name, its file and the sources of its paths, on which no calculation depends."""
     for name, platform in mission.platforms._asdict().items():
         if platform.path is not None:
             path = platform.path
@@ -71,7 +74,7 @@ def _bare(mission: Mission) -> Mission:
 
 
 def _children(value: SectionValue) -> tuple[object, ...] | None:
-    """Values that a value contains; None for a number, an array or a word."""
+    """Values that a section, list or mapping contains; None for a number, an array or a word, which contain none."""
     if isinstance(value, tuple):
         return value
     if isinstance(value, dict):
@@ -80,7 +83,7 @@ def _children(value: SectionValue) -> tuple[object, ...] | None:
 
 
 def _shape(value: SectionValue, numbers: list[float]) -> object:
-    """Shape of a value: everything except its numbers, which are appended to `numbers`."""
+    """Shape of a value: all that it contains except its numbers, which are appended to `numbers` in their order."""
     if isinstance(value, float):
         numbers.append(value)
         return float
@@ -92,7 +95,7 @@ def _shape(value: SectionValue, numbers: list[float]) -> object:
 
 
 def _with_leaves(value: SectionValue, put: Callable[[object], object]) -> SectionValue:
-    """Replace each number, array or word in a value by `put(leaf)`."""
+    """Copy of a value in which each number, array or word is replaced by the result of `put` for it."""
     children = _children(value)
     if children is None:
         return put(value)

@@ -1,7 +1,7 @@
 """YAML as a plain tree with positions: the content of a file before its keys and values are interpreted.
 
-The tree is built from the parser's events, so that its depth is limited before any recursion. Every scalar stays the
-text of the file, because YAML 1.1 would read `9.6e9` as text, `on` as true and `010` as eight.
+The tree is built from the events of the YAML parser, so that its depth is limited before any recursion. Every scalar
+stays the text of the file, because YAML 1.1 would read `9.6e9` as text, `on` as true and `010` as eight.
 """
 
 import re
@@ -41,7 +41,7 @@ NULLS = ("", "~", "null", "Null", "NULL")
 
 
 def _decoded(data: bytes | str, file: str, file_kind: str) -> str:
-    """Text of a file; raises `MissionError` if it is too large or not UTF-8."""
+    """Decode the content of a file to text; raises `MissionError` if it is too large or not UTF-8."""
     if len(data) > MAX_BYTES:
         raise MissionError(file, (file_fault(f"is larger than {MAX_BYTES // 1024} KiB, so no {file_kind} file"),))
     if isinstance(data, str):
@@ -66,15 +66,15 @@ class Tree:
     Attributes
     ----------
     file_kind : str
-        "mission" or "part"; faults of the whole file name it.
+        "mission" or "part"; messages about the file as a whole name it.
     root : dict
         The content. An unreadable value is reported and becomes `INVALID`.
     keys, values : dict of KeyPath to event
-        The parser's events, which hold the marks of start and end.
+        The parser's events of the keys and of the values by their paths, with the marks of their start and end.
     faults : list of Fault
-        Faults in the order in which they were met.
+        Faults in the order in which they were found.
     changes : dict of KeyPath to SetValue
-        The options that put values into the tree, each at the highest path that it changed. Cases of a sweep put
+        The options that put values into the tree, each at the highest path that it changed. The values of a sweep are
         floats.
     """
 
@@ -87,17 +87,17 @@ class Tree:
         self.changes: dict[KeyPath, SetValue] = {}
 
     def copied(self) -> "Tree":
-        """Copy of the tree; changes of the copy do not affect this tree."""
+        """Copy of the tree; changes to the copy do not affect this tree."""
         tree = Tree(self.file_kind)
         tree.root, tree.faults = _copied(self.root), list(self.faults)
         tree.keys, tree.values, tree.changes = dict(self.keys), dict(self.values), dict(self.changes)
         return tree
 
     def fault(self, mark: ParserEvent, path: KeyPath, problem: str, **details: str) -> None:
-        """Record a fault at a mark in the file. Without a mark, the fault is at the start of the file.
+        """Record a fault at a mark, which is a position in the file; without a mark it is at the start of the file.
 
-        If an option set the value, the fault names the option and has no line. Raises `UnusableError` when the file
-        has `MAX_FAULT_COUNT` faults.
+        If an option set the value at `path`, the fault names the option and has no line. `details` are further fields
+        of the fault. Raises `UnusableError` when the file has `MAX_FAULT_COUNT` faults.
         """
         change = self._change_at(path)
         if change is not None:
@@ -113,7 +113,7 @@ class Tree:
             raise UnusableError
 
     def _change_at(self, path: KeyPath) -> SetValue | None:
-        """The option that set a value, or a section or list that contains it; None if there is none."""
+        """Option that set the value at a path, or a section or list that contains it; None if there is none."""
         return next(filter(None, map(self.changes.get, upwards(path))), None)
 
     def in_order(self) -> tuple[Fault, ...]:
@@ -121,7 +121,10 @@ class Tree:
         return tuple(sorted(dict.fromkeys(self.faults), key=lambda fault: (fault.line or 0, fault.column or 0)))
 
     def report(self, path: KeyPath, problem: Problem) -> None:
-        """Record a problem that a reader reports, at the value or else at the nearest key above it."""
+        """Record a problem that a reader reports as a fault.
+
+        Its position is that of the value or key at `path`, or else of the nearest key above it.
+        """
         path = (*path, *problem.at)
         value: Content = self.root
         for name in path:
@@ -138,10 +141,10 @@ class Tree:
         self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
 
     def document(self, text: str, path: KeyPath, accepted: str) -> Content:
-        """Read the only YAML document of a text into the tree at a path; return `INVALID` for an empty text.
+        """Read the only YAML document of a text into the tree at a path; returns `INVALID` for an empty text.
 
-        Raises `UnusableError` for a second document, and `yaml.YAMLError` for a text that is not YAML. `accepted` is
-        the accepted content in the message about a second document.
+        Raises `UnusableError` for a second document, and `yaml.YAMLError` for a text that is not YAML. `accepted`
+        tells in the message about a second document what is accepted.
         """
         next_event: Callable[[], ParserEvent] = _PARSER(text).get_event
         while type(event := next_event()) is not yaml.DocumentStartEvent:
@@ -155,7 +158,10 @@ class Tree:
         return value
 
     def node(self, next_event: Callable[[], ParserEvent], event: ParserEvent, path: KeyPath) -> Content:
-        """Read one value; the depth of the recursion is bounded by `MAX_NESTING_LEVEL`."""
+        """Read the value that begins with `event`, including all values inside it, and return its content.
+
+        The depth of the recursion is bounded by `MAX_NESTING_LEVEL`.
+        """
         self.values[path] = event
         if len(self.values) > MAX_FILE_VALUE_COUNT:
             self.faults.append(
@@ -215,7 +221,10 @@ class Tree:
                 self.fault(item.start_mark, (*path, index), problem, given=given, accepted=accepted)
 
     def _mapping(self, next_event: Callable[[], ParserEvent], path: KeyPath, *, is_flow: bool) -> dict[str, Content]:
-        """Read the keys and values of a mapping whose first event has been read already."""
+        """Read the keys and values of a mapping, whose start event has been read already.
+
+        `is_flow` tells whether the mapping is written in braces.
+        """
         mapping: dict[str, Content] = {}
         split: dict[str, list[str]] = {}  # by key: parts of its value, split at the commas of a flow mapping
         name = ""
@@ -249,7 +258,10 @@ class Tree:
         return mapping
 
     def _without_brackets(self, path: KeyPath, texts: list[str]) -> None:
-        """Refuse `{position: 1 m, 2 m, 3 m}`, which YAML reads as three keys."""
+        """Refuse a value without brackets, as in `{position: 1 m, 2 m, 3 m}`, which YAML reads as three keys.
+
+        `texts` are the parts of the value between the commas.
+        """
         is_sure = len(texts) == 3 and all(unit_behind(text) or text == "0" for text in texts)
         hint = f"Did you mean [{', '.join(texts)}]?" if is_sure else "A decimal is written with a point"
         accepted = "accepted: one value, or [a, b, c]"
@@ -258,7 +270,7 @@ class Tree:
 
 
 def _is_bare(key: ParserEvent, item: ParserEvent) -> bool:
-    """Whether a key of a mapping is a number, with or without a unit, and has no value."""
+    """Whether a key of a mapping looks like a number, with or without a unit, and has no value."""
     is_empty = type(item) is ScalarEvent and not item.style and not item.value
     return is_empty and not key.style and bool(_NUMERAL.match(key.value))
 
@@ -270,7 +282,7 @@ _STARTS = {
 
 
 def read_tree(data: bytes | str, file: str, file_kind: str = "mission") -> Tree:
-    """Read a file that consists of one document; bytes are UTF-8, and `file_kind` is "mission" or "part".
+    """Read a file of one YAML document into a tree; bytes are UTF-8, and `file_kind` is "mission" or "part".
 
     Raises
     ------
@@ -312,7 +324,7 @@ def _copied(value: Content) -> Content:
 
 
 def _dotted(path: KeyPath) -> str:
-    """Text of a path such as `other_errors[0].name`, shortened beyond 200 characters."""
+    """Write a path as text, such as `other_errors[0].name`; a text of more than 200 characters is shortened."""
     text = ""
     for name in path:
         text += f"[{name}]" if isinstance(name, int) else f".{name}" if text else str(name)

@@ -1,4 +1,4 @@
-"""Vibration in a mission file: sinusoids, wideband noise and spectra, as displacement or as acceleration."""
+"""Sections of a mission file for vibrations: sinusoids, noise and spectra, of displacement or of acceleration."""
 
 import math
 from collections.abc import Iterator
@@ -39,7 +39,7 @@ class _Displacement(Quantity):
         self.of_acceleration, self.also = of_acceleration, also
 
     def leaf(self, value: object) -> float:
-        """Read a displacement and check its bounds; the error for a velocity or an acceleration has a hint."""
+        """Read a displacement and check its bounds; a velocity or an acceleration is refused with a hint."""
         try:
             return super().leaf(value)
         except InvalidValueError as error:
@@ -63,7 +63,7 @@ _ALONG = "along the line of sight; a vector: along each axis"
 
 
 def _of_all(value: float | Vector, number: float) -> float | Vector:
-    """Multiply an amplitude, which is a single value or one value per axis, by a number."""
+    """Multiply an amplitude, which is one value along the line of sight or one value per axis, by a number."""
     if isinstance(value, tuple):
         a, b, c = value
         return a * number, b * number, c * number
@@ -84,17 +84,17 @@ class Sinusoid(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """Displacement per unit of the amplitude. [m/m]"""
+        """Displacement per unit of the amplitude; 1, because the amplitude is a displacement. [m/m]"""
         return 1.0
 
     @property
     def displacement(self) -> float | Vector:
-        """Amplitude of the displacement, as a single value or along each axis. [m]"""
+        """Amplitude of the displacement, one value along the line of sight or one value per axis. [m]"""
         return self.amplitude
 
     @property
     def acceleration(self) -> float | Vector:
-        """Amplitude of the acceleration, as a single value or along each axis. [m/s²]"""
+        """Amplitude of the acceleration, one value along the line of sight or one value per axis. [m/s²]"""
         return _of_all(self.amplitude, (2 * math.pi * self.frequency) ** 2)
 
 
@@ -108,17 +108,17 @@ class AcceleratedSinusoid(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """Displacement per unit of the amplitude: 1/(2πf)². [s²]"""
+        """Displacement per unit of the amplitude, which is an acceleration: 1/(2πf)². [s²]"""
         return 1 / (2 * math.pi * self.frequency) ** 2
 
     @property
     def displacement(self) -> float | Vector:
-        """Amplitude of the displacement, as a single value or along each axis. [m]"""
+        """Amplitude of the displacement, one value along the line of sight or one value per axis. [m]"""
         return _of_all(self.amplitude, self.scale)
 
     @property
     def acceleration(self) -> float | Vector:
-        """Amplitude of the acceleration, as a single value or along each axis. [m/s²]"""
+        """Amplitude of the acceleration, one value along the line of sight or one value per axis. [m/s²]"""
         return self.amplitude
 
 
@@ -126,7 +126,7 @@ _SINUSOID, _ACCELERATED = Section(Sinusoid), Section(AcceleratedSinusoid)
 
 
 def _form_of_sinusoid(value: object) -> Reader[Sinusoid | AcceleratedSinusoid]:
-    """Reader of a sinusoid, chosen by the unit of its amplitude: acceleration, or else displacement."""
+    """Reader of a sinusoid by its acceleration if the amplitude has such a unit, or else by its displacement."""
     amplitude = value.get("amplitude") if isinstance(value, dict) else None
     components = amplitude if isinstance(amplitude, list) else [amplitude]
     is_accelerated = any(isinstance(text, str) and given_unit(text, units.ACCELERATION.si) for text in components)
@@ -145,14 +145,15 @@ class Wideband(NamedTuple):
 class Spectrum(NamedTuple):
     """One-sided spectral density of a vibration: straight over logarithms between its points, zero outside of them.
 
-    `points` are frequencies [Hz] with densities of acceleration [(m/s²)²/Hz], or of displacement [m²/Hz].
+    `points` are frequencies [Hz] with their densities. If `is_accelerated`, these are densities of acceleration
+    [(m/s²)²/Hz], and otherwise of displacement [m²/Hz].
     """
 
     points: Points
     is_accelerated: bool
 
     def times(self, power: PerCase) -> "Spectrum":
-        """The spectrum with each density multiplied by a power factor."""
+        """Copy of the spectrum with each density multiplied by `power`, a ratio of powers."""
         points: SectionValue = tuple((f, density * power) for f, density in self.points)
         return self._replace(points=points)
 
@@ -178,7 +179,10 @@ _SPECTRA = (
 
 
 def _form_of_spectrum(value: object) -> Reader[Spectrum]:
-    """Reader of a spectrum of displacement if most points have such units, and otherwise of acceleration."""
+    """Reader of a displacement spectrum if more points have units of displacement than of acceleration.
+
+    Otherwise it is the reader of an acceleration spectrum.
+    """
     texts = [item for item in value.values() if isinstance(item, str)] if isinstance(value, dict) else []
     accelerations, displacements = (
         sum(bool(given_unit(text, reader.ordinate.dimension.si)) for text in texts) for reader in _SPECTRA
@@ -207,7 +211,7 @@ class Vibration(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Refuse a spectrum level without a spectrum."""
+        """Refuse a `spectrum_level` without a `spectrum`."""
         if values.get("spectrum_level") is not None and "spectrum" in values and values["spectrum"] is None:
             problem = "shifts a spectrum, and there is none"
             yield Problem(problem, "accepted: spectrum beside it", at=("spectrum_level",))
@@ -229,7 +233,7 @@ class FeltVibration(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Refuse a spectrum level without a spectrum."""
+        """Refuse a `spectrum_level` without a `spectrum`."""
         yield from Vibration.problems(values)
 
     @property

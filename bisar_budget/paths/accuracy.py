@@ -1,4 +1,4 @@
-"""Accuracy of a path as its source states it: covariances, sigmas, and errors without a direction.
+"""Accuracy of a path as its source states it: covariances, sigmas of axes, or only the size of the total error.
 
 An ephemeris states covariances at epochs. Along the orbit's axes (radial, in-track, cross-track) a covariance changes
 little from one epoch to the next. So it is interpolated along these axes, and then converted to Earth-fixed axes.
@@ -38,9 +38,9 @@ class StatedAccuracy(NamedTuple):
         Covariance of position [m²], or of position and velocity [m², m²/s, m²/s²], along Earth-fixed axes or
         along the axes of a scene.
     total : float
-        Error without a direction, from a source without a covariance. [m]
+        Total position error, if the source states only its size and no covariance. [m]
     is_typical : bool
-        Whether the error is not stated, but is the usual error for the quality that the source states.
+        True if the source states only a quality of its fixes. The error is then the usual error for this quality.
     """
 
     words: str
@@ -50,7 +50,7 @@ class StatedAccuracy(NamedTuple):
 
     @property
     def position_m(self) -> float:
-        """Root sum of squares of the position errors of all axes, or `total` without a covariance. [m]"""
+        """Total position error: root sum of squares over the three axes, or `total` if there is no covariance. [m]"""
         variances = (
             [row[axis] for axis, row in enumerate(self.covariance[:3])] if self.covariance else [self.total**2]
         )
@@ -61,24 +61,24 @@ class PathNoise(NamedTuple):
     """Error of a path due to the noise of its log, as polynomials of slow time over the aperture.
 
     `modes` (modes, orders, 3) are coefficients of slow time to the power 0, 1, … [m], [m/s], …. Each mode is a
-    one-sigma error along one axis of the scene, and is independent of all other modes. Errors above order 8 are left
-    out.
+    one-sigma error along one axis of the scene, and is independent of all other modes. Terms above order 8 are
+    neglected.
     """
 
     modes: tuple[tuple[Vector, ...], ...]
 
 
 class CovarianceError(ValueError):
-    """Error for a matrix that is not a covariance."""
+    """Raised for a matrix that cannot be a covariance."""
 
 
 def as_matrix(values: Floats) -> Matrix:
-    """Convert an array to a symmetric matrix, as tuples of plain numbers."""
+    """Make an array (n, n) exactly symmetric, and convert it to tuples of Python numbers."""
     return tuple(tuple(float(value) for value in row) for row in (values + values.T) / 2)
 
 
 def as_rows(values: Floats) -> Matrix:
-    """Convert a matrix to tuples of plain numbers."""
+    """Convert a matrix to tuples of Python numbers, one tuple for each row."""
     return tuple(tuple(row) for row in np.asarray(values, dtype=float).tolist())
 
 
@@ -94,7 +94,10 @@ def block_turned(covariance: Floats, axes: Floats) -> Floats:
 
 
 def correlations(covariance: Floats) -> Matrix:
-    """Correlation matrix of a covariance. Correlations with an error of zero variance are 0."""
+    """Correlation matrix from a covariance matrix (n, n).
+
+    An error with zero variance has the correlation 0 with all other errors.
+    """
     sigmas = np.sqrt(np.diag(covariance))
     scale = np.where(sigmas > 0, sigmas, 1.0)
     matrix = covariance / np.outer(scale, scale)
@@ -103,10 +106,10 @@ def correlations(covariance: Floats) -> Matrix:
 
 
 def covering_sigmas(covariance: Floats) -> Vector:
-    """Sigmas of independent errors that have at least the variance of a covariance (3, 3). [m], [m/s]
+    """Sigmas (3,) of independent errors along three axes, chosen to cover a covariance (3, 3). [m], [m/s]
 
-    This holds in every direction. If the covariance is diagonal, these are its own sigmas. Otherwise they are larger
-    by a factor of up to √3.
+    In every direction their variance is at least the variance that the covariance gives. If the covariance is
+    diagonal, these are its own sigmas. Otherwise they are larger by a factor of up to √3.
     """
     largest = float(np.linalg.eigvalsh(np.array(correlations(covariance)))[-1])
     factor = math.sqrt(largest) if largest > 1 + _EQUAL_VARIANCE_FRACTION else 1.0
@@ -115,7 +118,7 @@ def covering_sigmas(covariance: Floats) -> Vector:
 
 
 def held_to_covariance(values: Floats) -> Floats:
-    """Correct the rounding errors of a matrix that is nearly a covariance; return the nearest covariance.
+    """Correct a covariance matrix that is not positive semi-definite only because of rounding errors.
 
     Raises
     ------
@@ -136,12 +139,15 @@ def held_to_covariance(values: Floats) -> Floats:
 
 # ---------------------------------------------------------------------- covariances of an orbit
 def turns_with_orbit(name: str) -> bool:
-    """Whether the CCSDS name of orbit axes states that velocities are relative to axes that turn with the orbit."""
+    """Whether the CCSDS name of orbit axes ends with `_ROTATING`.
+
+    Velocities are then relative to axes that turn with the orbit.
+    """
     return name.endswith("_ROTATING")
 
 
 def local_axes(name: str) -> str | None:
-    """`RTN` or `TNW` from the CCSDS name of axes that turn with an orbit; None for any other name."""
+    """Convert the CCSDS name of axes that follow an orbit to `RTN` or `TNW`; None for a name of any other axes."""
     for suffix in _AXES_SUFFIXES:
         name = name.removesuffix(suffix)
     name = _AXES_SYNONYMS.get(name, name)
@@ -152,9 +158,10 @@ def local_axes(name: str) -> str | None:
 class EpochCovariance:
     """Covariance (6, 6) of position and velocity at an epoch of TAI. [m², m²/s, m²/s²]
 
-    `axes` are `RTN` or `TNW`, `earth` for Earth-fixed axes, or `stars` for axes that `turn` converts to Earth-fixed
-    axes. None means that the axes are unknown; then only the total position variance is used. Velocities along the
-    axes of an orbit are relative to the stars, or relative to axes that turn with the orbit if `is_rotating`.
+    `axes` is the name of the axes: `RTN` or `TNW` for axes of the orbit, `earth` for Earth-fixed axes, or `stars` for
+    celestial axes, which `turn` converts to Earth-fixed axes. None means that the axes are unknown. Then only the
+    total position variance is used. With `RTN` or `TNW`, velocities are relative to the stars. If `is_rotating`, they
+    are relative to axes that turn with the orbit instead.
     """
 
     epoch: Instant
@@ -165,7 +172,10 @@ class EpochCovariance:
 
 
 class OrbitState(NamedTuple):
-    """Position, and velocity relative to the stars, along Earth-fixed axes. [m], [m/s]"""
+    """Position [m] of a satellite, and its velocity [m/s] relative to the stars.
+
+    Both are components along Earth-fixed axes.
+    """
 
     position: Vector
     velocity: Vector
@@ -173,7 +183,7 @@ class OrbitState(NamedTuple):
     def axes(self, name: str) -> Floats:
         """Unit vectors of the axes `RTN` (radial, in-track, cross-track) or `TNW` (velocity, in-plane, cross-track).
 
-        The vectors are the rows of the result (3, 3), along the axes of the Earth.
+        The vectors are the rows of the result (3, 3). Their components are along Earth-fixed axes.
         """
         position, velocity = np.array(self.position), np.array(self.velocity)
         across = np.cross(position, velocity)
@@ -193,9 +203,9 @@ class OrbitState(NamedTuple):
 
 
 def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: tuple[Instant, Instant]) -> OrbitState:
-    """State of an orbit at an instant, from its Earth-fixed positions.
+    """Position and velocity on an orbit at an instant, from its Earth-fixed positions.
 
-    The velocity is a central difference of positions within the span of the orbit.
+    The velocity is a central difference of positions, which all lie within the span of the orbit.
     """
     first = max(instant.after(-_VELOCITY_STEP_S), span[0])
     last = min(instant.after(_VELOCITY_STEP_S), span[1])
@@ -226,11 +236,11 @@ def stated_of_orbit(
     instant: Instant,
     span: tuple[Instant, Instant],
 ) -> StatedAccuracy | None:
-    """Accuracy at an instant of an ephemeris, from its stated covariances, along Earth-fixed axes.
+    """Accuracy of an ephemeris at an instant, along Earth-fixed axes, from the covariances that its file states.
 
     Between two epochs the covariance is interpolated linearly along the orbit's axes. Before the first and after the
-    last epoch, the nearest epoch counts. A covariance of zero counts as missing. Returns None if no covariance is
-    stated.
+    last epoch, the covariance of the nearest epoch is used. A covariance of zero counts as missing. Returns None if
+    no covariance is stated. `place` is the function from an instant to the Earth-fixed position [m].
     """
     nonzero = (covariance for covariance in covariances if np.trace(covariance.values[:3, :3]) > 0)
     stated = sorted(nonzero, key=lambda covariance: covariance.epoch)
@@ -261,7 +271,7 @@ def stated_of_orbit(
 
 
 def _covariance_along_orbit(covariance: EpochCovariance, state: OrbitState, instant: Instant) -> Floats:
-    """Convert a covariance to radial, in-track and cross-track axes, with the velocity relative to the stars."""
+    """Convert a covariance to radial, in-track and cross-track axes, for velocities relative to the stars."""
     if covariance.axes in LOCAL_AXES:
         values = covariance.values
         if covariance.is_rotating:

@@ -1,9 +1,9 @@
 """Names of columns that state the accuracy of the positions beside them.
 
 Programs use many names for such columns: `sigma_east`, `sde`, `SD-E`, `lat std dev`, `hAcc`, `cov_ee`. A column that
-looks like an accuracy is read if its name states an axis or direction of the position. It is ignored if it belongs to
-another quantity than a position. Any other such column has to be refused: if it were ignored, the declared error
-could be too small.
+looks like an accuracy is read if its name states an axis or direction of the position. It is ignored if its name
+states another quantity, such as a velocity. Any other column that looks like an accuracy is refused: if it were
+ignored, the error that the log declares could be too small.
 """
 
 import re
@@ -105,12 +105,14 @@ _COLUMN_SPELLINGS = (
 
 
 def meaning_of(name: str, unit: str | None) -> tuple[str | None, str | None]:
-    """Meaning of a column, and its unit: the stated unit, or else the unit at the end of the column's name.
+    """Find the accuracy that a column states, from its name and unit; return its standard name and unit.
 
-    The meaning is `sigma_east` or the sigma of another axis, `variance_east` or the variance of another axis,
-    `horizontal_accuracy`, `vertical_accuracy`, or `position_accuracy` for an accuracy without a direction. It is
-    `sigma_h` if other columns decide the meaning of h, or `CROSS_COVARIANCE`, or `UNCLEAR`. It is None for a column
-    that is no accuracy of a position.
+    The standard name is `sigma_east` or `variance_east`, or the same for another axis. It is `horizontal_accuracy`,
+    `vertical_accuracy`, or `position_accuracy` for an accuracy without a direction. It is `sigma_h` if h may be the
+    height or horizontal, which other columns then decide. It is `CROSS_COVARIANCE` for a covariance of two axes, and
+    `UNCLEAR` for an accuracy that is not known. It is None for a column that states no accuracy of a position.
+
+    The returned unit is `unit`, or else the unit at the end of the column's name, or None.
     """
     split, lower = _tokens(_CAMELS.sub("_", name)), _tokens(name)
     stated_unit = unit
@@ -141,7 +143,10 @@ def _without(tokens: list[str], tail: Sequence[str]) -> list[str]:
 
 
 def _of_tokens(tokens: Sequence[str]) -> str | None:
-    """Meaning of a column from the words of its name; None if the name does not look like an accuracy."""
+    """Standard name of the accuracy that a column states, as in `meaning_of`, from the words of the column's name.
+
+    Returns None if the name does not look like an accuracy.
+    """
     words = [token for token in tokens if token in _SIGMA_WORDS | _VARIANCES]
     is_unclear = any(_UNCLEAR_MEASURES.fullmatch(token) for token in tokens) or _LOOKS_LIKE.search("_".join(tokens))
     is_error = not words and not _ERROR_WORDS.isdisjoint(tokens)
@@ -178,7 +183,10 @@ def _of_tokens(tokens: Sequence[str]) -> str | None:
 
 
 def _of_variance(axis_tokens: Sequence[str]) -> str:
-    """Meaning of a variance or a covariance from the names of its axes, such as `ee`, `e`, `e e` or `east`."""
+    """Standard name of a variance or covariance column, from its axes such as `ee`, `e`, `e e` or `east`.
+
+    The result is `UNCLEAR` if the axes are not known.
+    """
     pair = (
         list(axis_tokens[0])
         if len(axis_tokens) == 1 and re.fullmatch(r"[enudxyz]{2}", axis_tokens[0])
@@ -193,20 +201,21 @@ def _of_variance(axis_tokens: Sequence[str]) -> str:
 
 
 def _is_cross(token: str) -> bool:
-    """Whether a word names two different axes among east, north, up and down."""
+    """Whether a word is the initials of two different axes among east, north, up and down, such as `en`."""
     return re.fullmatch(r"[enud]{2}", token) is not None and token[0] != token[1]
 
 
 def _is_velocity(tokens: Sequence[str]) -> bool:
-    """Whether the word v comes directly before the name of an axis."""
+    """Whether the words of a column's name include v directly before an axis, as for a velocity along this axis."""
     return any(first == "v" and second in "enudxyz" for first, second in pairwise(tokens))
 
 
 def _may_be_of_positions(meaning: str, unit: str) -> bool:
     """Whether a column with this unit may be the accuracy of a position.
 
-    A length, an area or an unknown unit may be one. An angle may be one too, but not for a meaning that an angle
-    cannot have, such as a vertical accuracy. The reader then refuses an angle along an axis.
+    `meaning` is the standard name of the accuracy. The result is true for a unit of length or area, and for an
+    unknown unit. It is also true for a unit of angle, except for accuracies that cannot be angles, such as a vertical
+    accuracy. The reader of the log later refuses a sigma in a unit of angle.
     """
     dimension = next((candidate for candidate in units.DIMENSIONS if _is_unit_of(unit, candidate)), None)
     if dimension in _OF_POSITIONS or dimension is None:

@@ -38,7 +38,7 @@ class Geodetic(NamedTuple):
 
 @dataclass(frozen=True)
 class SceneAxes:
-    """Axes of a scene: origin, and unit vectors east, north and up at the origin, in Earth-fixed axes."""
+    """Axes of a scene: origin [m], and unit vectors east, north and up there, all in Earth-fixed coordinates."""
 
     origin: Vector
     axes: Axes
@@ -108,7 +108,8 @@ def free_fall(position: Vectors, velocity: Vectors, axes: SceneAxes | None) -> V
     position, velocity : (3,)
         East, north, up; numbers or arrays (cases,). [m, m/s]
     axes : SceneAxes or None
-        Axes of a scene on the Earth. None means an Earth that does not turn, a sphere of mean radius below the scene.
+        Axes of a scene on the Earth. None means an Earth that does not turn, and is a sphere of mean radius directly
+        below the scene.
 
     Notes
     -----
@@ -194,15 +195,16 @@ def geodetic_places(points: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def geodetic(point: Vector) -> Geodetic:
-    """Geodetic place of Earth-fixed coordinates."""
+    """Geodetic latitude, longitude and height of a point in Earth-fixed coordinates (3,) [m]."""
     latitude, longitude, height = map(float, geodetic_places(np.array(point)))
     return Geodetic(latitude, longitude, height)
 
 
 def _directions(latitude: PerCase, longitude: PerCase) -> Floats:
-    """Unit vectors to the east, north and up at places, in Earth-fixed axes.
+    """Unit vectors to the east, north and up at geodetic positions, in Earth-fixed axes.
 
-    Latitude and longitude are (...) in radians. The result (3, ..., 3) is indexed by direction, place and component.
+    Latitude and longitude are (...) in radians. The result (3, ..., 3) is indexed by direction, position and
+    component.
     """
     sine, cosine, zero = np.sin(latitude), np.cos(latitude), np.zeros_like(longitude)
     sine_l, cosine_l = np.sin(longitude), np.cos(longitude)
@@ -213,7 +215,10 @@ def _directions(latitude: PerCase, longitude: PerCase) -> Floats:
 
 
 def axes_at_places(latitude: Floats, longitude: Floats) -> Floats:
-    """Unit vectors east, north and up at n places, indexed (axis, Earth-fixed component, place), (3, 3, n).
+    """Unit vectors east, north and up at n geodetic positions, in Earth-fixed axes.
+
+    The result (3, 3, n) is indexed by direction, Earth-fixed component and position.
+
 
     `latitude` and `longitude` are (n,). [rad]
     """
@@ -221,13 +226,13 @@ def axes_at_places(latitude: Floats, longitude: Floats) -> Floats:
 
 
 def axes_at(position: Geodetic) -> SceneAxes:
-    """Axes of a scene at a geodetic position, or at the positions of many cases."""
+    """Axes of a scene whose origin is a geodetic position; coordinates may be arrays (cases,)."""
     east, north, up = map(_vector, _directions(*np.broadcast_arrays(position.latitude, position.longitude)))
     return SceneAxes(earth_fixed(position), (east, north, up))
 
 
 def flown(position: Geodetic, heading: float, speed: float, climb: float, times_s: PerCase) -> Floats:
-    """Earth-fixed positions (..., 3) at times along a flight on a geodesic with constant speed and climb rate. [m]
+    """Earth-fixed positions (..., 3) of a flight along a geodesic with constant speed and climb rate. [m]
 
     Parameters
     ----------
@@ -240,7 +245,7 @@ def flown(position: Geodetic, heading: float, speed: float, climb: float, times_
     climb : float
         Vertical speed. [m/s]
     times_s : (...) array_like
-        Times from the start of the flight; may be negative. [s]
+        Times of the positions; may be negative. [s]
 
     Notes
     -----
@@ -253,7 +258,10 @@ def flown(position: Geodetic, heading: float, speed: float, climb: float, times_
     step = np.asarray(times_s, dtype=float)[..., None] / _RUNGE_KUTTA_STEPS
 
     def rates(state: Floats) -> Floats:
-        """Rates (2, ..., 3) of the displacement from the start [m/s] and of the direction of flight [1/s]."""
+        """Rates of change (2, ..., 3) of the state.
+
+        The state is the displacement from the start [m] and the unit vector of the direction of flight.
+        """
         displacement, direction = state
         latitude, longitude, height = geodetic_places(start + displacement)
         east, north, up = _directions(latitude, longitude)

@@ -89,13 +89,13 @@ class Elements:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name and catalogue number for comparisons."""
+        """Name and catalogue number, as they are compared with the name in a mission."""
         return (object_key(self.name), str(self.number))
 
 
 @dataclass(frozen=True, kw_only=True)
 class BrokenEntry:
-    """An unusable entry of a catalogue: the reason, and the names of its object as far as they can be read."""
+    """An entry of a catalogue that cannot be used: the reason, and its object's names that could be read."""
 
     problem: str
     names: tuple[str, ...] = ()
@@ -106,7 +106,10 @@ Entry = Elements | BrokenEntry
 
 
 def teme(elements: Elements) -> Callable[[Instant], Vector]:
-    """Return a function that places an object in the true equator and mean equinox of date, by SGP4. [m]
+    """Return a function from an instant to the position of an object by SGP4. [m]
+
+    The axes are those of the true equator and mean equinox of date (TEME).
+
 
     Raises
     ------
@@ -147,7 +150,7 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
 
 
 def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
-    """Return a function with the positions of `place` without their rounding steps. [m]
+    """Return a function like `place`, from an instant to a position, but without rounding steps. [m]
 
     These steps grow with the time from the epoch of the elements. SGP4 counts minutes and angles from the epoch,
     so a position is rounded to 2e-6 m a week from the epoch, and to 4e-5 m 100 days from the epoch. A polynomial of
@@ -181,7 +184,7 @@ def orbit_of(
 
     If several epochs are equally near, the last elements are used. `entries` are the entries of a file. The other
     arguments are those of `OrbitFormat.read`. `object_name` is a name or a catalogue number. Broken entries of
-    other objects are left out, and counted in the words of the orbit. Raises `PathFileError` in these cases: there
+    other objects are left out, and counted in `Orbit.words`. Raises `PathFileError` in these cases: there
     are no elements; there are elements of several objects and no name; an entry of the object is broken; an entry is
     broken and no object is named; SGP4 is missing or refuses the elements.
     """
@@ -421,7 +424,7 @@ def _epoch(line: str, location: str) -> Instant:
 
 
 def _drag(line: str, location: str) -> float:
-    """Drag term B* from five digits after an implied decimal point, and an exponent of a sign and a digit."""
+    """Drag term B*, written as five digits after an implied decimal point, and a signed exponent of one digit."""
     text = line[53:61].strip()
     match = re.fullmatch(r"([+-]?)\.?(\d{1,5})\s?([+-]\d)", text, re.ASCII)
     if match is None:
@@ -435,7 +438,10 @@ _VERSION_KEYWORD = "CCSDS_OMM_VERS"
 
 @dataclass(frozen=True, kw_only=True)
 class _Message:
-    """A message: its keywords and values, any fault of its form, and whether all mandatory keywords are required."""
+    """An orbit mean-elements message as read: its keywords and values.
+
+    `problem` is a fault of its form, or empty. `is_complete` is whether all mandatory keywords are required.
+    """
 
     where: str
     leaves: Mapping[str, object]
@@ -472,7 +478,7 @@ def read_omm(
 
 
 def _entry(message: _Message, orientation: Orientation) -> Entry:
-    """Elements of a message, or a broken entry with its fault."""
+    """Convert a message to mean elements, or to a `BrokenEntry` if the message cannot be used."""
     try:
         if message.problem:
             raise PathFileError(message.problem)
@@ -498,7 +504,10 @@ def _from_markup(data: bytes, name: str) -> Iterator[_Message]:
 
 
 def _from_keywords(text: str, name: str) -> Iterator[_Message]:
-    """Split a text with a keyword and a value in each line into messages. Each message begins with its version."""
+    """Split a text into messages, from lines with a keyword and a value.
+
+    A keyword for the version begins each message.
+    """
     leaves: dict[str, str] = {}
     first_line, problem = 0, ""
     for line_number, line in enumerate(text.split("\n"), 1):

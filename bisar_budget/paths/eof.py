@@ -99,12 +99,12 @@ def read_eof(
 
 
 def _dropped(repeated: int) -> str:
-    """Words for the number of repeated state vectors, which occur in joined files; empty if there are none."""
+    """Note on the number of repeated state vectors, which occur in joined files; empty if there are none."""
     return f", {repeated} repeated state vector{'s' * (repeated > 1)} left out" if repeated else ""
 
 
 def _short(satellite: str) -> str:
-    """Short name of a satellite, such as `s1a` for `Sentinel-1A`."""
+    """Short name of a Sentinel satellite for comparisons, such as `s1a` for `Sentinel-1A`."""
     return object_key(satellite).replace("sentinel-", "s").replace("sentinel", "s").replace(" ", "")
 
 
@@ -116,8 +116,8 @@ def _text(file: MessageElement, key: str) -> str | None:
 def _samples(file: MessageElement, system: str, name: str) -> tuple[list[Sample], list[int], list[str], int]:
     """Read the state vectors of a file, without repetitions.
 
-    Returns the state vectors, their lines, the qualities that are not nominal, and the number of repeated state
-    vectors.
+    Returns the state vectors, the numbers of their lines, all stated qualities other than nominal, and the number of
+    repeated state vectors.
     """
     samples: list[Sample] = []
     lines: list[int] = []

@@ -65,7 +65,7 @@ class Segment:
     samples : sequence of Sample
         Times in TAI, positions and velocities.
     first, last : Instant
-        First and last useable time, in TAI.
+        First and last useable time, in TAI. Between them the segment may be interpolated.
     where : str
         File and line, for messages.
     words : str
@@ -81,7 +81,7 @@ class Segment:
     covariances : sequence of EpochCovariance
         Covariances that the file states at epochs.
     remarks : tuple of str
-        Warnings.
+        Warnings about the segment.
     """
 
     object: str
@@ -108,13 +108,13 @@ def orbit_through(
 ) -> Orbit:
     """Orbit of an object through the segment that contains the middle of the aperture.
 
-    If there are several such segments, the segment that reaches farthest around the middle is used for all instants.
-    The error of the interpolation is estimated from the difference to an interpolation with two more degrees. An
-    error of 1 m or more gives a warning in `Orbit.doubts`.
+    If there are several such segments, the one whose nearer end is farthest from the middle is used for all instants.
+    The error of the interpolation is estimated: it is the distance to a polynomial with two more degrees. An error of
+    1 m or more gives a warning in `Orbit.doubts`.
 
     `segments` are the segments of a file. The other arguments are those of `OrbitFormat.read`. Raises `PathFileError`
-    if several objects are possible, if the file has no position at `center`, or if it is too sparse there.
-    `Orbit.place` raises it outside the span.
+    if several objects are possible, if the file has no position at `center`, or if its samples there are too far
+    apart. `Orbit.place` raises it outside the span of the segment.
     """
     if not segments:
         raise PathFileError(f"{name}: has no ephemeris")
@@ -124,7 +124,7 @@ def orbit_through(
 
 
 class _Between:
-    """Orbit through the samples of a segment."""
+    """Interpolation of a segment, from which `orbit` makes an `Orbit`."""
 
     def __init__(
         self, segment: Segment, interpolation: Interpolation, orientation: Orientation, center: Instant
@@ -218,12 +218,12 @@ class _Between:
 
 
 def every(samples: Sequence[Sample]) -> str:
-    """Words for the median step between the states of an ephemeris."""
+    """Text for reports about the median time between the samples of an ephemeris."""
     return f"one state every {minutes(usual_step(samples))}"
 
 
 def minutes(duration_s: float) -> str:
-    """Text of a duration [s], in seconds below one minute and otherwise in minutes."""
+    """Write a duration [s] as text: in seconds if it is below one minute, and otherwise in minutes."""
     return f"{duration_s / 60:.3g} min" if duration_s >= 60 else f"{duration_s:.3g} s"
 
 
@@ -248,8 +248,9 @@ def _times_around(samples: Sequence[Sample], time: Instant) -> tuple[Instant, In
 def _error_around(samples: Sequence[Sample], time: Instant, interpolation: Interpolation) -> float:
     """Estimated error of an interpolation near a time: its distance from an interpolation with two more degrees. [m]
 
-    It is the larger distance at the time itself and midway between the samples around it. If there are too few
-    samples for two more degrees, the second interpolation has two degrees less.
+    The distance is taken at the time itself and midway between the samples around it, and the larger one counts. If
+    there are too few samples for two more degrees, the second interpolation has two degrees less. The result is
+    infinite if this is not possible either.
     """
     step = 1 if interpolation.is_hermite else 2
     nodes, is_hermite = interpolation.nodes, interpolation.is_hermite
@@ -267,7 +268,7 @@ def _error_around(samples: Sequence[Sample], time: Instant, interpolation: Inter
 
 
 def _fitting(samples: Sequence[Sample], center: Instant) -> Interpolation:
-    """Lagrange interpolation with the smallest estimated error around an instant."""
+    """Choose the degree of the Lagrange interpolation whose estimated error around an instant is smallest."""
     candidates = [Interpolation(False, degree) for degree in _TRIED_DEGREES if degree + 3 <= len(samples)]
     if not candidates:
         return Interpolation(False, min(DEFAULT_DEGREE, len(samples) - 1))
@@ -276,7 +277,10 @@ def _fitting(samples: Sequence[Sample], center: Instant) -> Interpolation:
 
 
 def _segment_at(segments: Sequence[Segment], name: str, center: Instant) -> Segment:
-    """Segment that contains an instant; if there are several, the segment that reaches farthest around it."""
+    """Segment that contains an instant.
+
+    If there are several, the result is the segment whose nearer end is farthest from the instant.
+    """
     time = tai(center)
     useable = [segment for segment in segments if segment.is_useable(time)]
     if not useable:
@@ -289,10 +293,11 @@ def _segment_at(segments: Sequence[Segment], name: str, center: Instant) -> Segm
 
 
 def velocity_error(samples: Sequence[Sample]) -> float:
-    """Largest relative difference between stated velocities and the velocities of the positions.
+    """Largest relative difference between the velocities of samples and the rate of change of their positions.
 
-    About sixteen pairs of neighbouring samples are compared, because near a pole the Earth's rotation hardly moves a
-    position. The result is 0 for too few samples, and NaN if a difference is not finite.
+    About sixteen pairs of neighbouring samples are compared. One pair is not enough: velocities that are relative to
+    the wrong axes hardly differ near a pole, where the Earth's rotation hardly moves a position. The result is 0 for
+    too few samples, and NaN if a difference is not finite.
     """
     last = len(samples) - _NEIGHBOUR_SAMPLES
     if last < _NEIGHBOUR_SAMPLES:

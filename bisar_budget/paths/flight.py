@@ -1,9 +1,9 @@
 """The path of a platform from a file, and its conversion to the function of slow time that a budget uses.
 
-All commands take a path as one polynomial over the aperture, or as several polynomials in pieces. An orbit gives a
-position at any time, and its polynomial interpolates positions. A log gives measured fixes. A polynomial or a spline
-smooths them by least squares; a spline has as many pieces as the log needs. Both kinds of path state their distance
-from the positions of the file.
+All commands take a path as one polynomial over the aperture, or as several polynomials, each over a piece of the
+aperture. An orbit gives a position at any time, and its polynomial interpolates such positions. A log gives measured
+fixes. A polynomial or a spline smooths them by least squares; a spline has as many pieces as the log needs. Paths
+from orbits and from logs state their distance from the positions of the file.
 """
 
 import math
@@ -50,33 +50,35 @@ class SmoothingSettings:
     max_pieces : int
         Largest number of pieces of a spline.
     tried_coefficients, tried_ratio : int
-        Further pieces are tried, even without improvement, up to the larger of two numbers of coefficients:
-        `tried_coefficients`, enough for 40 full circles, and `tried_ratio` times the number of the best path so far.
+        Limits of the search for a better spline. Splines with more pieces are tried, even if they do not improve the
+        path, up to the larger of two numbers of coefficients: `tried_coefficients`, which is enough for 40 full
+        circles, and `tried_ratio` times the number of coefficients of the best path so far.
     clean_rms_m : float
         Root mean square of residuals below which a path gets no further pieces. [m]
     white_sigmas : float
-        If the mean product of neighbouring residuals is at most this number of its standard deviations, the
-        residuals count as white noise.
+        The residuals count as white noise if the mean product of neighbouring residuals is at most this number of
+        standard deviations of this mean.
     min_samples : int
         Smallest number of times over the aperture at which the error of a path is sampled.
     samples_per_piece : int
         Smallest number of such times in a piece.
     mode_fraction : float
-        Noise modes smaller than this fraction of the largest mode are left out as rounding.
+        Modes of a `PathNoise` smaller than this fraction of the largest mode are left out as rounding.
     stretch_ratio, widest_ratio : float
-        Ratio of a stretch to the next narrower stretch, and of the widest to the narrowest stretch.
+        Stretches of increasing duration are fitted. `stretch_ratio` is the ratio of the duration of a stretch to that
+        of the next shorter stretch, and `widest_ratio` the ratio of the longest to the shortest.
     max_fitted_fixes : int
         Largest number of fixes in a stretch.
     negligible_noise_m : float
-        If the error of the path due to noise is smaller, no wider stretch is tried. This error is negligible at any
-        carrier frequency. [m]
+        Error of the path due to noise below which no longer stretch is tried. This error is negligible at any carrier
+        frequency. [m]
     chance_factor : float
-        The squared difference of two fits counts as noise up to this factor times its variance.
+        The squared difference of two fits counts as noise up to this factor times its expected variance.
     hopeless_ratio : float
-        If the squared predicted error exceeds the smallest one by this ratio, no wider stretch is tried.
+        No longer stretch is tried if the squared predicted error exceeds the smallest one so far by this ratio.
     residual_ratio : float
-        If the residual in the aperture grows by more than this ratio, a wider fit is rejected, because it does not
-        follow the path.
+        The fit of a longer stretch is rejected if the residual in the aperture grows by more than this ratio, because
+        the fit then does not follow the path.
     stray_ratio, min_stray_m : float
         A warning names a fix whose residual is larger than `stray_ratio` times the median residual plus
         `min_stray_m` [m]. Noise of thousands of fixes reaches a ratio of 4.
@@ -111,7 +113,10 @@ NO_MATRIX: Matrix = ((0.0,) * 3,) * 3
 
 
 class PathFileError(Exception):
-    """Error for a file that gives no path. The message names the file, and its line, byte or record.
+    """Raised for a file from which no path can be read.
+
+    The message names the file, and its line, byte or record.
+
 
     `accepted` describes an accepted file, and `hint` a remedy. `key` is the key of the mission file that contradicts
     the file; it is empty if the file itself is wrong. `spans` are the times that the file covers, if it does not
@@ -137,7 +142,10 @@ def hold_to_bytes(data: bytes, max_bytes: int, name: str) -> None:
 
 
 class PathDoubt(NamedTuple):
-    """Uncertainty of a path: the largest distance `size` [m] of the true path from it, and its cause in `words`."""
+    """Uncertainty of a path at an instant: its `size` [m], and its cause in `words`.
+
+    The size is the largest distance between the path and the true path.
+    """
 
     size: float
     words: str
@@ -148,7 +156,7 @@ NO_DOUBT = PathDoubt(0.0, "")
 
 @dataclass(frozen=True)
 class Orbit:
-    """A path that is known at every instant of a span.
+    """Path of a satellite, which is known at every instant of a span.
 
     Attributes
     ----------
@@ -157,21 +165,22 @@ class Orbit:
     words : str
         Description of the orbit for reports.
     span : tuple of Instant, optional
-        First and last instant.
+        First and last instant of the ephemeris; None for mean elements.
     epoch : Instant, optional
-        Epoch of the elements.
+        Epoch of the mean elements; None for an ephemeris.
     doubts : callable
         Function from an instant to warnings about an unusually large uncertainty.
     doubt : callable
         Function from an instant to the uncertainty of the orbit as a `PathDoubt`, with its size in m.
     remedy : str
-        Advice how to reduce the uncertainty.
+        Advice on how to reduce the uncertainty.
     is_turned : bool
         Whether the file states the orbit in axes that are not fixed to the Earth.
     turning_doubt, turning_doubts : callable
         The parts of `doubt` and `doubts` that are due to the Earth's orientation.
     stated : callable
-        Function from an instant to the accuracy that the file states, along Earth-fixed axes, or None.
+        Function from an instant to the accuracy that the file states, along Earth-fixed axes. Its result is None if
+        the file states none.
     """
 
     place: Callable[[Instant], Vector]
@@ -187,9 +196,10 @@ class Orbit:
     stated: Callable[[Instant], StatedAccuracy | None] = lambda _: None
 
     def as_planned(self) -> "Orbit":
-        """The orbit as a plan that the satellite follows exactly.
+        """Return the orbit as a plan that the satellite follows exactly.
 
-        Its uncertainty is then only that of the Earth's orientation, without the age and the interpolation.
+        Its uncertainty is only that of the Earth's orientation. The age of the elements and the error of the
+        interpolation do not count.
         """
         words = f"{self.words}, flown as planned: its age and its interpolation do not count"
         return replace(self, words=words, doubt=self.turning_doubt, doubts=self.turning_doubts)
@@ -205,7 +215,10 @@ class Orbit:
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """Unusable records of a log: for each, the number of usable records before it (m,), and a message."""
+    """The m unusable records of a log.
+
+    `before` (m,) is the number of usable records before each of them. `faults` are messages about them.
+    """
 
     before: NDArray[np.int64]
     faults: Sequence[str]
@@ -213,7 +226,7 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """Fixes of a flight.
+    """Fixes of a flight: times and positions from a log, and the accuracy that the log states.
 
     Attributes
     ----------
@@ -238,9 +251,11 @@ class Log:
     left_out : LeftOut, optional
         Records that cannot be used and are not among the fixes.
     tracks : tuple of Log
-        Logs of all tracks of a file with several tracks, if no key chooses a track. The log itself is then the first.
+        Logs of all tracks of a file with several tracks, if the mission file does not choose one. The log itself is
+        then that of the first track.
     grid : (3, 3)
-        One step of each coordinate as the log writes it, in the axes of the positions. [m]
+        Vectors of one rounding step of each coordinate that the log writes, in the axes of the positions. [m] A zero
+        vector means that no rounding is found.
     """
 
     times: Floats
@@ -259,7 +274,7 @@ class Log:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A path by polynomials, and its distance from the positions of its file.
+    """A path that consists of polynomials, and its distance from the positions of its file.
 
     Attributes
     ----------
@@ -272,9 +287,9 @@ class Fitted:
     samples : int
         Number of fixes of a log that the path smooths; 0 for an orbit, which is interpolated.
     doubts : tuple of str
-        Warnings.
+        Warnings about the path.
     stretch : float
-        Duration of the fixes that the path smooths. [s]
+        Length of the time span around mid-aperture whose fixes the path smooths. [s]
     missed : float
         Root mean square distance of a fix of the log from the path that is fitted without the fix. [m]
     residual : (3, 3)
@@ -282,9 +297,10 @@ class Fitted:
     correlation_time : float
         Correlation time of a Gauss-Markov process that is correlated like the residuals. [s]
     acceleration_noise : (3, 3)
-        Covariance of the acceleration error due to the noise of the fit and the smear of a wider stretch. For one
-        polynomial, it is the error at mid-aperture. For several pieces, it is the acceleration of the parabola that
-        fits the error over the aperture. [m²/s⁴]
+        Covariance of the error of the acceleration. [m²/s⁴] The causes are noise of the fixes, and motion that is
+        smeared if fixes beyond the shortest time span are smoothed. For one polynomial, it is the error at
+        mid-aperture. For several pieces, it is the acceleration of the parabola that fits the error over the
+        aperture.
     path_noise : PathNoise, optional
         Error of the path over the aperture due to the same causes.
     pieces : int
@@ -309,7 +325,7 @@ class Fitted:
 def interpolated(
     positions_at: Callable[[Floats], Floats], aperture_time_s: float, widest_s: float = math.inf
 ) -> Fitted:
-    """Polynomial path through positions at Chebyshev points around the aperture.
+    """Polynomial path that interpolates an orbit: it goes through positions at Chebyshev points around the aperture.
 
     Parameters
     ----------
@@ -336,9 +352,10 @@ def interpolated(
 
 
 def stretch_around(times: Floats, aperture_time_s: float) -> float:
-    """Length of the shortest time span around mid-aperture whose fixes are smoothed. [s]
+    """Length of the shortest time span around mid-aperture whose fixes can be smoothed. [s]
 
-    The span is the aperture, or longer until it contains nine fixes: a log at 1 Hz has only three fixes in 3 s.
+    The span is the aperture. If the aperture has fewer than nine fixes, the span is just long enough for nine: a log
+    at 1 Hz has only three fixes in 3 s.
     """
     distances = np.sort(np.abs(times))[: _SMOOTHING.noise_fixes]
     return max(aperture_time_s, 2 * float(distances.max(initial=0.0)))
@@ -359,7 +376,7 @@ class _SmoothFit:
     residuals : (n, 3)
         Positions of the fixes minus the path. [m]
     independent : float
-        Number of independent fixes with the same information.
+        Number of independent fixes that would contain the same information as the correlated fixes.
     root : (coefficients, coefficients)
         Matrix whose product with its transpose is the covariance of the coefficients for white fixes of variance 1.
     spline : SplineFit, optional
@@ -388,21 +405,24 @@ class _SmoothFit:
 
     @property
     def covariance(self) -> Floats:
-        """Covariance of the coefficients for fixes of variance 1. Correlated fixes count as fewer fixes."""
+        """Covariance of the coefficients for fixes of variance 1.
+
+        Correlated fixes count as fewer fixes, which enlarges the covariance.
+        """
         return np.asarray(self.root @ self.root.T * (len(self.residuals) / self.independent))
 
     @property
     def variances(self) -> Floats:
-        """Variance of a fix on each axis, (3,). [m²]"""
+        """Variance of the noise of a fix along each axis, (3,), estimated from the residuals. [m²]"""
         variances: Floats = (self.residuals**2).sum(axis=0) / max(len(self.residuals) - len(self.series), 1)
         return variances
 
     @property
     def common_motion(self) -> tuple[float, float]:
-        """Mean product of each residual and the next residual, and its standard deviation. [m²]
+        """Mean scalar product of each residual and the next residual, and the standard deviation of this mean. [m²]
 
-        The mean is zero for white fixes. A fit reduces the product of neighbouring residuals of white noise; the mean
-        is corrected for this.
+        For fixes with white noise the expected mean is zero. The fit itself would make it negative; the mean is
+        corrected for this.
         """
         products = (self.residuals[1:] * self.residuals[:-1]).sum(axis=1)
         mean, square = float(products.mean()), float(np.mean(np.sum(self.residuals**2, axis=1)))
@@ -415,13 +435,13 @@ class _SmoothFit:
         return math.sqrt(float(np.mean(np.sum(self.residuals**2, axis=1))))
 
     def basis(self, times: Floats) -> Floats:
-        """Matrix (m, coefficients) from coefficients to positions at slow times (m,) [s]."""
+        """Matrix (m, coefficients) that converts coefficients to positions at slow times (m,) [s]."""
         if self.spline is not None:
             return spline_basis(times, self.spline.edges)
         return np.asarray(legendre.legvander(times / self.half_s, self.order))
 
     def places(self, times: Floats) -> Floats:
-        """Positions (m, 3) [m] at slow times (m,) [s]."""
+        """Positions (m, 3) [m] on the path at slow times (m,) [s]."""
         positions: Floats = self.basis(times) @ self.series
         return positions if self.spline is None else positions + self.spline.center
 
@@ -430,7 +450,7 @@ class _SmoothFit:
         return np.asarray(np.sum((self.basis(times) @ self.root) ** 2, axis=1))
 
     def state(self) -> PlatformState:
-        """The path as a function of slow time."""
+        """The path as a `PlatformState`, a function of slow time."""
         return path_of(powers_of(self.series, self.half_s)) if self.spline is None else self.spline.state()
 
     def sample_times(self, aperture_time_s: float) -> Floats:
@@ -439,9 +459,9 @@ class _SmoothFit:
         return np.asarray(aperture_time_s / 2 * np.linspace(-1, 1, count))
 
     def noise(self, times: Floats, left_out: Floats) -> float:
-        """Mean square of the path's error over times (m,) due to noise of the fixes. [m²]
+        """Mean square of the path's error due to noise of the fixes, over slow times (m,). [m²]
 
-        The projection `left_out` (m, m) is removed from the error first.
+        `left_out` (m, m) is a projection, for example onto straight lines. This part of the error does not count.
         """
         basis = self.basis(times)
         basis = basis - left_out @ basis
@@ -464,7 +484,10 @@ class _SmoothFit:
         return np.diag(variance * self.variances)
 
     def path_noise(self, aperture_time_s: float, excess: float) -> PathNoise:
-        """Error of the path over the aperture due to noise of the fixes, with its variance multiplied by `excess`."""
+        """Error of the path over the aperture due to noise of the fixes.
+
+        Its variance is multiplied by `excess`, the error ratio of `_widened`.
+        """
         sample_times, half_s = self.sample_times(aperture_time_s), aperture_time_s / 2
         through = np.linalg.pinv(legendre.legvander(sample_times / half_s, _SMOOTHING.max_order)) @ self.basis(
             sample_times
@@ -489,7 +512,8 @@ def _information(residuals: Floats, coefficients: int, independent: float) -> fl
     """Information criterion of a fit with residuals (n, 3) [m]. A smaller value is better.
 
     Each axis has its own noise, and the same number of coefficients. The last factor of the cost is that of AICc
-    (Hurvich & Tsai 1989). It corrects for a small number of fixes, which chance fits too well.
+    (Hurvich & Tsai 1989). It corrects for a small number of fixes, to which a path with many coefficients fits too
+    well by chance. `independent` is the number of independent fixes with the same information.
     """
     count, squares = len(residuals), (residuals**2).mean(axis=0) + _ROUNDING_M**2
     cost = 3 * coefficients * math.log(independent) * count / (count - coefficients - 1)
@@ -499,7 +523,8 @@ def _information(residuals: Floats, coefficients: int, independent: float) -> fl
 def _fit(times: Floats, log_positions: Floats, half_s: float, *, may_have_pieces: bool) -> _SmoothFit:
     """Fit the path with the smallest Bayesian information criterion (Schwarz 1978) to the fixes of a stretch.
 
-    The path is a polynomial, or with `may_have_pieces` a spline if its criterion is smaller.
+    The path is a polynomial. With `may_have_pieces` it is a spline if the criterion of the spline is smaller.
+    `half_s` is half the length of the stretch. [s]
     """
     inside = np.abs(times) <= half_s * (1 + 1e-9)
     times_inside, positions, count = times[inside], log_positions[inside], int(inside.sum())
@@ -514,9 +539,10 @@ def _fit(times: Floats, log_positions: Floats, half_s: float, *, may_have_pieces
 
 
 def _in_pieces(fit: _SmoothFit, positions: Floats) -> _SmoothFit:
-    """Replace a polynomial by a spline through the same fixes (n, 3) [m] if its information criterion is smaller.
+    """Replace a polynomial by a spline fitted to the same fixes (n, 3) [m] if the spline's criterion is smaller.
 
-    Pieces are halved, see `splines`, as long as neighbouring residuals are correlated.
+    The criterion is that of `_information`. Pieces are halved, see `splines`, as long as neighbouring residuals are
+    correlated.
     """
     best = newest = fit
     edges: Floats | None = np.array([-fit.half_s, fit.half_s])
@@ -545,18 +571,19 @@ def _in_pieces(fit: _SmoothFit, positions: Floats) -> _SmoothFit:
 def _widened(
     narrowest: _SmoothFit, times: Floats, positions: Floats, aperture_time_s: float, widest_s: float
 ) -> tuple[_SmoothFit, float]:
-    """Find the fit with the smallest predicted error over the aperture; return it and its error ratio.
+    """Find the length of the stretch whose fit has the smallest predicted error over the aperture.
 
-    The error ratio is the squared predicted error divided by the squared error due to noise.
+    Returns the fit and its error ratio, which is the squared predicted error divided by the squared error due to
+    noise.
 
     A longer stretch averages more noise: the acceleration of a parabola through n fixes of noise σ over the time T
     has an error of σ√(720/(n·T⁴)). But a longer stretch may smear the motion of the platform. The smear is unknown,
-    and is estimated from the distance between the path and the paths of narrower stretches. The expected square of
-    this distance is the square of the smear plus the noise that the wider fit avoids. The excess over that noise
-    counts as smear (rule of Goldenshluger & Lepski 2011; Lepski 1991).
+    and is estimated from the distance between the path and the paths of shorter stretches. The expected square of
+    this distance is the square of the smear plus the squared noise that the longer stretch avoids. The excess over
+    that noise counts as smear (rule of Goldenshluger & Lepski 2011; Lepski 1991).
 
-    Only the error beyond a straight line is minimised, because it defocuses. In addition, the error of the whole path
-    and the residual in the aperture must not grow.
+    Only the part of the error that is not a straight line in slow time is minimised, because this part defocuses. In
+    addition, the error of the whole path and the residual in the aperture must not grow.
     """
     sample_times, has_pieces = narrowest.sample_times(aperture_time_s), narrowest.spline is not None
     straight = np.linalg.qr(np.vander(sample_times, 2))[0]
@@ -596,7 +623,10 @@ def _widened(
 
 
 def _residual_within(fit: _SmoothFit, aperture_time_s: float) -> float:
-    """Mean square of the residuals in the aperture, or of all residuals if the aperture has too few fixes. [m²]"""
+    """Mean square of the residuals of the fixes in the aperture. [m²]
+
+    If the aperture has too few fixes, the residuals of all fixes of the stretch are used.
+    """
     inside = np.abs(fit.times) <= aperture_time_s / 2 * (1 + 1e-9)
     residuals = fit.residuals[inside] if inside.sum() >= _SMOOTHING.noise_fixes else fit.residuals
     count, coefficients = len(fit.residuals), len(fit.series)
@@ -612,14 +642,14 @@ def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s:
     vibration. Fixes with correlated residuals count as fewer fixes, so that a slow error of the log, which looks like
     motion, is not fitted.
 
-    The stretch is the shortest stretch around the aperture, or a longer stretch with a smaller predicted error of the
-    path, see `_widened`. This matters because noise of the log becomes an acceleration of the path, which makes
-    allowables wrong.
+    The stretch is the time span whose fixes are smoothed. It is the shortest one around the aperture, or a longer one
+    with a smaller predicted error of the path, see `_widened`. This matters because noise of the log becomes an
+    acceleration of the path, which makes allowables wrong.
 
-    `missed` is computed by leaving out each fix in the aperture, and the fixes next to it, in turn (Allen 1974). It
-    contains the noise, the motion that the polynomial does not follow, and the motion between two fixes, which a log
-    with a low rate does not show. If the path has more noise than a fix, as in a gap, `missed` is larger by that
-    ratio.
+    `Fitted.missed` is computed by leaving out one fix after the other (Allen 1974). These are the fixes in the
+    aperture, and the ones directly before and after it. `missed` contains the noise, the motion that the polynomial
+    does not follow, and the motion between two fixes, which a log with a low rate does not show. If the path has more
+    noise than a fix, as in a gap, `missed` is larger by that ratio.
 
     Parameters
     ----------
@@ -691,7 +721,7 @@ def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s:
 
 
 def around_aperture(times: Floats, aperture_time_s: float) -> slice:
-    """Slice of the fixes in the aperture and of the fixes directly before and after it, from slow times (n,) [s].
+    """Slice that selects the fixes in the aperture, and one before and one after it, from slow times (n,) [s].
 
     The accuracy of a log is the largest sigma of these fixes. The mean sigma would be smaller than the error of the
     log at some times of the aperture.
@@ -728,8 +758,8 @@ def slow_times(
     ------
     PathFileError
         The log begins or ends more than one median interval inside the aperture, has a gap in the aperture, or does
-        not have the clock on which the middle is given. A gap is longer than five median intervals. The median is the
-        smaller one of the medians in the aperture and in the whole log.
+        not have the clock on which the middle is given. A gap is longer than five median intervals. The median
+        interval is that of the fixes in the aperture or that of the whole log, whichever is smaller.
     """
     times, start = log.times, log.start
     _hold_to_clock(log, center, center_seconds, name)
@@ -748,7 +778,7 @@ def slow_times(
     slow, half = times - middle, aperture_time_s / 2
 
     def cause(index: int) -> str:
-        """Message about an unusable record directly before the fix of an index; empty if there is none."""
+        """Message about an unusable record directly before the fix with a given index; empty if there is none."""
         if log.left_out is None or index not in log.left_out.before:
             return ""
         return f"; {log.left_out.faults[int((log.left_out.before == index).argmax())]}"
@@ -800,7 +830,7 @@ def _hold_to_clock(log: Log, center: Instant | None, center_seconds: float | Non
 
 
 def dated(log: Log, center: Instant | None) -> Log:
-    """Add a date to a log that has only times of day: the date that brings it nearest to the middle of the aperture.
+    """Add a date to a log that has only times of day, so that it is nearest to the middle of the aperture.
 
     Any other log is returned unchanged, and so is every log if `center` is None.
     """
@@ -856,7 +886,8 @@ def hold_to_usable_records(log: Log, times: Floats, stretch_s: float) -> None:
     Parameters
     ----------
     log : Log
-        The log. A left-out record lies in the stretch if the usable record before or after it does.
+        The log. An unusable record has no time. It counts as in the stretch if the interval between the usable fixes
+        around it overlaps the stretch.
     times : (n,) ndarray
         Slow times of the log. [s]
     stretch_s : float
@@ -865,7 +896,7 @@ def hold_to_usable_records(log: Log, times: Floats, stretch_s: float) -> None:
     Raises
     ------
     PathFileError
-        The stretch has an unusable record. The message names the first.
+        The stretch has an unusable record. The message names the first one.
     """
     if log.left_out is None:
         return
@@ -881,15 +912,15 @@ def hold_to_usable_records(log: Log, times: Floats, stretch_s: float) -> None:
 
 
 def widest_stretch(log: Log, times: Floats, aperture_time_s: float) -> float:
-    """Longest time around the middle of an aperture within which a log is complete. [s]
+    """Longest time span around the middle of an aperture within which a log is complete. [s]
 
-    It ends before an unusable record, and before a gap of more than five median intervals. These do not make the log
-    unusable if they lie outside the stretch that the path needs, but fixes beyond them are not used.
+    It ends before an unusable record, and before a gap of more than five median intervals. If these lie outside the
+    shortest stretch that the path needs, the log can be used, but not its fixes beyond them.
 
     Parameters
     ----------
     log : Log
-        The log. A left-out record lies between the usable records around it.
+        The log. An unusable record has no time, and may lie anywhere between the usable fixes around it.
     times : (n,) ndarray
         Slow times of the log. [s]
     aperture_time_s : float
@@ -912,10 +943,10 @@ def widest_stretch(log: Log, times: Floats, aperture_time_s: float) -> float:
 
 
 def _independent(residuals: Floats) -> float:
-    """Number of independent samples with the same information as residuals (n, 3).
+    """Number of independent samples that would contain as much information as correlated residuals (n, 3).
 
     The number is n for white noise. Otherwise, n is divided by the sum of the autocorrelation up to its first zero.
-    All axes count equally.
+    The autocorrelation is the mean over the three axes.
     """
     count = len(residuals)
     spectrum = np.abs(np.fft.rfft(residuals, 2 * count, axis=0)) ** 2
@@ -949,9 +980,10 @@ def least_squares(normalised_times: Floats, positions: Floats, order: int) -> tu
 def powers_of(
     coefficients: Floats, half_s: float, convert: Callable[[Floats], NDArray[np.floating]] = legendre.leg2poly
 ) -> Floats:
-    """Coefficients (order + 1, 3) of τ⁰, τ¹, … of a series over -`half_s` … `half_s`. [m], [m/s], …
+    """Convert the coefficients of a series over -`half_s` … `half_s` to coefficients of τ⁰, τ¹, …. [m], [m/s], …
 
-    `convert` converts coefficients of the series to coefficients of powers. The default is for a Legendre series.
+    Coefficients and result are (order + 1, 3). `convert` does this for one axis and a series over -1 … 1; the default
+    is for a Legendre series.
     """
     powers = np.zeros_like(coefficients)
     for axis in range(3):
@@ -966,7 +998,10 @@ def _vector(values: Floats) -> Vector:
 
 
 def path_of(powers: Iterable[Iterable[float]]) -> PlatformState:
-    """Path from at least two coefficients, of τ⁰, τ¹, …. Zero coefficients of the highest powers are left out."""
+    """Path that is a polynomial of slow time, from its coefficients of τ⁰, τ¹, … (at least two).
+
+    Zero coefficients of the highest powers are left out.
+    """
     vectors: list[Vector] = [(float(x), float(y), float(z)) for x, y, z in powers]
     position, velocity, (x, y, z), *bends = vectors if len(vectors) > 2 else [*vectors, STRAIGHT]
     while bends and bends[-1] == STRAIGHT:
@@ -976,7 +1011,7 @@ def path_of(powers: Iterable[Iterable[float]]) -> PlatformState:
 
 # ---------------------------------------------------------------------- positions between the samples of a table
 class Sample(NamedTuple):
-    """A sample of an orbit: time of a time system without leap seconds, position [m] and velocity [m/s]."""
+    """A sample of an orbit: time in a time system without leap seconds, position [m] and velocity [m/s]."""
 
     time: Instant
     place: Vector
@@ -986,8 +1021,8 @@ class Sample(NamedTuple):
 def interpolate(samples: Sequence[Sample], time: Instant, count: int, is_hermite: bool) -> Vector:
     """Position at a time, interpolated from the `count` samples around it. [m]
 
-    All times between two neighbouring samples use the same samples. Neighbouring intervals both use the sample
-    between them, for even and odd `count`, so the path has no jumps.
+    All times between two neighbouring samples use the same `count` samples. The sample at the boundary of two
+    intervals is among the samples of both intervals, for even and odd `count`. So the path has no jumps.
     """
     after = bisect_right(samples, time, key=lambda sample: sample.time)
     first = min(max(after - (count + 1) // 2, 0), len(samples) - count)
@@ -996,9 +1031,9 @@ def interpolate(samples: Sequence[Sample], time: Instant, count: int, is_hermite
 
 
 def _through(samples: Sequence[Sample], times: Sequence[float], is_hermite: bool) -> Vector:
-    """Value at time 0 of a polynomial through samples: Lagrange's, or Hermite's if velocities are used too.
+    """Position at time 0 on a polynomial through samples: Lagrange's, or Hermite's if velocities are used too. [m]
 
-    `times` are the times of the samples. [s] The result is NaN if it overflows.
+    `times` are the times of the samples, relative to the wanted time. [s] The result is NaN if it overflows.
 
     Sources: Abramowitz & Stegun, equations 25.2.1 and 25.2.2; Burden & Faires, Numerical Analysis, theorem 3.9.
     """

@@ -6,15 +6,15 @@
 
 The time column is `time [s]`, counted from any origin, or it has ISO 8601 time stamps. The stamps of a column `utc`
 end with Z; the stamps of `gpst` and `tai` have no zone. `time [UTC]` means the same as `utc`. A `time` column without
-a unit is in the time scale that the mission file states.
+a unit has time stamps in the time scale that the mission file states.
 
 A position is `latitude` and `longitude` with `height` above the WGS-84 ellipsoid or `altitude` above mean sea level.
 It may also be Earth-fixed `x`, `y`, `z`, or `east`, `north`, `up` from the scene centre. `geoid_separation` converts
 an altitude into a height.
 
 `sigma_east`, `sigma_north` and `sigma_up`, or the names that other programs use, are one-sigma errors of the
-position. A cell in these columns without a number above 0 is ignored. A column that may be an accuracy, but is not a
-known one, is refused. Other columns are not read. Cells are separated by commas, semicolons or tabs. The headers of
+position. A cell in these columns is ignored if it has no number above 0. A column that may be an accuracy, but is not
+known, is refused. Other columns are not read. Cells are separated by commas, semicolons or tabs. The headers of
 some exporters are also accepted; they are listed below.
 """
 
@@ -90,8 +90,8 @@ _CLOCKS_APART_S = 1.0  # accepted drift of an exporter's two clocks, beyond the 
 class _Column(NamedTuple):
     """A column that is read: its name, unit as written, factor to SI, and index in a row. A time stamp has no unit.
 
-    The columns of exporters get the names of plain logs. They may also be `altitude` above mean sea level, `unix`
-    (time since 1970 in UTC), `week` (GPS week), `fix` (kind of fix), or `receiver` (number of the receiver).
+    Columns of exporters get the names of the columns of plain logs. Exporters have further columns: `unix` (time
+    since 1970 in UTC), `week` (GPS week), `fix` (kind of fix), and `receiver` (number of the receiver).
     """
 
     name: str
@@ -101,9 +101,10 @@ class _Column(NamedTuple):
 
 
 class _Vendor(NamedTuple):
-    """An exporter of logs: its name in reports, the column names that identify it, and the meaning of its columns.
+    """A program that exports logs: its name in reports, the column names that identify it, and its columns.
 
-    Column names are in lower case. `least_fix` is the lowest kind of fix that has a height.
+    `columns` are the columns of a plain log by the names that the exporter gives them, in lower case. `least_fix` is
+    the lowest number of a kind of fix that has a height.
     """
 
     words: str
@@ -116,9 +117,9 @@ class _Vendor(NamedTuple):
 class _Header:
     """The header of a log: its line, the delimiter and number of cells, and the columns that are read.
 
-    `numbers` are the columns of numbers. `accuracy` are the columns of position errors, whose cells may be empty.
-    `stamp` is the column of time stamps in the time scale `scale`. `zone` matches the end of a stamp, and decides
-    whether a time zone is required, forbidden or optional.
+    `numbers` are the columns of numbers, except for position errors. `accuracy` are the columns of position errors,
+    whose cells may be empty. `stamp` is the column of time stamps, which are in the time scale `scale`. `zone`
+    matches the end of a stamp; it decides whether a time zone is required, forbidden or optional.
     """
 
     line: int
@@ -133,7 +134,7 @@ class _Header:
 
     @property
     def columns(self) -> tuple[_Column, ...]:
-        """All columns of a table: the columns of numbers, then the columns of position errors."""
+        """All columns of a `_Table` in their order: `numbers`, then `accuracy`."""
         return (*self.numbers, *self.accuracy)
 
     @property
@@ -142,19 +143,19 @@ class _Header:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Names of the three coordinates."""
+        """Names of the three coordinates, such as latitude, longitude and height."""
         return next((kind for kind in _POSITION_COLUMNS if kind[1] in self.names), _GEODETIC)
 
     def index_of(self, name: str) -> int | None:
-        """Index of a column in a table; None if there is no such column."""
+        """Index of the column with a given name in a `_Table`; None if there is no such column."""
         return self.names.index(name) if name in self.names else None
 
 
 class _Table(NamedTuple):
     """Rows of a log: their line numbers (n,), numbers (n, columns) in units of the file, and time stamps.
 
-    A time stamp is split into whole minutes since MJD 0, in seconds, and the remaining seconds. [s] The minutes are
-    NaN if an exporter leaves the stamp out.
+    A time stamp is split into two numbers: `minutes`, the seconds from MJD 0 to the start of its minute, and
+    `seconds` within the minute. [s] `minutes` is NaN if an exporter leaves the stamp out.
     """
 
     lines: NDArray[np.int64]
@@ -164,7 +165,7 @@ class _Table(NamedTuple):
 
 
 def is_csv(data: bytes) -> bool:
-    """Whether the first line that is neither blank nor a comment names columns of positions."""
+    """Whether a file is a CSV log: its first line that is neither blank nor a comment names columns of positions."""
     head = data[:100_000].decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     line = next(filter(_has_content, _dataflash_as_csv(head)), "")
     cells = line.split(max(",;\t", key=line.count))
@@ -210,8 +211,8 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
 def _with_fix(table: _Table, header: _Header, keys: LogKeys, name: str) -> tuple[_Table, int]:
     """Select the rows that have a position; return them and the number of rows without a position.
 
-    The rows of a plain log are unchanged. From the rows of an exporter, those without a fix are left out, and those
-    of other receivers than the chosen one. Raises `PathFileError` if no row has a fix, if there are several receivers
+    The rows of a plain log are unchanged. From the log of an exporter, rows without a fix are left out, and rows of
+    receivers that are not chosen. Raises `PathFileError` if no row has a fix, if there are several receivers
     and the mission file does not choose one, or if it chooses one and the log has no column of receivers.
     """
     receiver = header.index_of("receiver")
@@ -249,9 +250,9 @@ def _hold_to_datum(lines: Sequence[str], name: str) -> None:
 
 
 def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats, Instant | None, str]:
-    """Times of the rows [s], the instant from which they count, and words for the accuracy of this instant.
+    """Times of the rows [s], the instant from which they count, and a text about the accuracy of this instant.
 
-    The instant is in the time scale of the header. It is None if the log does not state it. The words may be empty.
+    The instant is in the time scale of the header. It is None if the log does not state it. The text may be empty.
     """
     time_index = header.index_of("time")
     counted_s = np.zeros(len(table.lines))
@@ -288,11 +289,12 @@ def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats,
 
 
 def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> tuple[Floats, Instant, str]:
-    """Convert the times of a fine clock to UTC with the stamps of a second clock that writes whole seconds.
+    """Convert the times of a fine clock to UTC, with time stamps from a second clock that writes whole seconds.
 
-    Stamps are truncated to whole seconds. So the start is at or after every difference of stamp and time, and less
-    than 1 s after it. These differences bound the start, and the middle between the bounds is taken. Returns the
-    times from the first row on [s], the instant of the first row, and words for the accuracy of UTC. Raises
+    `counted_s` are the times of the fine clock, and `instants` the stamps. [s] Stamps are truncated to whole seconds.
+    So the instant at which the fine clock was 0 is at or after every difference of a stamp and its time, and less
+    than 1 s after it. These differences bound the instant, and the middle between the bounds is taken. Returns the
+    times from the first row on [s], the instant of the first row, and a text about the accuracy of UTC. Raises
     `PathFileError` if there is no stamp, or if the clocks drift apart.
     """
     has_instant = np.isfinite(instants) & records.is_usable
@@ -318,10 +320,10 @@ def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> 
 
 
 def _positions(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) -> Floats:
-    """Coordinates (3, n) along the axes of the header, with latitude and longitude in rad and all others in m.
+    """Coordinates (3, n) that the header names, with latitude and longitude in rad and all others in m.
 
-    An altitude is converted to a height above the ellipsoid. Rows with impossible coordinates are left out of
-    `records`.
+    An altitude is converted to a height above the ellipsoid. Rows with impossible coordinates are marked as unusable
+    in `records`.
     """
     kind = header.axes
     is_geodetic = kind == _GEODETIC
@@ -377,10 +379,10 @@ def _earth_fixed(coordinates: Floats, header: _Header) -> Floats:
 
 
 def _figures(table: _Table, header: _Header, records: LogRecords) -> tuple[dict[str, Floats], str]:
-    """One-sigma errors (n,) [m] by the name of the error, and words for the number of unusable cells.
+    """One-sigma errors (n,) [m] by name, such as `sigma_east`, and a note on the number of unusable cells.
 
-    Rows are left out if a cell has a text that no program writes for a missing value. If a log states both a sigma
-    and its variance, the larger error counts.
+    A row is left out if one of its accuracy cells has a text that no program writes for a missing value. If a log
+    states both a sigma and a variance of the same axis, the larger error counts.
     """
     figures: dict[str, Floats] = {}
     negative = 0
@@ -401,10 +403,10 @@ def _figures(table: _Table, header: _Header, records: LogRecords) -> tuple[dict[
 
 
 def _sigmas(figures: Mapping[str, Floats], header: _Header, positions: Floats) -> Floats | None:
-    """One-sigma errors (n, 3) east, north, up of positions (3, n); NaN for an unknown error. [m]
+    """One-sigma errors (n, 3) east, north, up; NaN for an unknown error. [m]
 
-    If several columns state the error of the same axis, the largest error counts. Returns None if no row states an
-    error.
+    `figures` are errors (n,) by name, from `_figures`, and `positions` are the coordinates (3, n). If several columns
+    state the error of the same axis, the largest error counts. Returns None if no row states an error.
     """
     local, fixed = (
         known_sigmas(np.column_stack([figures[name] for name in names])) if figures.keys() >= set(names) else None
@@ -479,10 +481,11 @@ def _accuracy_columns(
     refuse: Callable[[str], NoReturn],
     level_columns: Mapping[str, _Column] = MappingProxyType({}),
 ) -> tuple[_Column, ...]:
-    """Columns that state errors of positions; `kind` are the names of the coordinates.
+    """Columns that state errors of positions, from the cells of a header.
 
-    `level_columns` are columns that are known already, and come first. `refuse` raises the error for a column that is
-    unclear, given twice, or incomplete without another column.
+    `kind` are the names of the coordinates. `level_columns` are columns of errors that are known already, and come
+    first in the result. `refuse` raises the error for a column that is unclear, given twice, or incomplete without
+    another column.
     """
     columns = dict(level_columns)
     has_covariance = False
@@ -518,11 +521,11 @@ def _accuracy_columns(
 
 
 def _with_plain_heights(columns: dict[str, _Column], refuse: Callable[[str], NoReturn]) -> dict[str, _Column]:
-    """Resolve ambiguous columns of height errors.
+    """Rename columns of errors whose names may mean the height or a horizontal error.
 
-    A `sigma_h` is a horizontal error if the log has a vertical error. It is a height error if the log has an east
-    error and no other error of the height. Any other `sigma_h` is refused. A height error without errors of east and
-    north, beside a horizontal error, becomes a vertical error.
+    A `sigma_h` is a horizontal error if the log has a vertical accuracy. It is a height error if the log has an east
+    error and no other error of the height. Any other `sigma_h` is refused. A `sigma_up` becomes a vertical accuracy
+    if the log has a horizontal accuracy, but no errors of east and north.
     """
     level, vertical = _LEVEL_ACCURACIES
     if "sigma_h" in columns:
@@ -618,7 +621,7 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
 def _vendor_header(
     vendor: _Vendor, cells: Sequence[str], delimiter: str, line: int, where: str, keys: LogKeys
 ) -> _Header:
-    """Read the header of an exporter's log."""
+    """Make the header of a log that a known exporter has written, from the cells of its first line."""
     columns: dict[str, _Column] = {}
     for index, cell in enumerate(cells):
         column = vendor.columns.get(cell.strip().lower())
@@ -659,7 +662,7 @@ def _measured(
     refuse: Callable[[str], NoReturn],
     dimension: units.Dimension | None = None,
 ) -> _Column:
-    """Make a column of numbers; refuse a unit that is missing, unknown or of the wrong dimension."""
+    """Describe a column of numbers; refuse a unit that is missing, unknown or of the wrong dimension."""
     dimension = dimension or _COLUMN_DIMENSIONS.get(name, units.LENGTH)
     example = (
         "time [s]', 'time [UTC]' or 'time [GPST]" if dimension is units.TIME else f"{name} [{_usual(dimension)}]"
@@ -675,7 +678,11 @@ def _measured(
 
 @dataclass(eq=False)
 class _Rows:
-    """Rows read so far, messages about unusable rows by line, and the number of rows that an exporter left empty."""
+    """Rows of a log that are read so far.
+
+    `broken` are messages about unusable rows, by line. `most_broken` is the largest number of such rows. `empty` is
+    the number of rows in which an exporter left numbers out.
+    """
 
     tables: list[_Table]
     broken: dict[int, str]
@@ -684,12 +691,12 @@ class _Rows:
 
     @property
     def table(self) -> _Table:
-        """All rows as one table."""
+        """All rows that are read so far, joined to one table."""
         return _Table(*(np.concatenate(columns) for columns in zip(*self.tables, strict=True)))
 
 
 def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
-    """Read all rows after the header, in chunks of lines, which is fast and needs little memory."""
+    """Read all rows after the header, many lines at once, which is fast and needs little memory."""
     nothing = np.zeros(0)
     empty = _Table(np.zeros(0, dtype=np.int64), np.zeros((0, len(header.columns))), nothing, nothing)
     rows = _Rows([empty], {}, most_left_out(len(lines) - header.line))
@@ -744,7 +751,10 @@ def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name
 
 
 def _is_complete(text: str, header: _Header) -> bool:
-    """Whether no number of a row is missing. A row with a wrong number of cells counts as complete here."""
+    """Whether a row has a text in each column of numbers.
+
+    A row with a wrong number of cells counts as complete here.
+    """
     cells = _cells(text, header.delimiter)
     if isinstance(cells, str) or len(cells) != header.width:
         return True
@@ -752,7 +762,10 @@ def _is_complete(text: str, header: _Header) -> bool:
 
 
 def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
-    """Numbers (n, columns) and time stamps of rows without quotes; None if the rows cannot be read in this way."""
+    """Numbers (n, columns) and time stamps of rows whose cells have no quotes; None if they cannot be read.
+
+    The time stamps are None if the log has no column of time stamps.
+    """
     delimiter = header.delimiter
     if {text.count(delimiter) for text in texts} != {header.width - 1} or any(map(_QUOTED, texts)):
         return None
@@ -774,9 +787,10 @@ def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] |
 
 
 def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
-    """Numbers (n, columns) and time stamps of rows with quotes; None if the rows cannot be read.
+    """Numbers (n, columns) and time stamps of rows whose cells may have quotes; None if they cannot be read.
 
-    This takes six times as long as for rows without quotes.
+    The time stamps are None if the log has no column of time stamps. Reading takes six times as long as by
+    `_plain_cells`.
     """
     try:
         rows = list(csv.reader(texts, delimiter=header.delimiter, skipinitialspace=True))
@@ -805,9 +819,10 @@ def _or_nan(cell: str) -> float:
 
 
 def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None:
-    """Minutes since MJD 0, in seconds, and the remaining seconds of time stamps; None if a text is no time stamp. [s]
+    """Split time stamps into the start of their minute, in seconds from MJD 0, and the seconds within the minute. [s]
 
-    Minutes are NaN and seconds are 0 if an exporter leaves a stamp out.
+    If an exporter leaves a stamp out, the start is NaN and the seconds are 0. Returns None if a text is no time
+    stamp.
     """
     has_text = [bool(text) or header.vendor is None for text in texts]
     minutes = [_minute(text[:17]) if is_stated else math.nan for text, is_stated in zip(texts, has_text, strict=True)]
@@ -822,7 +837,7 @@ def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None
 
 @lru_cache(maxsize=256)
 def _minute(text: str) -> float | None:
-    """Seconds from MJD 0 to the whole minute at the beginning of a time stamp; None if the text is no time stamp.
+    """Seconds from MJD 0 to the minute of a time stamp, from its text without seconds; None for other text. [s]
 
     Many rows share a minute, so results are cached.
     """
@@ -968,7 +983,7 @@ _VENDORS = (
 
 
 def _vendor_of(cells: Sequence[str]) -> _Vendor | None:
-    """The exporter whose column names the cells contain; None if there is no such exporter."""
+    """Exporter that has written a header, known by its column names in the cells; None if no exporter is known."""
     names = [cell.strip().lower() for cell in cells]
     return next((vendor for vendor in _VENDORS if vendor.signs.issubset(names)), None)
 
@@ -976,8 +991,9 @@ def _vendor_of(cells: Sequence[str]) -> _Vendor | None:
 def _dataflash_as_csv(lines: list[str]) -> list[str]:
     """Convert the lines of a dataflash log to CSV with a header and GPS rows; other logs are unchanged.
 
-    The FMT row of GPS becomes the header. All further lines become empty, so that each line keeps its number. HAcc
-    and VAcc of the GPA row with the same time and receiver are appended to a GPS row as two cells.
+    The FMT row that names the columns of GPS rows becomes the header. GPS rows stay. All other lines become empty, so
+    that each line keeps its number. Two cells are appended to a GPS row: HAcc and VAcc from the GPA row with the same
+    time and receiver.
     """
     if not any(line.startswith("FMT,") for line in lines[:100]):
         return lines

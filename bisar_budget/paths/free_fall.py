@@ -1,8 +1,8 @@
 """Motion errors of platforms in free fall, from the linearised dynamics of the orbit.
 
-If the measured state of a satellite is wrong at mid-aperture, the satellite is assumed to be on a slightly different
-orbit. The difference between the two orbits is not a straight line: a height error changes the orbital period, and
-gravity is evaluated at a wrong position.
+If the measured position and velocity of a satellite are wrong at mid-aperture, the satellite is assumed to be on a
+slightly different orbit. The difference between the true and the assumed orbit is not a straight line in time: a
+height error changes the orbital period, and gravity is evaluated at a wrong position.
 """
 
 from dataclasses import dataclass
@@ -29,10 +29,10 @@ class FreeFall:
     centre : Vectors
         Position of the Earth's centre. [m]
     rotation : Vectors
-        Rate at which the axes turn relative to the stars; zero for a scene without a place on the Earth. [rad/s]
+        Rate at which the axes turn relative to the stars; zero for a scene without a position on the Earth. [rad/s]
     share : float or (cases,)
-        1 in cases with a platform in free fall, and 0 in all other cases. There, errors are p + vτ + aτ²/2, without
-        gravity and rotation.
+        1 in cases with a platform in free fall, and 0 in all other cases. In these other cases errors are
+        p + vτ + aτ²/2, without gravity and rotation.
     """
 
     centre: Vectors
@@ -40,7 +40,7 @@ class FreeFall:
     share: PerCase = 1.0
 
     def motions(self, path: PlatformState, half: Floats, places: Floats) -> Floats:
-        """Motion over the aperture due to a unit error of the state at mid-aperture.
+        """Position error over the aperture due to a unit error of position, velocity or acceleration at mid-aperture.
 
         Parameters
         ----------
@@ -54,9 +54,10 @@ class FreeFall:
         Returns
         -------
         (3, 3, 3, nodes, cases)
-            Indices are the error (1 m of position, 1 m/s of velocity, 1 m/s² of acceleration), the axis of the error,
-            and the component east, north or up. [m] The velocity error is the rate of the position error in the axes
-            of the scene. The acceleration error has a constant direction in these axes.
+            Position errors. [m] The indices are the unit error (1 m of position, 1 m/s of velocity, 1 m/s² of
+            acceleration), the axis of this error, the component east, north or up, the slow time and the case. The
+            velocity error is the rate of the position error in the axes of the scene. The acceleration error is
+            constant in these axes.
 
         Notes
         -----
@@ -104,7 +105,7 @@ class FreeFall:
         return gravity, spin
 
     def rate_against_stars(self, position: Vectors) -> Vectors:
-        """Rate −ω×p, in the axes of the scene, of a position error p that is constant relative to the stars.
+        """Rate of change −ω×p, in scene axes, of a position error p that is constant relative to the stars.
 
         ω is the rate at which the axes turn. The result is in m/s for `position` in m, and in 1/s for a unit vector.
         """
@@ -121,7 +122,7 @@ class FreeFall:
         return (a / square, b / square, c / square)
 
     def of(self, cases: Any) -> "FreeFall":
-        """The dynamics of some of the cases; `cases` are their indices."""
+        """Dynamics for a selection of the cases; `cases` are the indices of these cases."""
 
         def chosen(number: PerCase) -> PerCase:
             return number[cases] if isinstance(number, np.ndarray) and number.ndim else number
@@ -135,7 +136,7 @@ class FreeFall:
 def of_scene(axes: SceneAxes | None) -> FreeFall:
     """Dynamics of free fall in the axes of a scene.
 
-    If `axes` is None, the scene has no place on the Earth. Then the Earth's centre is one Earth radius below the
+    If `axes` is None, the scene has no position on the Earth. Then the Earth's centre is one Earth radius below the
     scene centre, and the axes do not turn.
     """
     if axes is None:
@@ -144,10 +145,10 @@ def of_scene(axes: SceneAxes | None) -> FreeFall:
 
 
 def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
-    """Dynamics of free fall for a path above 100 km in free fall; None for any other path.
+    """Dynamics of the errors of a path, if it is in free fall above a height of 100 km; None for any other path.
 
-    A path is in free fall if its acceleration differs from free fall by at most 5 % of gravity, μ/r². Numbers of the
-    path may be arrays (cases,).
+    A path is in free fall if its acceleration differs from that of free fall by at most 5 % of gravity, μ/r². The
+    coordinates of the path may be arrays (cases,). Then `share` of the result says which cases are in free fall.
     """
     fall = of_scene(axes)
     x, y, z = (component - centre for component, centre in zip(path.position, fall.centre, strict=True))
@@ -168,8 +169,9 @@ def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
 class _Collocation:
     """Gauss-Legendre nodes (N,) over -1 … 1, and matrices (N, N) that integrate values at the nodes.
 
-    `once` and `twice` give the single and the double integral from 0 to the nodes. `to_coefficients` gives the
-    Legendre coefficients of the polynomial through the values.
+    `times` are the nodes. Multiplied by values at the nodes, `once` and `twice` give the single and the double
+    integral from 0 to each node, and `to_coefficients` gives the Legendre coefficients of the polynomial through the
+    values.
     """
 
     times: Floats
@@ -178,18 +180,21 @@ class _Collocation:
     to_coefficients: Floats
 
     def twice_at(self, places: Floats) -> Floats:
-        """Weights (places, N) of the values at the nodes in the double integral from 0 to each place."""
+        """Matrix (places, N) from values at the nodes to the double integral from 0 to each of the times `places`."""
         return _integral(places, 2) @ self.to_coefficients
 
 
 def _integral(places: Floats, times: int) -> Floats:
-    """Values (places, N) at places of the Legendre polynomials integrated `times` times from 0."""
+    """Values (places, N), at the points `places`, of the N Legendre polynomials integrated `times` times from 0."""
     return np.asarray(np.polynomial.legendre.legvander(places, _NODE_COUNT - 1 + times) @ _integrated(times))
 
 
 @cache
 def _integrated(times: int) -> Floats:
-    """Legendre coefficients of the Legendre polynomials integrated `times` times from 0, one column each."""
+    """Legendre coefficients of the N Legendre polynomials integrated `times` times from 0.
+
+    Each column of the result belongs to one polynomial.
+    """
     return np.asarray(np.polynomial.legendre.legint(np.eye(_NODE_COUNT), m=times, lbnd=0.0))
 
 

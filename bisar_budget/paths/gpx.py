@@ -49,7 +49,7 @@ def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
 
     Arguments and errors are the same for all readers, see `LogFormat.read`. If the mission file states the time scale
     utc, times need no zone. If there are several tracks, the mission file may choose one by its name or number. If it
-    does not, `tracks` of the log contains all tracks that can be read, and other tracks are ignored.
+    does not, `Log.tracks` contains all tracks that can be read, and the unreadable tracks are ignored.
     """
     hold_to_scale("utc", keys, name)
     hold_to_size(len(data), name, "track")
@@ -76,7 +76,10 @@ def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
 
 
 def _chosen(tracks: Sequence[MessageElement], track_name: str, name: str) -> int:
-    """Index from 0 of the track with the given name; if no track has this name, it is read as a number from 1."""
+    """Index, from 0, of the track that the mission file chooses.
+
+    `track_name` is the name of a track. If no track has this name, it is read as the number of a track, from 1.
+    """
     matches = [number for number, track in enumerate(tracks) if _name_of(track) == track_name.strip()]
     if len(matches) == 1:
         return matches[0]
@@ -102,7 +105,7 @@ def _track_words(tracks: Sequence[MessageElement], index: int) -> str:
 
 
 def _read_track(track: MessageElement, track_words: str, name: str, keys: LogKeys) -> Log:
-    """The log of a track. Points without a fix in three dimensions, and points that cannot be used, are left out."""
+    """Make the log of a track. Points without a fix in three dimensions, and unusable points, are left out."""
     points, lines, broken, without_fix = [], [], {}, 0
     for point in track.all("trkpt"):
         if any(
@@ -135,7 +138,10 @@ def _read_track(track: MessageElement, track_words: str, name: str, keys: LogKey
 
 
 def _point(point: MessageElement, name: str, keys: LogKeys) -> tuple[Instant, tuple[float, float, float, float]]:
-    """Instant, latitude, longitude, elevation and geoid separation of a point; NaN without a separation."""
+    """Read the instant of a point, and its latitude [deg], longitude [deg], elevation [m] and geoid separation [m].
+
+    The separation is NaN if the point states none.
+    """
     instant = _instant(point, name, keys)
     has_separation = any(child.name == "geoidheight" for child in point.children)
     return instant, (

@@ -19,21 +19,21 @@ _MAX_OFFSET_HOURS = 18  # of a local time from UTC, the limit in common readers 
 
 
 class Instant(NamedTuple):
-    """Instant of UTC: modified Julian day and seconds of the day.
+    """Instant of UTC: modified Julian day, and seconds of the day.
 
-    At 7.5 km/s an error of 10 ns is 0.1 mm.
+    Two numbers are needed for precision: at 7.5 km/s an error of 10 ns is 0.1 mm.
     """
 
     day: int
     seconds: float
 
     def after(self, seconds: float) -> "Instant":
-        """The instant after a number of seconds, without leap seconds."""
+        """Add a number of seconds to the instant. Leap seconds are ignored."""
         days, remainder = divmod(self.seconds + seconds, DAY_S)
         return Instant(self.day + int(days), remainder)
 
     def since(self, other: "Instant") -> float:
-        """Seconds since another instant, without leap seconds. [s]"""
+        """Time from another instant to this instant. Leap seconds are ignored. [s]"""
         return (self.day - other.day) * DAY_S + (self.seconds - other.seconds)
 
     def as_text(self) -> str:
@@ -60,7 +60,7 @@ def day_of_year(year: int, day: int) -> int | None:
 def parse_instant(text: str, *, needs_zone: bool = True) -> Instant | None:
     """Read an instant like 2026-06-01T05:20:31.250Z, or with an offset from UTC such as +01:00; None for other text.
 
-    With `needs_zone`, a text without a zone is refused.
+    With `needs_zone`, the result is also None for a text without a zone.
     """
     match = _ISO_8601.fullmatch(text.strip())
     if match is None or (needs_zone and not match[8]):
@@ -83,9 +83,9 @@ def parse_instant(text: str, *, needs_zone: bool = True) -> Instant | None:
 
 
 def parse_stamp(text: str, *, needs_zone: bool = True) -> Instant | None:
-    """Read the time stamp of a record as `parse_instant` does, and also with 60 as its second.
+    """Read the time stamp of a record as `parse_instant` does; its seconds may also be 60.
 
-    Receivers round 59.996 s to 60.00 s. The second 60 is the first second of the next minute.
+    Receivers round 59.996 s to 60.00 s. Seconds of 60 are read as the start of the next minute.
     """
     rounded = _ROUNDED_MINUTE.fullmatch(text.strip())
     if rounded is None:
@@ -131,7 +131,7 @@ def tai(instant: Instant) -> Instant:
 
 
 def later(instant: Instant, seconds: float) -> Instant:
-    """The instant of UTC after a number of elapsed seconds, leap seconds included."""
+    """Add a number of elapsed seconds to an instant of UTC. Leap seconds count as elapsed."""
     without_leaps = instant.after(seconds)
     if tai_less_utc(without_leaps.day) == tai_less_utc(instant.day):
         return without_leaps  # a conversion to TAI and back would round twice
@@ -139,7 +139,7 @@ def later(instant: Instant, seconds: float) -> Instant:
 
 
 def utc(tai_instant: Instant) -> Instant:
-    """Convert an instant of TAI to UTC. During a leap second the seconds of the day are 86400 s and more."""
+    """Convert an instant of TAI to UTC. During a leap second the seconds of the day are 86400 s or more."""
     instant = tai_instant.after(-tai_less_utc(tai_instant.day))
     earlier = tai_instant.after(-tai_less_utc(instant.day))
     if earlier.day > instant.day:

@@ -1,4 +1,4 @@
-"""Checks and conversions of fixes from a log of any format: time scale, heights, rising times, possible motion."""
+"""Checks and conversions of the fixes in a log of any format: time scale, heights, rising times, plausible motion."""
 
 import re
 from bisect import bisect_left
@@ -30,9 +30,10 @@ _MIN_HEIGHT_M, _MAX_HEIGHT_M = -12e3, 100e3  # from the deepest trench to the bo
 class LogKeys(NamedTuple):
     """Keys of a mission file that describe a log.
 
-    `week` is the GPS week in which the log begins, and `geoid_separation` the height of the geoid above the ellipsoid
-    [m]. If a file contains several logs, one is chosen by the `talker` of NMEA, by the `track` of GPX (name or
-    number), or by the `instance` of a receiver. None means that the mission file does not state the key.
+    `week` is the GPS week in which the log begins. `time_scale` is the time scale of its time stamps.
+    `geoid_separation` is the height of the geoid above the ellipsoid. [m] If a file contains several logs, one is
+    chosen by the `talker` of NMEA, by the `track` of GPX (name or number), or by the `instance` of a receiver. None
+    means that the mission file does not state the key.
     """
 
     week: int | None = None
@@ -58,7 +59,7 @@ def most_left_out(count: int) -> int:
 
 
 class LogRecords:
-    """Records of a log that have a fix: their names in messages, and whether they are usable.
+    """Records of a log that have a fix, with their line or number for messages, and which of them are usable.
 
     Parameters
     ----------
@@ -69,15 +70,15 @@ class LogRecords:
     lines : (count,) array_like, optional
         Lines of the records in the file, rising. If omitted, records are numbered from 1.
     broken : mapping, optional
-        Messages about further records that cannot be read, by their lines or numbers.
+        Messages about records that cannot be read, by their lines or numbers. They are not among the `count` records.
     lost : int
-        Number of further records that were damaged during recording or transfer, and are missing.
+        Number of records that are missing, because they were damaged during recording or transfer.
 
     Raises
     ------
     PathFileError
-        More records than `most_left_out` are unusable, or no record is usable. Methods that leave records out raise
-        it too.
+        More records than `most_left_out` are unusable, or no record is usable. The methods `leave_out` and
+        `keep_what_rises` raise it too.
     """
 
     def __init__(
@@ -106,11 +107,11 @@ class LogRecords:
         return int(self.is_usable.argmax())
 
     def where(self, index: int) -> str:
-        """Beginning of a message about a record: the file and the place of the record."""
+        """Beginning of a message about a record: the name of the file, and the record's line or number."""
         return f"{self.name}{':' if self._is_in_lines else ': record '}{self._numbers[index]}"
 
     def words(self, index: int) -> str:
-        """The record in words, for use within a sentence."""
+        """Name of a record within the sentence of a message, such as `line 12` or `record 12`."""
         return f"{'line' if self._is_in_lines else 'record'} {self._numbers[index]}"
 
     def leave_out(self, is_unusable: Booleans | np.bool_, reason: Callable[[int], str]) -> None:
@@ -162,7 +163,7 @@ class LogRecords:
         self.leave_out(is_unusable, lambda index: not_after(row_of_index[index]))
 
     def left_out(self) -> LeftOut | None:
-        """The records that are left out; None if all are used."""
+        """Records that are left out, with messages about them; None if all records are used."""
         if not self._faults:
             return None
         numbers = sorted(self._faults)
@@ -170,7 +171,7 @@ class LogRecords:
         return LeftOut(before, tuple(self._faults[number] for number in numbers))
 
     def left_out_words(self) -> str:
-        """Words for the number of records that are left out, and for their places; empty if all records are used."""
+        """Note on how many records are left out, and on their lines or numbers; empty if all records are used."""
         if not self._faults:
             return ""
         numbers = sorted(self._faults)
@@ -179,7 +180,10 @@ class LogRecords:
         return f", {counted(len(numbers), 'record')} that cannot be used left out ({noun} {listed})"
 
     def _add(self, faults: Mapping[int, str], count: int) -> None:
-        """Add records that are left out; raises `PathFileError` if there are too many."""
+        """Note `count` further records as left out; raises `PathFileError` if there are now too many.
+
+        `faults` are messages about these records by line or number, or about the first of them.
+        """
         self._faults |= faults
         unusable = len(self._faults) - len(faults) + count + self._lost
         if unusable > most_left_out(self._total) or unusable >= self._total:
@@ -190,7 +194,7 @@ class LogRecords:
 
 
 def _longest_rise(times: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) of the times in their longest rising subsequence.
+    """Mask (n,) that selects the longest rising subsequence of times (n,).
 
     If times are equal, only the first of them may belong to it.
     """
@@ -225,7 +229,10 @@ def _longest_rise(times: Floats) -> NDArray[np.bool_]:
 
 
 def _whole_seconds(times: Floats, start: Instant | None) -> str:
-    """Reason for repeated times: a recorder that has truncated all times to whole seconds; empty if it has not."""
+    """Explanation of repeated times for a message: the recorder has truncated all times to whole seconds.
+
+    The text is empty if the times do not look like that.
+    """
     seconds = times + (start.seconds if start else 0.0)
     fixes_per_stamp = len(times) / max(len(np.unique(times)), 1)
     if (
@@ -241,7 +248,7 @@ def _whole_seconds(times: Floats, start: Instant | None) -> str:
 
 
 def hold_to_scale(log_scale: str, keys: LogKeys, name: str) -> None:
-    """Refuse a time scale of the mission file that differs from the scale that the log states."""
+    """Refuse a mission file whose time scale differs from the scale that the log states."""
     if keys.time_scale not in (None, log_scale):
         raise PathFileError(
             f"{name}: counts in {SCALES[log_scale]}, and trajectory.time_scale says "
@@ -253,7 +260,7 @@ def hold_to_scale(log_scale: str, keys: LogKeys, name: str) -> None:
 
 
 def one_instance(counts: Mapping[float, int], keys: LogKeys, name: str) -> float:
-    """Instance of the receiver that is read: the instance that the mission file chooses, or the only one.
+    """Instance (number) of the receiver whose fixes are read: the one that the mission file chooses, or the only one.
 
     `counts` has the number of fixes by instance. Raises `PathFileError` if the chosen instance has no fix, or if
     there are several instances and no choice.
@@ -271,12 +278,12 @@ def one_instance(counts: Mapping[float, int], keys: LogKeys, name: str) -> float
 
 
 def is_wgs84(datum: str) -> bool:
-    """Whether the name of a datum or reference system means WGS-84 or a frame of the ITRF."""
+    """Whether a datum or reference system with the name `datum` is WGS-84 or a frame of the ITRF."""
     return _WGS84.fullmatch(datum.strip()) is not None
 
 
 def utc_of(instant: Instant, scale: str) -> Instant:
-    """Convert an instant of the time scale `scale` to UTC."""
+    """Convert an instant to UTC from `scale`, a key of `SCALES`."""
     return instant if scale == "utc" else utc(instant.after(TAI_LESS[scale.upper()]))
 
 
@@ -287,7 +294,7 @@ def unix_instant(unix_us: int) -> Instant:
 
 
 def scale_words(start: Instant, scale: str) -> str:
-    """Words for the difference between UTC and the scale of a log, at the start of the log; empty for UTC."""
+    """Note on the difference between UTC and the time scale of a log at its start; empty for a log in UTC."""
     if scale == "utc":
         return ""
     system = scale.upper()
@@ -296,7 +303,10 @@ def scale_words(start: Instant, scale: str) -> str:
 
 
 def hold_to_ellipsoid(keys: LogKeys, name: str, log_words: str = "has heights above the ellipsoid") -> None:
-    """Refuse a geoid separation in the mission file for a log whose heights do not need it."""
+    """Refuse a mission file that states a geoid separation for a log that does not need it.
+
+    `log_words` is the reason for the message.
+    """
     if keys.geoid_separation is not None:
         raise PathFileError(
             f"{name}: {log_words}, and trajectory.geoid_separation is given beside it",
@@ -321,7 +331,10 @@ def from_sea_level(heights: Floats, separations: Floats | None, keys: LogKeys, n
 
 
 def needs_separation(problem: str) -> PathFileError:
-    """The error of a log without heights above the ellipsoid. It names the key that gives the geoid separation."""
+    """Make the error for a log without heights above the ellipsoid and without a geoid separation.
+
+    It names the key of the mission file that gives the geoid separation.
+    """
     return PathFileError(
         problem,
         "accepted: trajectory.geoid_separation: 47 m and the like, the height of the geoid above the ellipsoid there",
@@ -332,9 +345,9 @@ def needs_separation(problem: str) -> PathFileError:
 def level_sigmas(horizontal: Floats | None, vertical: Floats | None) -> Floats | None:
     """One-sigma errors (n, 3) east, north, up from a horizontal and a vertical accuracy. [m]
 
-    A horizontal error has no direction. It may lie along one axis, so each horizontal axis gets all of it. If only
-    one of the two accuracies is known, it counts along every axis. A number that is not positive is unknown. Returns
-    None if no number is positive.
+    A horizontal accuracy (n,) does not state a direction. The error may lie along one axis, so it is used for the
+    east and for the north axis. If only one of the two accuracies is known, it is used for all axes. A number that is
+    not positive is unknown. Returns None if no number is positive.
     """
     if horizontal is None:
         horizontal = vertical
@@ -349,7 +362,7 @@ def level_sigmas(horizontal: Floats | None, vertical: Floats | None) -> Floats |
 def known_sigmas(sigmas: Floats) -> Floats | None:
     """Replace one-sigma errors (n, 3) that are not positive by NaN; None if no error is positive. [m]
 
-    Larger errors than the largest possible error of a log are reduced to it.
+    Errors above 1000 km, which receivers write without a fix, are reduced to 1000 km.
     """
     found = np.where(sigmas > 0, np.minimum(sigmas, _MAX_LOG_SIGMA_M), np.nan)
     return None if np.isnan(found).all() else found
@@ -372,11 +385,12 @@ def geodetic_log(
     coordinates: tuple[Floats, Floats, Floats],
     sigmas: Floats | None = None,
 ) -> Log:
-    """A log from geodetic coordinates: latitude, longitude [rad] and height above the ellipsoid [m], (n,) each.
+    """Make a log from geodetic coordinates: latitude, longitude [rad], height above the ellipsoid [m], each (n,).
 
-    Times (n,) count from `start`, an instant in a scale of `SCALES`, or without `start` from an unknown instant [s].
-    `sigmas` (n, 3) are one-sigma errors east, north, up [m]. Records with impossible coordinates, or with a time that
-    does not rise, are left out. Raises `PathFileError` if too many are left out.
+    `words` describes the log for reports. Times (n,) count from `start`, an instant in the time scale `scale`, a key
+    of `SCALES`. [s] Without `start` they count from an unknown instant. `sigmas` (n, 3) are one-sigma errors east,
+    north, up. [m] Records with impossible coordinates, or with a time that does not rise, are left out. Raises
+    `PathFileError` if too many are left out.
     """
     latitude, longitude, height = coordinates
     for name, values, limit_deg, limit_words in (
@@ -421,9 +435,9 @@ def usable_log(
 ) -> Log:
     """Make a log from the usable records whose times rise.
 
-    `positions_of` gives positions (m, 3) of the m records that a mask (n,) keeps [m]. `clock_words` states the
-    accuracy of the times. `geodetic` are latitude, longitude and height of each record, if the log has them. The
-    other parameters are as in `geodetic_log`.
+    `positions_of` is a function from a mask (n,) to the positions (m, 3) [m] of the m records that it selects.
+    `clock_words` is a text about the accuracy of the times. `geodetic` are latitude, longitude and height of each
+    record, if the log has them. The other parameters are as in `geodetic_log`.
     """
     start_utc = None if start is None else utc_of(start, scale)
     records.keep_what_rises(times, start_utc)
@@ -470,7 +484,7 @@ _MEDIAN_MARGIN_SAMPLES = 10  # samples beyond each end of the aperture that coun
 
 
 def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str) -> None:
-    """Refuse a log that no platform can have flown.
+    """Refuse a log whose fixes near the aperture cannot be the motion of a platform.
 
     Parameters
     ----------
@@ -486,10 +500,10 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
     Raises
     ------
     PathFileError
-        The log has one of three faults. First, all fixes in the stretch are equal to 1 mm. Second, a fix is repeated
-        for a time in which the platform, at its mean speed, moves by more than 0.1 m. Third, a step differs from the
-        median of the seven steps around it by more than 0.1 m, by more than 3 g can cause, and by more than 20 times
-        the median of such differences.
+        The log has one of three faults. First, all fixes in the stretch are the same to 1 mm. Second, a fix is
+        repeated for a time in which the platform, at its mean speed, moves by more than 0.1 m. Third, a step between
+        two fixes differs too much from the median of the seven steps around it: by more than 0.1 m, by more than an
+        acceleration of 3 g can cause, and by more than 20 times the median of such differences.
     """
     half = stretch_s / 2 * (1 + 1e-9)
     first, last = int(np.searchsorted(times, -half, "left")), int(np.searchsorted(times, half, "right"))
@@ -510,7 +524,10 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
 
 
 def _hold_to_new_fixes(times: Floats, positions: Floats, extent: float, name: str) -> None:
-    """Refuse a log that repeats a fix while the platform moves."""
+    """Refuse a log that repeats a fix while the platform moves.
+
+    `extent` is the distance that the platform moves in the whole time of the fixes. [m]
+    """
     is_repeated = np.linalg.norm(np.diff(positions, axis=0), axis=1) <= _SAME_FIX_M
     if not is_repeated.any():
         return

@@ -1,4 +1,4 @@
-"""Helpers to read files of orbits and logs: texts, times, numbers, and XML as a tree whose elements know their lines.
+"""Helpers to read files of orbits and logs: texts, times, numbers, and XML as a tree of elements with their lines.
 
 XML files may come from strangers, so no reference is followed, and no entity is expanded.
 """
@@ -24,14 +24,14 @@ _DECIMAL_PATTERN = re.compile(r"\s*[+-]?(\d+(?:\.\d*)?|\.\d+)([eEdD][+-]?\d+)?\s
 def hold_to_size(size: int, name: str, part: str = "objects") -> None:
     """Refuse a file larger than `MAX_MARKUP_BYTES`.
 
-    The message advises the user to keep only the needed `part` of the file.
+    The message advises the user to keep only the needed part of the file; `part` says what, such as "objects".
     """
     if size > MAX_MARKUP_BYTES:
         raise PathFileError(f"{name}: is larger than {MAX_MARKUP_BYTES // 1_000_000} MB; keep the {part} needed")
 
 
 def decoded(data: bytes, name: str) -> str:
-    """Text of a file in UTF-8; raises `PathFileError` for other bytes."""
+    """Decode the bytes of a file from UTF-8 to text; raises `PathFileError` if they are not UTF-8."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -40,7 +40,7 @@ def decoded(data: bytes, name: str) -> str:
 
 
 def is_markup(data: bytes) -> bool:
-    """Whether a file is XML instead of text of keywords."""
+    """Whether a file is XML: its first character that is not blank is <."""
     return data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<"
 
 
@@ -59,7 +59,7 @@ def epoch_in(text: str) -> Instant | None:
 
 
 def number_in(text: object) -> float | None:
-    """A finite number from a text or a number; None otherwise."""
+    """Convert a text or a number to a float; None if it is not a finite number."""
     if isinstance(text, bool) or not isinstance(text, str | int | float):
         return None
     if isinstance(text, str):
@@ -90,7 +90,7 @@ _MAX_LIST_CHARACTERS = 400
 
 
 class _Named(Protocol):
-    """An object of a file: its name in messages, and the names by which a mission may choose it."""
+    """Data about an object, such as a satellite: its name in messages, and names by which a mission may choose it."""
 
     @property
     def object(self) -> str: ...
@@ -103,7 +103,7 @@ _Candidate = TypeVar("_Candidate", bound=_Named)
 
 
 def object_key(text: str) -> str:
-    """Form of a name or number for comparisons: no case, no extra spaces, and no leading zeros of a number."""
+    """Form of a name or number for comparisons: lower case, no extra spaces, no leading zeros of a number."""
     text = " ".join(text.split()).casefold()
     return text.lstrip("0") or "0" if text.isdecimal() and text.isascii() else text
 
@@ -111,9 +111,10 @@ def object_key(text: str) -> str:
 def one_object(
     blocks: Sequence[_Candidate], name: str, object_name: str | None, number: str = "OBJECT_ID"
 ) -> Sequence[_Candidate]:
-    """Blocks of a file that belong to the object with a given name, or to the only object if no name is given.
+    """Select the blocks of a file that are about one object: the object with a given name, or the only object.
 
-    The last of an object's `names` is unique to the object. `number` is the word for this name in messages. Raises
+    A block is an element set or a segment of an ephemeris. The last of an object's `names` is unique to the object,
+    and `number` is what messages call this name. Raises
     `PathFileError` if there is no such object, or if there are several.
     """
     if object_name is not None:
@@ -137,7 +138,7 @@ def _listed(objects: Sequence[_Named]) -> str:
 
 
 def cut(text: str) -> str:
-    """Shorten the text of a list so that it fits into a message."""
+    """Shorten a text that lists names to 400 characters, so that it fits into a message."""
     return text if len(text) <= _MAX_LIST_CHARACTERS else f"{text[:_MAX_LIST_CHARACTERS]}..."
 
 

@@ -65,9 +65,9 @@ _GST_REACH_S = 5.0  # largest time from a fix to a GST that applies to it; recei
 
 
 class _Quality(NamedTuple):
-    """Quality of a fix as the receiver states it: words for reports, and the usual one-sigma error. [m]
+    """Quality of a fix as the receiver states it: a text for reports, and the usual one-sigma error. [m]
 
-    The words begin with the kind of sentence that states the quality.
+    The text begins with the kind of sentence that states the quality.
     """
 
     words: str
@@ -110,7 +110,7 @@ class _Fix(NamedTuple):
     quality: _Quality
 
     def distance(self, other: "_Fix") -> float:
-        """Distance to another fix, for short distances. [m]"""
+        """Distance to another fix, by an approximation for short distances. [m]"""
         north = EQUATORIAL_RADIUS_M * (self.latitude - other.latitude)
         turned = math.remainder(self.longitude - other.longitude, 2 * math.pi)
         return math.hypot(north, EQUATORIAL_RADIUS_M * math.cos(self.latitude) * turned, self.height - other.height)
@@ -119,7 +119,7 @@ class _Fix(NamedTuple):
 class _Accuracy(NamedTuple):
     """A GST sentence: its line, second of the day, and one-sigma errors east, north and up, NaN if unknown. [m]
 
-    `unusable` is the number of figures in the sentence that are not valid errors.
+    `unusable` is the number of values in the sentence that are not valid errors.
     """
 
     line: int
@@ -144,7 +144,7 @@ class _Datum(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Words that describe the datum within a sentence."""
+        """Description of the datum and its offsets, as part of a message."""
         north, east, up = (shown(offset) for offset in self.offsets)
         code_words = {"999": "a user datum (999)", "": "a datum without a code"}
         if self.reference in _REFERENCES:
@@ -179,12 +179,12 @@ def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
 
 @dataclass(eq=False)
 class _Sentences:
-    """The sentences of a log that are read.
+    """Content of all sentences of a log that are used.
 
     Fixes are grouped by talker and kind of sentence; dates, accuracies and datums are grouped by talker. Dates and
     datums come with their lines. `broken` are messages about unusable fixes, by line. `undated` are messages about
     invalid dates. `lost` counts sentences with a wrong checksum. `doubtful_datums` are the datums of DTM sentences
-    with a wrong checksum. `unusable` counts invalid figures of GST sentences by talker.
+    with a wrong checksum. `unusable` counts invalid values in GST sentences by talker.
     """
 
     fixes: defaultdict[tuple[str, str], list[_Fix]]
@@ -222,21 +222,22 @@ class _Sentences:
         return next(iter(+counts))
 
     def _words(self, talker: str) -> str:
-        """Number of a talker's fixes of each quality, in words; the most frequent two, the most frequent first."""
+        """Text with the two most frequent qualities of a talker's fixes, and the number of fixes of each."""
         of_talker = (fix.quality.words for kind in _FIX_SENTENCES for fix in self.fixes.get((talker, kind), ()))
         return ", ".join(f"{count} of {words}" for words, count in Counter(of_talker).most_common(2))
 
     def other_receivers(self, talker: str) -> set[str]:
-        """All other talkers with fixes.
+        """Talkers, other than the given one, that have fixes.
 
-        They are other receivers, so the datum and accuracy that they state are their own.
+        They are other receivers. So the datums and accuracies that they state do not apply to the given talker.
         """
         return {speaker for (speaker, _), fixes in self.fixes.items() if fixes} - {talker}
 
     def hold_to_datum(self, talker: str, name: str) -> None:
         """Refuse a log whose datum is not WGS-84.
 
-        Only the datums that the talker states count, and those of talkers without fixes.
+        The datums count that the talker states, or that talkers without fixes state. The latter are further names of
+        the same receiver.
         """
         # DTM sentences with a wrong checksum count if a talker has no others: without them, WGS-84 would be assumed.
         datums = {**self.doubtful_datums, **self.datums}
@@ -297,11 +298,11 @@ class _Sentences:
         )
 
     def dates_for(self, talker: str) -> Sequence[tuple[int, Instant]]:
-        """Dates with their lines: the dates of a talker, or of all talkers if this talker states none."""
+        """Dates that a talker states, each with its line; the dates of all talkers if this talker states none."""
         return self.dates.get(talker) or sorted(date for dates in self.dates.values() for date in dates)
 
     def accuracies_for(self, talker: str) -> Sequence[_Accuracy]:
-        """Errors that a talker states, or else the errors of talkers without fixes.
+        """Errors that a talker states in GST sentences, or else those that talkers without fixes state.
 
         A talker without fixes is another name of the same receiver.
         """
@@ -309,15 +310,15 @@ class _Sentences:
         return self.accuracies.get(talker) or sorted(gst for speaker in speakers for gst in self.accuracies[speaker])
 
     def unusable_words(self, talker: str) -> str:
-        """Words for the number of invalid accuracy figures; empty if there are none.
+        """Note on the number of invalid values in GST sentences; empty if there are none.
 
-        The figures of the talker count, and the figures of talkers without fixes.
+        Sentences of the talker count, and sentences of talkers without fixes.
         """
         count = sum(self.unusable[speaker] for speaker in self.unusable.keys() - self.other_receivers(talker))
         return f", {counted(count, 'figure')} of accuracy that cannot be used left out" if count else ""
 
     def lost_words(self) -> str:
-        """Words for the number of sentences with a wrong checksum or an invalid date; empty if there are none."""
+        """Note on the number of sentences with a wrong checksum or an invalid date; empty if there are none."""
         lost, undated = self.lost.total(), len(self.undated)
         words = f", {counted(lost, 'sentence')} with a wrong checksum left out" if lost else ""
         return words + (f", {counted(undated, 'sentence')} without a date that there is left out" if undated else "")
@@ -427,8 +428,9 @@ def _sigmas(
 ) -> Floats | None:
     """One-sigma errors (n, 3) east, north, up of fixes at rising times, from GST sentences. [m]
 
-    The larger error of the GST before a fix and the GST after it counts. A GST more than 5 s from the fix is ignored.
-    An error is NaN if no GST states it. Returns None if no fix has an error.
+    A fix gets the larger one of two errors: from the GST sentence before it, and from the one after it. A sentence
+    more than 5 s from the fix is ignored. An error is NaN if no sentence states it. Returns None if no fix has an
+    error.
     """
     if not stated:
         return None
@@ -463,9 +465,9 @@ def _dated(
 
 # ---------------------------------------------------------------------- sentences
 def _checked_fields(sentence: str) -> list[str]:
-    """Fields of a sentence with a right checksum; raises `ValueError` for any other sentence.
+    """Split a sentence into its fields; raises `ValueError` if the checksum is missing or wrong.
 
-    The fields are split as by pynmea2, in a tenth of the time.
+    The result is that of pynmea2, in a tenth of the time.
     """
     match = _CHECKED.fullmatch(sentence)
     if match is None or reduce(xor, match[1].encode()) != int(match[2], 16):
@@ -474,7 +476,7 @@ def _checked_fields(sentence: str) -> list[str]:
 
 
 def _unchecked_fields(sentence: str) -> list[str]:
-    """Fields of a sentence, whatever its checksum, followed by empty fields."""
+    """Split a sentence into its fields without a check of its checksum; 14 empty fields are appended."""
     return [field.strip() for field in sentence.partition("*")[0].split(",")[1:]] + [""] * 14
 
 
@@ -507,7 +509,7 @@ def _metres(text: str, unit: str, where: str) -> float:
 def _fix(
     fields: Sequence[str], where: str, line: int, quality: _Quality | None, height: Sequence[str]
 ) -> _Fix | None:
-    """Make a fix from the fields of a sentence; None if its quality is None, which means no position.
+    """Make a fix from the fields of a sentence; None if `quality` is None, which means that there is no position.
 
     `height` has four fields: height, unit of the height, geoid separation, and unit of the separation.
     """
@@ -552,7 +554,7 @@ def _gst(fields: Sequence[str], where: str, line: int) -> _Accuracy | None:
 
 
 def _dtm(fields: Sequence[str], where: str, line: int) -> _Datum | None:
-    """Datum of a DTM sentence; None if the receiver states no datum."""
+    """Read the datum from the fields of a DTM sentence; None if the sentence states no datum."""
     code, subdivision, north, north_side, east, east_side, up, reference = fields[:8]
     offsets = (f"{north or 0}' {north_side}".strip(), f"{east or 0}' {east_side}".strip(), f"{up or 0} m")
     is_zero = all(number_in(offset or "0") == 0 for offset in (north, east, up))

@@ -56,9 +56,9 @@ _CELESTIAL_AXES = (*_EQUINOX_OF_DATE, *_CELESTIAL)
 
 @dataclass
 class CovarianceBlock:
-    """A covariance as written in a message: line, epoch, frame and rows of its triangle.
+    """A covariance as written in a message: line, epoch, frame, and the rows of its lower triangle.
 
-    An empty frame means the frame of the ephemeris.
+    An empty frame means the reference frame of the positions and velocities.
     """
 
     line: int
@@ -69,16 +69,16 @@ class CovarianceBlock:
 
 @dataclass(frozen=True)
 class _EphemerisBlock:
-    """A segment as written in a message.
+    """A segment of an ephemeris as written in a message.
 
     Attributes
     ----------
     line : int
-        First line.
+        Number of the first line.
     metadata : mapping
-        Line and value by keyword.
+        Line number and value of each keyword in the metadata.
     rows : sequence
-        Line, epoch and numbers of each sample.
+        Line number, epoch and numbers of each sample, as texts.
     covariances : sequence of CovarianceBlock
         Covariances of the segment.
     """
@@ -96,9 +96,9 @@ def read_oem(
 
     Arguments and errors are the same for all readers, see `OrbitFormat.read`.
 
-    If the message states no interpolation, it is interpolated by Hermite's polynomial of degree 7 if its velocities
-    agree with its positions, and otherwise by Lagrange's polynomial of degree 7. A polynomial of degree n goes
-    through n + 1 samples for Lagrange, and through half that number for Hermite.
+    If the message states no interpolation, Hermite's polynomial of degree 7 is used, or Lagrange's polynomial of
+    degree 7 if the velocities do not agree with the positions. Lagrange's polynomial of degree n goes through n + 1
+    samples, and Hermite's through half that number.
 
     `object_name` is an OBJECT_NAME or an OBJECT_ID.
     """
@@ -202,9 +202,10 @@ def _segment(block: _EphemerisBlock, name: str, orientation: Orientation) -> Seg
 def read_covariance(
     block: CovarianceBlock, time: Instant, frame: str, orientation: Orientation, name: str
 ) -> EpochCovariance:
-    """Convert a covariance of a CCSDS message to metres and seconds; `time` is its epoch of TAI.
+    """Convert a covariance of a CCSDS message from texts in km and km/s to numbers in m and m/s.
 
-    `frame` is the reference frame of the message.
+    `time` is its epoch in TAI. `frame` is the reference frame of the message, which applies if the covariance states
+    none.
     """
     location = f"{name}:{block.line}" if block.line else name
     if [len(cells) for _, cells in block.rows] != list(range(1, 7)):
@@ -236,7 +237,7 @@ def read_covariance(
 
 
 def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
-    """Note that the message states no interpolation, or no degree; empty if it states both."""
+    """Note for reports that a message states no interpolation or no degree; empty if it states both."""
     kind, degree = (metadata.get(key, (0, ""))[1].upper() for key in ("INTERPOLATION", "INTERPOLATION_DEGREE"))
     if not kind:
         return " (the file states no interpolation)"
@@ -288,7 +289,7 @@ def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str
 
 
 def _time(line: int, text: str, system: str, name: str) -> Instant:
-    """Convert a time of the message to TAI."""
+    """Convert the text of a time in the time system `system` to an instant of TAI."""
     head, _, seconds = text.rpartition(":")
     minute = _minute(head)
     # A leap second is part of the last minute of its day.
@@ -308,7 +309,7 @@ def _minute(text: str) -> Instant | None:
 
 
 def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:
-    """Segments of a message as text, with a keyword and a value in each line."""
+    """Yield the segments of a message that is written as text with keywords."""
     text = text.rstrip()
     lines = ((number, line.strip()) for number, line in enumerate(text.split("\n"), 1))
     rows: list[tuple[int, str, Sequence[str]]] = []
@@ -359,7 +360,10 @@ def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:
 
 
 def _add_to_covariances(covariances: list[CovarianceBlock], number: int, line: str, name: str) -> None:
-    """Add a line between COVARIANCE_START and COVARIANCE_STOP: an epoch, a frame or a row of a triangle."""
+    """Read a line between COVARIANCE_START and COVARIANCE_STOP, and add it to the covariances.
+
+    It is an epoch, which begins a covariance, or a frame or a row of the triangle of the last covariance.
+    """
     key, equals, value = (piece.strip() for piece in line.partition("="))
     if key == "EPOCH" and equals:
         covariances.append(CovarianceBlock(number, value))
@@ -373,7 +377,7 @@ def _add_to_covariances(covariances: list[CovarianceBlock], number: int, line: s
 
 
 def _from_markup(data: bytes, name: str) -> Iterator[_EphemerisBlock]:
-    """Segments of a message in XML."""
+    """Yield the segments of a message that is written in XML."""
     for message in parse_markup(data, name).all("oem"):
         for segment in message.all("segment"):
             metadata = {
@@ -390,12 +394,12 @@ def _from_markup(data: bytes, name: str) -> Iterator[_EphemerisBlock]:
 
 
 def _matrix(matrix: MessageElement) -> CovarianceBlock:
-    """A covariance of XML, with a name for each element of the lower triangle: CX_X, CY_X, CY_Y, …"""
+    """Covariance from an XML element whose children are the lower triangle: CX_X, CY_X, CY_Y, …"""
     return named_covariance({element.name: element.text.strip() for element in matrix.children}, matrix.line)
 
 
 def named_covariance(leaves: Mapping[str, str], line: int) -> CovarianceBlock:
-    """A covariance from elements with keywords, such as CX_X. An empty element counts as missing."""
+    """Covariance from texts by keyword: CX_X, CY_X, CY_Y, … for its elements. An empty text counts as missing."""
     rows: list[tuple[int, Sequence[str]]] = [
         (line, [leaves[key] for key in keywords if leaves.get(key)]) for keywords in _TRIANGLE_KEYWORDS
     ]

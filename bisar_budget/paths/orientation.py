@@ -40,8 +40,9 @@ class Orientation(NamedTuple):
     pole : tuple of float
         Position of the pole, x towards Greenwich and y towards 90° west. [rad]
     ut1_doubt, pole_doubt : float
-        Largest errors of UT1 - UTC [s] and of the pole [rad]. The defaults apply if no values are known: an example
-        of 0.1 s, which reports mention in a warning, and the largest distance that the pole reaches.
+        Largest errors of UT1 - UTC [s] and of the pole [rad]. The defaults apply if no values are known. The default
+        of `ut1_doubt` is 0.1 s, an example that reports mention in a warning. The default of `pole_doubt` is the
+        largest distance that the pole reaches.
     day : int, optional
         Day of UTC to which UT1 - UTC belongs, so that UT1 has no jump at a leap second. None means any day.
     is_predicted : bool
@@ -57,13 +58,13 @@ class Orientation(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Words for UT1 - UTC in reports; empty if the orientation is unknown."""
+        """Text about UT1 - UTC for reports; empty if the orientation is unknown."""
         if self._replace(day=None) == UNKNOWN:
             return ""
         return f", UT1 - UTC {self.ut1_minus_utc:.6g} s" + (" (predicted)" if self.is_predicted else "")
 
     def ut1(self, instant: Instant) -> Instant:
-        """UT1 at an instant of UTC."""
+        """Convert an instant of UTC to UT1."""
         leaps = 0 if self.day is None else tai_less_utc(instant.day) - tai_less_utc(self.day)
         return instant.after(self.ut1_minus_utc + leaps)
 
@@ -77,7 +78,7 @@ UNKNOWN = Orientation()
 
 
 def from_teme(position: Vector, instant: Instant, orientation: Orientation = UNKNOWN) -> Vector:
-    """Convert coordinates in the true equator and mean equinox of date to Earth-fixed coordinates. [m]"""
+    """Convert a position from the true equator and mean equinox of date (TEME) to Earth-fixed axes. [m]"""
     angle = sidereal_time(orientation.ut1(instant))
     sine, cosine = math.sin(angle), math.cos(angle)
     x, y, z = position
@@ -85,9 +86,9 @@ def from_teme(position: Vector, instant: Instant, orientation: Orientation = UNK
 
 
 def _from_true_pole(position: Vector, pole: tuple[float, float]) -> Vector:
-    """Convert a position from axes with z along the pole of rotation to Earth-fixed axes.
+    """Convert a position to Earth-fixed axes from axes that turn with the Earth, with z along the pole of rotation.
 
-    The rotation is R₁(-y)·R₂(-x) for the pole x, y (IERS Conventions, 5.1).
+    The rotation is R₁(-y)·R₂(-x) for the coordinates x, y of the pole [rad] (IERS Conventions, 5.1).
     """
     (sine_x, cosine_x), (sine_y, cosine_y) = ((math.sin(angle), math.cos(angle)) for angle in pole)
     x, y, z = position
@@ -99,8 +100,8 @@ def sidereal_time(ut1: Instant) -> float:
     """Greenwich mean sidereal time as defined by the IAU in 1982. [rad]
 
     Source: Vallado, Fundamentals of Astrodynamics and Applications, 4th edition, equation 3-45 (also Aoki and others,
-    1982). The 876600 hours per century in the equation are one turn per day. Here the seconds of the day give this
-    turn, because the equation as written would round to 1e-7 s.
+    1982). The term of 876600 hours per century in the equation is one turn per day. It is computed from the seconds
+    of the day, because the equation as written would have a rounding error of 1e-7 s.
     """
     centuries = (ut1.day - _J2000_DAY - 0.5 + ut1.seconds / DAY_S) / _CENTURY_DAYS
     at_midnight = (ut1.day - _J2000_DAY - 0.5) / _CENTURY_DAYS
@@ -113,11 +114,14 @@ def sidereal_time(ut1: Instant) -> float:
 
 
 def celestial_turn(is_j2000: bool, orientation: Orientation = UNKNOWN) -> Turn:
-    """Return a function that converts from the GCRF, or the mean equator and equinox of J2000, to Earth-fixed axes.
+    """Return a function that converts positions from celestial to Earth-fixed axes.
 
-    Precession and nutation follow the IAU, 2006 and 2000A (IERS Conventions 2010, chapter 5). The axes of J2000
-    differ from the axes of the GCRF by 0.023", which is 0.8 m at the distance of a low orbit. A file that calls the
-    GCRF `EME2000` has this error.
+    The celestial axes are those of the GCRF, or with `is_j2000` of the mean equator and equinox of J2000.
+
+
+    Precession follows the IAU 2006 and nutation the IAU 2000A (IERS Conventions 2010, chapter 5). The axes of J2000
+    differ from the axes of the GCRF by 0.023", which is 0.8 m at the distance of a low orbit. Positions are wrong by
+    this amount if a file calls the GCRF `EME2000`.
 
     Raises
     ------
@@ -161,7 +165,11 @@ _ACCEPTED_TABLES = "accepted: finals2000A.all or .csv of the IERS, its C04, or E
 
 
 class _TableRow(NamedTuple):
-    """Texts of one day in a table: MJD, pole and UT1 - UTC. Pole and UT1 - UTC have errors, which may be empty."""
+    """A row of a table, which belongs to one day.
+
+    `cells` are the texts of the MJD, x of the pole, y of the pole and UT1 - UTC. Each of the last three is followed
+    by the text of its error, which may be empty.
+    """
 
     line: int
     cells: list[str]
@@ -170,12 +178,12 @@ class _TableRow(NamedTuple):
 
 
 def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation:
-    """Orientation at an instant, from a table of the IERS or of CelesTrak.
+    """Orientation of the Earth at an instant, from a table of the IERS or of CelesTrak.
 
-    The table is finals2000A, or finals of the IAU 1980, daily or all, in fixed columns; finals2000A.all.csv; C04 of
-    any series; or EOP-All.csv of CelesTrak. Between two days the orientation is linear: the table does not have the
-    faster tides of 0.03 ms and 0.5 mas. The doubts are the errors that the rows state. For predictions they grow to a
-    few ms in a month.
+    The table may be finals2000A, or finals of the IAU 1980, each as the daily or the complete file in fixed columns.
+    It may also be finals2000A.all.csv, C04 of any series, or EOP-All.csv of CelesTrak. Between two days the
+    orientation is interpolated linearly. Tides of less than a day, of 0.03 ms and 0.5 mas, are not in the table.
+    `ut1_doubt` and `pole_doubt` are the errors that the rows state. For predictions they grow to a few ms in a month.
 
     Parameters
     ----------
@@ -189,7 +197,7 @@ def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation
     Raises
     ------
     PathFileError
-        The file is no such table, or has no values of the day of the instant and of the next day.
+        The file is no such table, or has no values for the day of the instant or for the next day.
 
     Notes
     -----
@@ -225,7 +233,7 @@ def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation
 
 
 def _rows(text: str, name: str) -> Iterator[_TableRow]:
-    """Yield the rows of a table that have values; its first lines decide the format."""
+    """Yield the rows of a table that have values. The first lines of the table decide which format is read."""
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     header = lines[0][1].strip() if lines else ""
     if header.lower().startswith(("<!doctype", "<html", "<?xml")):
@@ -250,7 +258,10 @@ _MAX_HEADER_LINES = 40  # lines of text above the rows of C04
 
 
 def _unreadable_table(text: str) -> str | None:
-    """Words for a common table of the Earth's rotation that cannot be read; None for any other text."""
+    """Name, for a message, of a known kind of Earth rotation table that cannot be read.
+
+    Returns None for any other text.
+    """
     beginning = text[:2000]
     if re.search(r"(?m)^\s*NUM_OBSERVED_POINTS|^BEGIN OBSERVED", beginning):
         return "the text form of CelesTrak's EOP"
@@ -274,7 +285,7 @@ def _of_finals(lines: Sequence[tuple[int, str]]) -> Iterator[_TableRow]:
 
 
 def _is_empty(cells: Sequence[str]) -> bool:
-    """Whether a row is for a future day and has no values."""
+    """Whether a row has a date and no values, as rows for days too far in the future have."""
     return bool(cells[0]) and not any(cells[1:])
 
 
@@ -342,9 +353,11 @@ def _row_of(line: str, separator: str, header: Sequence[str], location: str) -> 
 
 
 def _numbers(row: _TableRow, last_measured: float | None, location: str) -> list[float]:
-    """Numbers of a row. If the row states no errors, the usual errors are used.
+    """Numbers of a row: MJD, then x and y of the pole [arcsec] and UT1 - UTC [s], each followed by its error.
 
-    Raises `PathFileError` for a cell that is no number, and for values that are not possible.
+    If the row states no errors, usual errors are used. For predictions these grow with the time since
+    `last_measured`, the last day with measured values. Raises `PathFileError` for a cell that is no number, and for
+    values that are not possible.
     """
     numbers: list[float] = []
     is_stated = any(row.cells[n] for n in (2, 4, 6))
@@ -377,7 +390,10 @@ def _numbers(row: _TableRow, last_measured: float | None, location: str) -> list
 
 
 def _between(first: list[float], second: list[float], fraction: float) -> Orientation:
-    """Orientation interpolated linearly between two days; `fraction` is the elapsed part of the first day."""
+    """Orientation interpolated linearly between the rows of two successive days.
+
+    The rows are numbers as from `_numbers`. `fraction` is the elapsed part of the first day, from 0 to 1.
+    """
     leaps = tai_less_utc(int(second[0])) - tai_less_utc(int(first[0]))
     change = [end - start for start, end in zip(first, second, strict=True)]
     change[5] -= leaps

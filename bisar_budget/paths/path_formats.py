@@ -1,4 +1,4 @@
-"""Formats of orbits and of logs: the content that identifies a format, its name in messages, and its reader."""
+"""Formats of orbit files and flight logs: name in messages, content that identifies the format, and reader."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -22,7 +22,7 @@ from bisar_budget.paths.ulog import is_ulog, read_ulog
 
 
 class OrbitFormat(NamedTuple):
-    """A format of orbit files.
+    """A format of orbit files: its name, how its files are recognised, and its reader.
 
     Attributes
     ----------
@@ -34,9 +34,10 @@ class OrbitFormat(NamedTuple):
         Name of the XML element that identifies the format; empty for a format that is not XML.
     read : callable
         Reader. Its arguments are the bytes of a file, the name of the file in messages, the name of the object
-        (needed if there are several), the middle of the aperture, and the orientation that converts from celestial to
-        Earth-fixed axes. Raises `PathFileError` if the file breaks its format, has several objects or no object of
-        the name, or has no position at the middle of the aperture.
+        (needed if there are several), the middle of the aperture, and the orientation of the Earth, with which
+        celestial axes are converted to Earth-fixed axes. Returns an `Orbit`. Raises `PathFileError` if the file
+        breaks its format, if it has several objects and no name is given, if it has no object with the given name, or
+        if it has no position at the middle of the aperture.
     """
 
     words: str
@@ -91,7 +92,7 @@ _EXAMINED_BYTES = 4096  # at the beginning of a file, which identify its format
 
 
 def orbit_format(data: bytes) -> str | None:
-    """Key in `ORBIT_FORMATS` of the format of a file's content; None if the content is no orbit."""
+    """Recognise an orbit format from the content of a file; return its key in `ORBIT_FORMATS`, or None."""
     beginning = data[:_EXAMINED_BYTES].removeprefix(b"\xef\xbb\xbf")
     if is_markup(beginning):
         names = re.findall(rb"<(?:\w+:)?(\w+)[\s>]", beginning)
@@ -100,7 +101,10 @@ def orbit_format(data: bytes) -> str | None:
 
 
 def hold_to_format(data: bytes, name: str, form: str) -> None:
-    """Refuse a file of another format than `form`; the message names the key of the mission file that reads it."""
+    """Refuse a file that is not an orbit in the format `form`, but in another known format.
+
+    The message names the key of the mission file that reads this other format.
+    """
     actual = orbit_format(data)
     if actual == form:
         return
@@ -112,7 +116,10 @@ def hold_to_format(data: bytes, name: str, form: str) -> None:
 
 
 def hold_to_log(data: bytes, name: str) -> None:
-    """Refuse a file that is known to be no flight log; the message names the mission file's key that reads it."""
+    """Refuse a file that is an orbit, or has a known format that cannot be read, instead of a flight log.
+
+    The message names the key of the mission file that reads it, if there is one.
+    """
     _refuse(data, name, orbit_format(data), f"accepted: a log of a flight, {_words_of_logs()}")
 
 
@@ -122,7 +129,10 @@ def _words_of_logs() -> str:
 
 
 def _refuse(data: bytes, name: str, actual: str | None, accepted: str) -> None:
-    """Refuse a file that is an orbit of the format `actual`, or has a known format that cannot be read."""
+    """Refuse a file that is an orbit in the format `actual`, or has a known format that cannot be read.
+
+    `actual` is a key of `ORBIT_FORMATS`, or None if the file is no orbit. `accepted` describes what is accepted.
+    """
     if actual is not None:
         key = f"orbit: {{{actual}: …}} reads it"
         raise PathFileError(f"{name}: is {ORBIT_FORMATS[actual].words}", accepted, key)
@@ -145,7 +155,7 @@ def _has_ubx(data: bytes) -> bool:
 
 
 def _ubx_sums(data: bytes) -> bytes:
-    """Fletcher checksum of a u-blox message, two bytes."""
+    """Fletcher checksum (two bytes) of a u-blox message without sync bytes and checksum."""
     first = second = 0
     for byte in data:
         first = (first + byte) & 0xFF
@@ -155,7 +165,7 @@ def _ubx_sums(data: bytes) -> bytes:
 
 # ---------------------------------------------------------------------- logs of flights
 class LogFormat(NamedTuple):
-    """A format of logs.
+    """A format of flight logs: its name, how its files are recognised, and its reader.
 
     Attributes
     ----------
@@ -166,8 +176,8 @@ class LogFormat(NamedTuple):
     is_format : callable
         Function that tests whether bytes are a file in this format.
     read : callable
-        Reader: takes the bytes of a file, the name of the file in messages, and the keys of the mission file about
-        the log. Raises `PathFileError` with the line, byte or record of a fault.
+        Reader. Its arguments are the bytes of a file, the name of the file in messages, and the keys of the mission
+        file about the log. Returns a `Log`. Raises `PathFileError` with the line, byte or record of a fault.
     """
 
     words: str
@@ -195,16 +205,16 @@ _KEYS_OF_FORMATS = {
 
 
 def log_format(data: bytes) -> str | None:
-    """Key in `LOG_FORMATS` of the format of a file's content; None if the content is no log."""
+    """Recognise a log format from the content of a file; return its key in `LOG_FORMATS`, or None."""
     return next((name for name in reversed(LOG_FORMATS) if LOG_FORMATS[name].is_format(data)), None)
 
 
 def read_log(data: bytes, name: str, stated_format: str | None, keys: LogKeys) -> Log:
-    """Read a log in the format that the mission file states.
+    """Read a flight log in the format that the mission file states.
 
     If `stated_format` is None, the format follows from the content, or else from the ending of the name. The other
-    arguments are those of the reader. Raises `PathFileError` for content of another format or of no format, and for
-    faults that the reader finds.
+    arguments are those of `LogFormat.read`. Raises `PathFileError` for content of another format, for content that is
+    not recognised as a log, and for faults that the reader finds.
     """
     actual = log_format(data)
     if actual is None and is_accuracy(data):

@@ -2,8 +2,8 @@
 
 A log writes degrees, minutes and metres with a fixed number of decimals. The grid is the coarsest decimal step on
 which all fixes lie. It is found from the numbers alone: zeros at the end of a cell are not evidence. A step counts as
-a grid only if the fixes deviate from a smooth path by about the rounding to the step. Fixes of a simulated platform
-that is at rest, or has a round speed, lie on any grid.
+a grid only if the fixes deviate from a smooth path by about the rounding error of the step. This is needed because
+fixes of a simulated platform that is at rest, or has a round speed, lie on a coarse grid by chance.
 """
 
 import math
@@ -27,16 +27,17 @@ _MAX_ROUNDING_RATIO = 0.05  # of binary rounding to a step; if it is larger, a g
 
 
 def decimal_step(times: Floats, values: Floats, units: Sequence[float]) -> float:
-    """Largest decimal step of a unit on which all values lie; 0 if there is no such step.
+    """Largest decimal step to which all values of a coordinate are rounded; 0 if there is no such step. [SI]
 
     Parameters
     ----------
     times : (n,) ndarray
         Rising times. [s]
     values : (n,) ndarray
-        Values of a coordinate. [SI]
+        Values of the coordinate. [SI]
     units : sequence of float
-        Sizes of the units in which the log may write the coordinate. [SI]
+        Sizes of the units in which the log may write the coordinate. [SI] A decimal step is a unit times a power of
+        ten.
     """
     stride = -(-len(values) // _MAX_FIXES)
     values, times = values[::stride], times[::stride]
@@ -59,7 +60,7 @@ def decimal_step(times: Floats, values: Floats, units: Sequence[float]) -> float
 
 
 def _roughness(times: Floats, values: Floats) -> float:
-    """Root mean square deviation of values from a polynomial that is fitted to them, in the unit of the values."""
+    """Root mean square deviation of values (n,) from a polynomial fitted to them, in the unit of the values."""
     normalised_times = 2 * (times - times[0]) / (times[-1] - times[0]) - 1
     basis = chebyshev.chebvander(normalised_times, min(_PATH_ORDER, len(values) // 3))
     centred = values - values.mean()
@@ -70,7 +71,7 @@ def _roughness(times: Floats, values: Floats) -> float:
 def geodetic_grid(times: Floats, latitude: Floats, longitude: Floats, height: Floats) -> Matrix:
     """Vectors of one grid step in latitude, longitude and height, in Earth-fixed axes. [m]
 
-    A coordinate without a grid has a zero vector.
+    Each row of the result (3, 3) is a vector. It is zero for a coordinate without a grid.
     """
     middle = len(times) // 2
     middle_fix = np.array([latitude[middle], longitude[middle], height[middle]])
@@ -89,7 +90,7 @@ def geodetic_grid(times: Floats, latitude: Floats, longitude: Floats, height: Fl
 def cartesian_grid(times: Floats, positions: Floats) -> Matrix:
     """Vectors of one grid step along each axis of positions (n, 3). [m]
 
-    A coordinate without a grid has a zero vector.
+    Each row of the result (3, 3) is a vector. It is zero for an axis without a grid.
     """
     steps = [decimal_step(times, values, _LENGTH_UNITS_M) for values in positions.T]
     return tuple(tuple(row) for row in np.diag(steps).tolist())

@@ -55,7 +55,7 @@ _MAX_RTKLIB_SIGMA_M = 1e5
 
 
 class _Columns(NamedTuple):
-    """Columns of a solution.
+    """Layout of the lines in a solution, as its header names the columns.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class _Columns(NamedTuple):
     delimiter : str
         Character between cells; empty for blanks.
     indices : dict
-        Index of each column by its name. The first two cells are the time.
+        Index of the cell of each column by the column's name. The first two cells of a line are the time.
     width : int
         Number of cells in a line.
     is_in_minutes : bool
@@ -79,12 +79,12 @@ class _Columns(NamedTuple):
 
 
 def is_solution(data: bytes) -> bool:
-    """Whether a file has a line that names the columns of a solution."""
+    """Whether a file is a solution of RTKLIB: it has a line that names the columns of a solution."""
     return bool(_ANY_HEADER.search(data[:100_000]))
 
 
 def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read a solution of at most `MAX_SOLUTION_BYTES` bytes.
+    """Read the fixes in a solution of RTKLIB of at most `MAX_SOLUTION_BYTES` bytes.
 
     Arguments and errors are the same for all readers, see `LogFormat.read`. The log has standard deviations of
     each fix east, north and up, unless the file has none or only zeros.
@@ -141,7 +141,7 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
 
 
 def _header(text: str, location: str) -> _Columns | None:
-    """Columns that a header line, beginning with %, names; None for any other line."""
+    """Read the columns that a header line, which begins with %, names; None for any other line."""
     match = _HEADER_LINE.match(" ".join(text.split()))
     if match is None:
         return None
@@ -167,7 +167,10 @@ def _header(text: str, location: str) -> _Columns | None:
 
 
 def _row(text: str, header: _Columns, location: str) -> tuple[int, list[float]]:
-    """Modified Julian day of a line, and its numbers, with the seconds of the day as the last number."""
+    """Read a line with a fix; return its modified Julian day and its numbers.
+
+    The numbers are those of all cells, with 0 for the two cells of the time. The seconds of the day are appended.
+    """
     cells = (text.replace(header.delimiter, " ") if header.delimiter else text).split()
     if len(cells) != header.width:
         raise PathFileError(f"{location}: has {counted(len(cells), 'cell')}, the columns need {header.width}")
@@ -202,7 +205,7 @@ def _row(text: str, header: _Columns, location: str) -> tuple[int, list[float]]:
 
 @lru_cache(maxsize=64)
 def _day(text: str) -> int | None:
-    """Modified Julian day of a date like 2026/06/01; None if the text is no date."""
+    """Convert a date like 2026/06/01 to a modified Julian day; None if the text is no date."""
     match = _DATE_PATTERN.fullmatch(text)
     instant = parse_instant("{}-{}-{}T00:00:00Z".format(*match.groups())) if match else None
     return None if instant is None else instant.day
@@ -227,16 +230,19 @@ def _radians(table: Floats, header: _Columns, axis: str, records: LogRecords) ->
 
 
 def _hold_to_datum(datum_line: str, name: str) -> None:
-    """Refuse fixes of another datum than WGS-84 or an ITRF frame; a line that begins with % states the datum."""
+    """Refuse a solution whose datum is neither WGS-84 nor an ITRF frame.
+
+    `datum_line` is the line, beginning with %, that states the datum; it may be empty.
+    """
     match = _DATUM_WORDS.search(datum_line)
     if match is not None and not is_wgs84(match[1]):
         raise PathFileError(f"{name}: has positions of the datum {shown(match[1])}", "accepted: WGS84")
 
 
 def _heights(heights: Floats, datum_line: str, keys: LogKeys, name: str) -> Floats:
-    """Convert heights to heights above the ellipsoid. [m]
+    """Convert the heights in a solution to heights above the ellipsoid. [m]
 
-    The line that begins with % states the datum, and whether heights are above the ellipsoid or the geoid.
+    `datum_line`, which begins with %, states whether the heights are above the ellipsoid or above the geoid.
     """
     match = re.search(r"height=[^/,)]+/(\w+)", datum_line)
     if match is not None and match[1] == "ellipsoidal":
@@ -250,7 +256,10 @@ def _heights(heights: Floats, datum_line: str, keys: LogKeys, name: str) -> Floa
 
 
 def _qualities(table: Floats, header: _Columns) -> str:
-    """Number of fixes of each quality, in words, the most frequent first; empty without a column of the quality."""
+    """Text with the four most frequent qualities and the number of fixes of each.
+
+    The text is empty if the solution has no column of the quality.
+    """
     if "Q" not in header.indices:
         return ""
     values, counts = np.unique(table[:, header.indices["Q"]], return_counts=True)
@@ -264,10 +273,10 @@ def _qualities(table: Floats, header: _Columns) -> str:
 def _sigmas(
     table: Floats, header: _Columns, latitude: Floats, longitude: Floats, records: LogRecords
 ) -> Floats | None:
-    """Standard deviations (n, 3) east, north, up; None if the file has none, or only zeros. [m]
+    """Standard deviations (n, 3) of the fixes east, north, up; None if the file has none, or only zeros. [m]
 
-    A zero means unknown. Standard deviations of x, y, z are converted with their covariances. The file states each
-    covariance as a root of its absolute value, with its sign.
+    A zero means unknown. If the file states standard deviations of x, y, z, these are converted to east, north, up
+    with the covariances. For each covariance the file states the square root of its absolute value, with its sign.
     """
     is_turned = "sdx(m)" in header.indices
     names = ("sdx(m)", "sdy(m)", "sdz(m)") if is_turned else ("sde(m)", "sdn(m)", "sdu(m)")

@@ -6,9 +6,9 @@ heading, wander angle [rad]; accelerations [m/s²] and angular rates [rad/s] of 
 of 10 doubles: time; one-sigma (RMS) errors of position north, east, down [m], of velocity [m/s], of roll, pitch,
 heading [arcmin].
 
-Source: the tables of both files in Applanix' POSPac MMS user guide. The frame of the velocities follows from the
-heading, which is the true heading after the wander angle is subtracted: x is the wander angle west of north, y west
-of x, z up. `test_a_real_flight_has_the_wander_frame` checks this against a flight.
+Source: the tables of both files in Applanix' POSPac MMS user guide. The wander frame follows from the heading in the
+file: minus the wander angle, it is the true heading. So x points west of north by the wander angle, y is 90° west of
+x, and z points up. `test_a_real_flight_has_the_wander_frame` checks this against a flight.
 """
 
 import math
@@ -65,7 +65,7 @@ _ACCEPTED_ACCURACY_FILE = "accepted: an accuracy file (smrmsg), records of ten d
 
 
 class _Kind(NamedTuple):
-    """A kind of file.
+    """A kind of file that consists of records: an SBET, or its accuracy file.
 
     Attributes
     ----------
@@ -74,9 +74,9 @@ class _Kind(NamedTuple):
     width : int
         Number of doubles in a record.
     fields : tuple
-        Fields that are checked.
+        Fields that are checked: name, index in a record, smallest and largest value, and unit of each.
     nonzero_fields : int
-        Number of leading fields that are not all zero in a sound record.
+        Number of doubles at the beginning of a record that are not all zero in a usable record.
     """
 
     words: str
@@ -96,7 +96,10 @@ _SMRMSG = _Kind("an accuracy file of an SBET (smrmsg)", 10, _SMRMSG_FIELDS, 4)
 
 @dataclass(frozen=True)
 class Accuracy:
-    """One-sigma errors of position [m] and velocity [m/s], east, north and up: the largest among several records."""
+    """One-sigma errors of position [m] and velocity [m/s], east, north and up.
+
+    Each error is the largest one in a number of `records`.
+    """
 
     position: Vector
     velocity: Vector
@@ -109,17 +112,26 @@ def of_gps(week: int, seconds: float) -> Instant:
 
 
 def is_sbet(data: bytes) -> bool:
-    """Whether bytes are records of 17 doubles; the records at both ends have to be possible for a flight."""
+    """Whether a file is an SBET.
+
+    The records of 17 doubles at its beginning and end have to be possible for a flight.
+    """
     return _looks_like(data, _SBET)
 
 
 def is_accuracy(data: bytes) -> bool:
-    """Whether bytes are records of 10 doubles; the records at both ends need stated errors and rising times."""
+    """Whether a file is the accuracy file of an SBET.
+
+    The records of 10 doubles at its beginning and end have to be possible, and to have different times.
+    """
     return _looks_like(data, _SMRMSG)
 
 
 def _looks_like(data: bytes, kind: _Kind) -> bool:
-    """Whether most of the first three and last three records are of a kind, and times rise from first to last."""
+    """Whether a file consists of records of a kind.
+
+    Most of its first three and last three records have to be usable. Their first and last time have to differ.
+    """
     count = len(data) // kind.size
     if not count or (b"\n" in data[: kind.size] and data[: kind.size].isascii()):
         return False
@@ -132,13 +144,13 @@ def _looks_like(data: bytes, kind: _Kind) -> bool:
 
 
 def read_sbet(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read a trajectory of at most `MAX_SBET_BYTES` bytes.
+    """Read the fixes of an SBET trajectory of at most `MAX_SBET_BYTES` bytes.
 
     Arguments and errors are the same for all readers, see `LogFormat.read`.
 
     Positions come from latitude, longitude and height. Velocities are converted from the wander frame, and have to
-    agree with the positions. Without the key `week` the log has seconds of the week, and no start. Times continue to
-    rise over the end of a week. A leap second within the file is ignored.
+    agree with the positions. Without the key `week` the log has no start, and its times are seconds of the GPS week.
+    Times continue to rise over the end of a week. A leap second within the file is ignored.
     """
     hold_to_scale("gps", keys, name)
     hold_to_ellipsoid(keys, name)
@@ -166,7 +178,7 @@ def read_accuracy(
     """Read the accuracy of a trajectory in the aperture from a file of at most `MAX_SBET_BYTES` bytes.
 
     For each sigma, the largest value in the aperture and next to it is used, see `around_aperture`. `week` is the GPS
-    week of the trajectory. The arguments after it are the same as in `slow_times`. Raises `PathFileError`, with the
+    week of the trajectory. All further arguments are the same as in `slow_times`. Raises `PathFileError`, with the
     record or byte of the fault, for a damaged file. It is also raised for records that do not cover the aperture,
     have a gap in it, or state an error of zero throughout.
     """
@@ -191,7 +203,7 @@ def read_accuracy(
 
 
 def _records(data: bytes, name: str, kind: _Kind) -> tuple[Floats, LogRecords]:
-    """Records (n, width), and whether each is usable: every field has to be within its range.
+    """Read the records (n, width) of a file. In a usable record, every checked field is within its range.
 
     An incomplete record at the end, where writing stopped, counts as an unusable record.
     """
@@ -215,13 +227,13 @@ def _records(data: bytes, name: str, kind: _Kind) -> tuple[Floats, LogRecords]:
 
 
 def _field_words(table: Floats, wrong: NDArray[np.bool_], kind: _Kind, index: int) -> str:
-    """The first wrong field of a record and its value, in words."""
+    """Text for a message with the name and value of the first field of a record that is outside its range."""
     field, column, _, _, unit = kind.fields[int(wrong[:, index].argmax())]
     return f"{field} is {table[index, column]:.6g} {unit}"
 
 
 def _misread(data: bytes, name: str, kind: _Kind, table: Floats, wrong: NDArray[np.bool_]) -> PathFileError:
-    """Error for a file with many wrong records.
+    """Make the error for a file with too many records that are not possible.
 
     It names the likely cause, such as another kind of file or other units.
     """
@@ -240,7 +252,7 @@ def _misread(data: bytes, name: str, kind: _Kind, table: Floats, wrong: NDArray[
 
 
 def _wrong(records: Floats, fields: _Fields) -> NDArray[np.bool_]:
-    """Mask (fields, n) of the fields of records that are outside their ranges."""
+    """Mask (fields, n) of the values in n records that are outside the range of their field."""
     is_wrong = np.empty((len(fields), len(records)), dtype=bool)
     with np.errstate(invalid="ignore"):
         for index, (_, column, lowest, highest, _) in enumerate(fields):
@@ -251,7 +263,10 @@ def _wrong(records: Floats, fields: _Fields) -> NDArray[np.bool_]:
 
 
 def _over_weeks(times: Floats, records: LogRecords) -> Floats:
-    """Make times continue over the end of a week. Times of unusable records are unchanged."""
+    """Convert seconds of the GPS week (n,) to times that continue to rise over the end of a week. [s]
+
+    Times of unusable records are unchanged.
+    """
     usable = np.flatnonzero(records.is_usable)
     usable_times = times[usable]
     steps = np.diff(usable_times)
@@ -264,7 +279,7 @@ def _over_weeks(times: Floats, records: LogRecords) -> Floats:
 
 
 def _hold_to_velocities(times: Floats, records: Floats, name: str) -> None:
-    """Refuse velocities that differ from the motion of the positions."""
+    """Refuse a trajectory whose stated velocities differ from the motion of its positions."""
     if len(times) < 2 or not records[:, 4:7].any():
         return
     latitude, longitude, height, x, y, z = records[:, 1:7].T

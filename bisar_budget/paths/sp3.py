@@ -53,11 +53,11 @@ class _Satellite:
     samples : list of Sample
         Times in TAI, positions and velocities.
     lines : list of int
-        Lines of the samples.
+        Numbers of the lines of the samples.
     deviations : list of Vector or None
-        Standard deviations of the position of each sample. [m]
+        Standard deviations of the position of each sample; None if the file states none. [m]
     breaks : set of int
-        Indices of samples after a manoeuvre or a missing position.
+        Indices of samples that directly follow a manoeuvre or a missing position.
     predicted : Instant, optional
         Time of the first predicted position, in TAI.
     """
@@ -115,15 +115,15 @@ class _Heading:
     frame, system : str
         Earth-fixed axes and time system.
     base : float
-        Base of the exponents of standard deviations; 0 without them.
+        Standard deviations of positions are written as exponents of this base; 0 if the file states no base.
     nameless : int
         Number of positions without a readable name of a satellite.
     broken : dict
         Messages about other unusable lines, by their numbers.
     first_epoch_line : int
-        Line of the first epoch.
+        Number of the line with the first epoch.
     accuracy : dict
-        Accuracy by satellite; 0 if it is unknown. [m]
+        Accuracy of the orbit of each satellite, by its name; 0 if it is unknown. [m]
     """
 
     def __init__(self, lines: Sequence[str], name: str) -> None:
@@ -170,7 +170,7 @@ class _Heading:
 
 
 def _accuracy(exponent: str) -> float:
-    """Accuracy of 2ⁿ mm from its exponent n; 0 if it is unknown. [m]
+    """Accuracy of an orbit, 2ⁿ mm, from the text of the exponent n; 0 if it is unknown. [m]
 
     An exponent above 30 is not possible for an orbit, and counts as unknown.
     """
@@ -179,9 +179,10 @@ def _accuracy(exponent: str) -> float:
 
 
 def _deviations(line: str, base: float) -> Vector | None:
-    """Standard deviations of the position in a line, baseⁿ mm for each axis; None if the line has none. [m]
+    """Standard deviations of the position in a line, for each axis baseⁿ mm; None if the line states none. [m]
 
-    An axis without a standard deviation gets the largest of the line. Three zeros mean that the line states none.
+    The line states the exponents n. An axis without an exponent gets the largest exponent of the line. If all
+    exponents are zero, the line states no standard deviation.
     """
     if base <= 1:
         return None
@@ -195,14 +196,14 @@ def _deviations(line: str, base: float) -> Vector | None:
 
 
 def _id(text: str) -> str:
-    """Standard name of a satellite, such as G05 from G05, from G 5, or in SP3-a from 5 alone."""
+    """Standard name of a satellite, such as G05, from `G05`, `G 5`, or `5` as written in SP3-a."""
     return (text[:1].strip() or "G") + text[1:].strip().rjust(2, "0")
 
 
 def _satellites(
     lines: Sequence[str], header: _Heading, name: str, object_name: str | None = None
 ) -> dict[str, _Satellite]:
-    """All satellites of a file by their names, or only the satellite with a given name."""
+    """Read the samples of all satellites of a file, or of the one with a given name; return them by their names."""
     key = None if object_name is None else object_key(object_name)
     satellites: dict[str, _Satellite] = {}
     time: Instant | None = None
@@ -250,7 +251,7 @@ def _epoch_after(line: str, last_epoch: Instant | None, system: str, location: s
 
 
 def _add_velocity(line: str, satellite: _Satellite, index: int, location: str) -> None:
-    """Add the velocity in a line to the sample of the position before it."""
+    """Read a velocity from a line, and add it to the sample `index`, whose position the line before it states."""
     if _satellite_of(line, location) != satellite.id:
         raise PathFileError(f"{location}: the velocity is not of {satellite.id}, whose position is above it")
     velocity = [speed / 10 for speed in _numbers(line, location, "dm/s")]
@@ -261,7 +262,7 @@ def _add_velocity(line: str, satellite: _Satellite, index: int, location: str) -
 def _add_position(
     line: str, time: Instant, number: int, satellites: dict[str, _Satellite], header: _Heading, name: str
 ) -> tuple[_Satellite, int] | None:
-    """Add the position in a line as a sample; return its satellite and the index of the sample.
+    """Read a position from a line, and add it to its satellite as a sample; return satellite and index of the sample.
 
     Returns None if the line has no position, or repeats the sample before it.
     """
@@ -295,7 +296,10 @@ def _add_position(
 
 
 def _is_of(line: str, key: str) -> bool:
-    """Whether a position or a velocity belongs to a satellite. A line without a name belongs to no satellite."""
+    """Whether a line with a position or a velocity belongs to a satellite.
+
+    `key` is the name of the satellite in the form of `object_key`. A line without a name belongs to no satellite.
+    """
     return bool(_SATELLITE.fullmatch(line[1:4])) and object_key(_id(line[1:4])) == key
 
 
@@ -308,7 +312,7 @@ def _satellite_of(line: str, location: str) -> str:
 
 
 def _numbers(line: str, location: str, unit: str) -> list[float]:
-    """Three coordinates in a line, each from 14 columns."""
+    """Read the three coordinates in a line, each from 14 columns, in the unit of the file."""
     requirement = f"must be a number of {unit} in columns"
     return [
         coordinate_in(line[first : first + 14], location, f"{requirement} {first + 1} to {first + 14}")
@@ -339,7 +343,10 @@ def _epoch(line: str, system: str, location: str) -> Instant:
 
 
 def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instant) -> Iterator[Segment]:
-    """Segments of a satellite between gaps and manoeuvres. `center` is mid-aperture in TAI."""
+    """Yield the segments of a satellite's orbit between gaps and manoeuvres.
+
+    `center` is mid-aperture in TAI. It decides whether a warning about predicted positions is needed.
+    """
     samples = satellite.samples
     steps = sorted(after.time.since(before.time) for before, after in pairwise(samples))
     usual_step = steps[len(steps) // 2] if steps else 0.0
@@ -387,7 +394,8 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
 def _stated(satellite: _Satellite, stretch: range, time: Instant) -> StatedAccuracy | None:
     """Accuracy that a file states for a satellite at a time in TAI; None if it states none.
 
-    It is the accuracy in the header, or the standard deviations of the samples around the time if these are larger.
+    It is the accuracy in the header, or the standard deviations of the samples directly before and after the time if
+    these are larger. `stretch` are the indices of the samples of a segment.
     """
     after = bisect_left(satellite.samples, time, stretch.start, stretch.stop, key=lambda sample: sample.time)
     neighbours = {min(max(index, stretch.start), stretch.stop - 1) for index in (after - 1, after)}

@@ -29,7 +29,7 @@ _HALVED_MOTION_FRACTION = 0.5  # pieces with more than this fraction of the larg
 
 
 def basis(times: Floats, edges: Floats) -> Floats:
-    """Values (n, m + `SPLINE_ORDER`) of the B-splines at times (n,), for m pieces between rising edges (m + 1,).
+    """Values (n, m + `SPLINE_ORDER`) of all B-splines at times (n,), for m pieces whose edges (m + 1,) rise.
 
     The first and the last piece continue beyond the edges. Source: the recursion of de Boor (1972) and Cox (1972).
     """
@@ -59,7 +59,8 @@ class SplineFit:
     edges : (m + 1,)
         Times at which pieces begin and end. [s]
     center : (3,)
-        Mean position of the fixes. The spline is relative to it, so that a distant position loses no digits. [m]
+        Mean position of the fixes. [m] The spline is relative to it, so that no digits are lost if the fixes are far
+        from the origin.
     series : (coefficients, 3)
         Coefficients of the spline. [m]
     residuals : (n, 3)
@@ -90,12 +91,16 @@ class SplineFit:
     def motion(self) -> Floats:
         """Scalar product of each residual and the next residual, (n - 1,). [m²]
 
-        The mean is 0 for white noise, and positive if the residuals contain motion.
+        It shows where the residuals contain motion of the platform: the mean is 0 for white noise, and positive for
+        motion.
         """
         return np.asarray((self.residuals[1:] * self.residuals[:-1]).sum(axis=1))
 
     def halved(self, times: Floats) -> Floats | None:
-        """Edges after the pieces with the largest residual motion are halved; None if no such piece can be halved."""
+        """Halve the pieces whose residuals contain the most motion; return the new edges.
+
+        `times` (n,) are the times of the fixes. [s] Returns None if no piece with motion can be halved.
+        """
         lengths, middles = np.diff(self.edges), (self.edges[1:] + self.edges[:-1]) / 2
         piece = np.clip(np.searchsorted(self.edges, times, "right") - 1, 0, len(middles) - 1)
         early = np.bincount(piece, times < middles[piece], len(middles))
@@ -107,7 +112,7 @@ class SplineFit:
         return np.sort(np.concatenate([self.edges, middles[motion >= _HALVED_MOTION_FRACTION * motion.max()]]))
 
     def state(self) -> PlatformState:
-        """The spline as a path with a polynomial for each piece."""
+        """The spline as a `PlatformState`, a path with one polynomial for each piece."""
         # Coefficients about the middle of a piece, from values at SPLINE_ORDER + 1 nodes; exact except for rounding.
         middles, halves = (self.edges[1:] + self.edges[:-1]) / 2, np.diff(self.edges) / 2
         nodes = np.cos(np.pi * (np.arange(SPLINE_ORDER + 1) + 0.5) / (SPLINE_ORDER + 1))
@@ -135,9 +140,9 @@ def _vector(values: Iterable[float]) -> Vector:
 
 
 def _shifted(powers: Floats, by_s: float) -> list[Vector]:
-    """Move the origin of a polynomial from 0 to the time `by_s` [s]; return its coefficients there.
+    """Move the origin of time of a polynomial from 0 to `by_s` [s]; return its coefficients about the new origin.
 
-    The Taylor series is computed by repeated synthetic division.
+    These are the coefficients of its Taylor series, computed by repeated synthetic division.
     """
     shifted = powers.copy()
     for first in range(len(shifted) - 1):

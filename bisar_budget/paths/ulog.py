@@ -1,10 +1,10 @@
-"""Logs of PX4 (ULog, `.ulg`): fixes of the GPS topic, or the global position that the autopilot estimates.
+"""Logs of the PX4 autopilot (ULog, `.ulg`): fixes of the GPS topic, or the autopilot's estimate of its position.
 
-A ULog consists of messages, each with a size, a type and a payload. The types are formats of topics (F), numbers for
-the names of topics (A), and records of topics (D). The topics `vehicle_gps_position` and `sensor_gps` have their own
-UTC, and heights above the ellipsoid. `vehicle_global_position` has times since the start of the autopilot, and gets
-UTC from the GPS topic. Both state standard deviations of each fix: `eph` is horizontal, `epv` vertical. Attitude is
-not read.
+A ULog consists of messages, each with a size, a type and a payload. Type F states the fields of a topic, type A gives
+a number to a topic, and type D is a record of the topic with a number. The GPS topics are `vehicle_gps_position` and
+`sensor_gps`. They have their own UTC, and heights above the ellipsoid. The topic `vehicle_global_position` has times
+since the start of the autopilot, and gets UTC from a GPS topic. GPS topics and global positions state standard
+deviations of each fix: `eph` is horizontal, `epv` vertical. Attitude is not read.
 
 Source: PX4 user guide, "ULog File Format"; PX4-Autopilot msg/SensorGps.msg (latitude_deg and so on, before release
 1.14 lat in 1e-7 deg and alt in mm) and msg/versioned/VehicleGlobalPosition.msg. The package pyulog is a reference in
@@ -62,9 +62,10 @@ _MAX_CLOCK_DRIFT_S = 1.0  # due to jitter of messages; a larger drift means that
 
 
 class _Units(NamedTuple):
-    """Names of the coordinates of a topic, and their factors to degrees and metres.
+    """Names of the fields of a topic with coordinates, and factors that convert them to degrees and metres.
 
-    GPS topics have two versions of these names and factors.
+    `height` is above the ellipsoid, and `altitude` above mean sea level. GPS topics have two versions of these names
+    and factors.
     """
 
     latitude: str
@@ -85,7 +86,7 @@ Records = NDArray[np.void]
 
 
 class _Topic(NamedTuple):
-    """A topic: its name, its records, the names of its coordinates, and the instance of the receiver."""
+    """A topic in a log: its name, records, names and units of coordinates, and instance (number) of the receiver."""
 
     name: str
     records: Records
@@ -93,7 +94,7 @@ class _Topic(NamedTuple):
     instance: int = 0
 
     def column(self, field: str) -> Floats:
-        """Values of a field, (n,)."""
+        """Values of a field in all records, (n,)."""
         values: Floats = self.records[field].astype(np.float64)
         return values
 
@@ -145,7 +146,7 @@ def _count(topic: _Topic) -> int:
 def _with_fixes(topic: _Topic) -> _Topic:
     """Keep only the records of a topic that have a fix.
 
-    Records of a GPS topic also need UTC, which is 0 at first.
+    Records of a GPS topic also need UTC, which is 0 until the receiver knows it.
     """
     records = topic.records
     if topic.name in _GPS_TOPICS:
@@ -165,7 +166,7 @@ def _of_gps(gps: _Topic, keys: LogKeys, name: str) -> Log:
 
 
 def _of_global(position: _Topic, gps: _Topic | None, keys: LogKeys, name: str) -> Log:
-    """Log of the position that the autopilot estimates.
+    """Make a log from the positions that the autopilot estimates.
 
     Without a GPS topic, the log has no UTC, and its times are seconds since the start of the autopilot.
     """
@@ -223,7 +224,10 @@ def _log(
 
 # ---------------------------------------------------------------------- messages
 def _topics(data: bytes, name: str) -> list[_Topic]:
-    """Topics that have positions, with their records; each instance is a separate topic."""
+    """Read the topics of a log that have positions.
+
+    If a topic has several instances, which are receivers, each instance is a separate element of the list.
+    """
     formats: dict[str, str] = {}
     layouts: dict[str, tuple[np.dtype[np.void], _Units]] = {}
     subscriptions: dict[int, tuple[str, np.dtype[np.void], _Units, int]] = {}
@@ -255,7 +259,10 @@ def _topics(data: bytes, name: str) -> list[_Topic]:
 
 
 def _messages(data: bytes, name: str) -> Iterator[tuple[int, int, bytes]]:
-    """Type, byte offset and payload of every complete message. A power loss may truncate the last message."""
+    """Yield type, byte offset and payload of every complete message.
+
+    The last message may be incomplete because of a power loss; it is ignored.
+    """
     offset, end = _HEADER_BYTES, len(data)
     unpack = struct.Struct("<HB").unpack_from
     while offset + 3 <= end:
@@ -272,14 +279,17 @@ def _messages(data: bytes, name: str) -> Iterator[tuple[int, int, bytes]]:
 
 
 def _hold_to_flags(payload: bytes, location: str) -> None:
-    """Refuse a file with flags of a newer version of ULog."""
+    """Refuse a file whose flag message has flags of a newer version of ULog, which cannot be read."""
     incompatible = payload[8:16]
     if incompatible[:1] > bytes([_APPENDED_DATA_FLAG_BITS]) or any(incompatible[1:]):
         raise PathFileError(f"{location}: has flags {incompatible.hex()} of a newer kind of ULog")
 
 
 def _layout(topic: str, fields: str, location: str) -> tuple[np.dtype[np.void], _Units]:
-    """NumPy data type for the fields of a topic that are read, and the names and units of its coordinates."""
+    """NumPy data type of the fields of a topic that are read, and the names and units of its coordinates.
+
+    `fields` is the text of the format message (F) of the topic.
+    """
     types: dict[str, tuple[str, int]] = {}
     offset = 0
     for field in filter(None, fields.split(";")):

@@ -1,4 +1,4 @@
-"""Times at which a satellite is above an elevation at a scene: rise, culmination and set, and times of a squint.
+"""Passes of a satellite over a scene: rise, culmination and set above an elevation, and times with a given squint.
 
 An orbit is sampled every two minutes in the axes of the scene, and interpolated by Lagrange polynomials through eight
 samples. Their error is centimetres in a low orbit, and less than a metre at the perigee of a transfer orbit. All
@@ -58,7 +58,11 @@ class Stretch(NamedTuple):
 
 
 class _Sampled:
-    """Samples of an orbit in the axes of a scene, at most two minutes apart, from `start` [s] to `stop` [s]."""
+    """Samples of an orbit in the axes of a scene, from `start` [s] to `stop` [s].
+
+    They are at most two minutes apart, and are interpolated. If the orbit ends early, `stop` is earlier, and `reason`
+    is the cause.
+    """
 
     def __init__(self, orbit: Orbit, axes: SceneAxes, origin: Instant, start: float, stop: float) -> None:
         self.orbit, self.start, self.reason = orbit, start, ""
@@ -75,7 +79,7 @@ class _Sampled:
         self.positions: Floats = axes.places(np.array(positions)) if positions else np.empty((0, 3))
 
     def at(self, times: Floats) -> tuple[Floats, Floats]:
-        """Positions [m] and velocities [m/s], each (n, 3), at times (n,) within the span."""
+        """Positions [m] and velocities [m/s], each (n, 3), interpolated at times (n,) within the samples."""
         sample_number = (times - self.start) / self.step
         last = len(self.positions) - _INTERPOLATION_NODES
         first = np.clip(sample_number.astype(int) - (_INTERPOLATION_NODES // 2 - 1), 0, last)
@@ -89,7 +93,7 @@ class _Sampled:
 
 @dataclass(frozen=True, eq=False)
 class Watched:
-    """A satellite seen from the origin of a scene during a time span, and the parts of the span without an orbit.
+    """Motion of a satellite during a time span, seen from a scene, and the parts of the span without an orbit.
 
     Times are seconds after `origin`. If a file has several element sets or segments, the nearest one is used at each
     time, as `orbits_of` does for a mission.
@@ -103,7 +107,7 @@ class Watched:
     def over(
         cls, orbit_at: Callable[[Instant], Orbit], axes: SceneAxes, origin: Instant, duration_s: float
     ) -> "Watched":
-        """Sample the orbits of a time span that begins at `origin`.
+        """Sample a satellite's orbits during a time span that begins at `origin`.
 
         `orbit_at` returns the orbit at an instant, and raises `PathFileError` if there is none.
         """
@@ -126,11 +130,11 @@ class Watched:
         return np.array([piece.start for piece in self.pieces])
 
     def _of(self, times: Floats) -> NDArray[np.intp]:
-        """Index of the piece in which each time lies."""
+        """Index in `pieces` of the sampled orbit to which each time belongs."""
         return np.maximum(np.searchsorted(self._starts, times, "right") - 1, 0)
 
     def at(self, times: Floats) -> tuple[Floats, Floats]:
-        """Positions [m] and velocities [m/s], each (n, 3), in scene axes, at times (n,) that have an orbit."""
+        """Positions [m] and velocities [m/s], each (n, 3), in scene axes, at times (n,) outside the gaps."""
         position, velocity = np.empty((2, times.size, 3))
         piece_numbers = self._of(times)
         for number in np.unique(piece_numbers).tolist():
@@ -139,29 +143,29 @@ class Watched:
         return position, velocity
 
     def state(self, time: float) -> PlatformState:
-        """Position and velocity at a time as a platform state."""
+        """`PlatformState` of the satellite at a time [s], with its position and velocity in scene axes."""
         (position,), (velocity,) = self.at(np.array([time]))
         return PlatformState(position=tuple(position.tolist()), velocity=tuple(velocity.tolist()))
 
     def orbit(self, time: float) -> Orbit:
-        """Orbit that is used at a time."""
+        """Orbit from which the position at a time [s] is taken."""
         return self.pieces[int(self._of(np.array([time]))[0])].orbit
 
     def sine_of_elevation(self, times: Floats) -> Floats:
-        """Sine of the elevation (n,) at times (n,)."""
+        """Sine of the elevation of the satellite, (n,), at times (n,)."""
         position, _ = self.at(times)
         sine: Floats = position[:, 2] / np.linalg.norm(position, axis=1)
         return sine
 
     def _rate(self, times: Floats) -> Floats:
-        """Rate of the sine of the elevation (n,) at times (n,), multiplied by the slant range. [m/s]"""
+        """Rate of change of the sine of the elevation, multiplied by the slant range, (n,), at times (n,). [m/s]"""
         position, velocity = self.at(times)
         square = np.sum(position**2, axis=1)
         rate: Floats = velocity[:, 2] - position[:, 2] * np.sum(position * velocity, axis=1) / square
         return rate
 
     def squint(self, times: Floats) -> Floats:
-        """Squint (n,) at times (n,), as in `PlatformState.squint`. [rad]"""
+        """Squint angle of the satellite, (n,), at times (n,), as `PlatformState.squint` defines it. [rad]"""
         position, velocity = self.at(times)
         lengths = np.linalg.norm(position, axis=1) * np.linalg.norm(velocity, axis=1)
         with np.errstate(invalid="ignore"):
@@ -170,7 +174,7 @@ class Watched:
         return angle
 
     def above(self, elevation: float) -> list[Stretch]:
-        """Stretches of time above an elevation [rad], in order."""
+        """Find the stretches of time in which the satellite is above an elevation [rad], in the order of time."""
         min_sine = math.sin(elevation)
         stretches: list[Stretch] = []
         for piece in self.pieces:
@@ -194,7 +198,7 @@ class Watched:
         return stretches
 
     def culmination(self, stretch: Stretch) -> float:
-        """Time within a stretch with the highest elevation. [s]"""
+        """Time of the highest elevation within a stretch. [s]"""
         times = _times(stretch.start, stretch.stop)
         times = np.concatenate([times, _roots(self._rate, times)])
         return float(times[self.sine_of_elevation(times).argmax()])
@@ -227,7 +231,7 @@ def _times(start: float, stop: float) -> Floats:
 
 
 def _roots(function: Callable[[Floats], Floats], times: Floats) -> Floats:
-    """Times at which a function changes sign.
+    """Times at which a function of time changes its sign, by bisection. [s]
 
     The function is assumed to change sign at most once between two neighbours in `times`.
     """
@@ -246,10 +250,11 @@ def _roots(function: Callable[[Floats], Floats], times: Floats) -> Floats:
 def _orbits(
     orbit_at: Callable[[Instant], Orbit], origin: Instant, duration_s: float
 ) -> Iterator[tuple[float, float, Orbit | PathFileError]]:
-    """Parts of a time span: start and end of each part [s], and its orbit or the reason why there is none.
+    """Divide a time span into parts with one orbit each; yield start [s], end [s] and orbit of each part.
 
-    At each time the nearest element set is used, or the segment that reaches farthest around the time. So each
-    element set, and each segment, has one part of the span.
+    Instead of a missing orbit, the error with the reason is yielded. At each time the nearest element set is
+    used, or the segment of an ephemeris whose nearer end is farthest from the time. So each element set, and each
+    segment, has one part of the span.
     """
     orbits: dict[float, Orbit | PathFileError] = {}
 
@@ -262,7 +267,7 @@ def _orbits(
         return orbits[time]
 
     def search(start: float, stop: float) -> None:
-        """Find all changes of the orbit between two times, and record them in `orbits`."""
+        """Find all changes of the orbit between two times [s]; add the orbits before and after them to `orbits`."""
         orbit, next_orbit = at(start), at(stop)
         if stop - start <= _CHANGE_ERROR_S or (_are_same_orbit(orbit, next_orbit) and not _is_gap(orbit)):
             return
@@ -297,7 +302,10 @@ def _are_same_orbit(orbit: Orbit | PathFileError, next_orbit: Orbit | PathFileEr
 
 
 def _changes(orbit: Orbit | PathFileError, next_orbit: Orbit | PathFileError, origin: Instant) -> list[float]:
-    """Times at which one orbit is likely to replace another: ends of spans, and the middle between two epochs. [s]"""
+    """Times at which one orbit is likely to replace another. [s]
+
+    These are the ends of the spans of ephemerides, and the middle between the epochs of two element sets.
+    """
     ends: list[Instant] = []
     for candidate in (orbit, next_orbit):
         if isinstance(candidate, PathFileError):

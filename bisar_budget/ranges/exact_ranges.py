@@ -75,10 +75,11 @@ class PointSettings:
         Root of the determinant of H at a point (the area that the gradient g spans), as a fraction of its value at
         the scene centre. A path on which the fraction is smaller is near a fold or beyond it.
     near_fold_fraction : float
-        The same fraction, as the upper bound of the neighbourhood of a fold. There the area changes much in a small
+        Value of the same fraction below which a point counts as near a fold. There the area changes much in a small
         step, and one peak may fade into another.
     last_step_rad : float
-        Largest change of a phase by the last step, not counting the part that is linear in the step. [rad]
+        Largest change of a phase that the last step of a search may cause. The part of the change that is linear in
+        the step does not count. [rad]
     last_step_near_fold_fraction : float
         Largest square of the last step near a fold, as a fraction of the largest square elsewhere.
     nearest_fraction : float
@@ -171,12 +172,12 @@ class TimeTags:
     case: Indices
 
     def of(self, lanes: Indices) -> "TimeTags | None":
-        """Select lanes by index; None if none of the selected lanes is a time tag."""
+        """Time tags of the lanes with the indices `lanes`; None if no selected lane has a time-tag error."""
         case = self.case.take(lanes)
         return replace(self, case=case) if (case >= 0).any() else None
 
     def put(self, platform: int, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> list[Any]:
-        """Return the shifts `along` of one platform, with the values in time-tag lanes replaced.
+        """Copy `along`, the shifts or directions of one platform, and replace the values of time-tag lanes.
 
         Returns three arrays (nodes, lanes), one per axis. A time-tag lane gets the shift that its time-tag error
         `tag_s` [s] causes. [m] If `is_rate`, it gets the change of this shift per second of time-tag error. [m/s]
@@ -238,14 +239,14 @@ class Lanes:
         return Lanes(self.case.take(lanes), at_nodes, moves, directions, order, tags)
 
     def there(self, case: Indices) -> "Lanes":
-        """Errors for the collections that `ExactRanges.at` returns for the same `case`.
+        """Errors of the collections that `ExactRanges.at` returns for the same `case`, one lane per collection.
 
-        The lanes must be one per case, in the order of the cases.
+        The present lanes must be one per case, in the order of the cases.
         """
         return replace(self.of(case), case=np.arange(case.size))
 
     def shifts(self, size: Any) -> Floats:
-        """Shifts of both platforms at the nodes caused by errors of the given sizes, (2, 3, nodes, lanes). [m]"""
+        """Shifts of both platforms at the nodes that errors of given sizes cause, (2, 3, nodes, lanes). [m]"""
         course = self.at_nodes * size
         shifts: Floats = self.directions * course
         return shifts if self.tags is None else self._tagged(self.tags, course, shifts)
@@ -260,18 +261,18 @@ class Lanes:
         return self._tagged(self.tags, self.at_nodes * size, self.directions, is_rate=True)
 
     def _tagged(self, tags: TimeTags, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> Floats:
-        """Replace the shifts or directions of both platforms in the time-tag lanes."""
+        """Return the shifts or directions `along` of both platforms, with the values of time-tag lanes replaced."""
         both = np.array([tags.put(platform, tag_s, along[platform], is_rate=is_rate) for platform in (0, 1)])
         return np.asarray(both * self.moves[:, None, None])
 
     def clock(self, size: Any) -> Floats:
-        """Range error at the nodes by clock errors of given sizes. [m]"""
+        """Range error at the nodes that clock errors of given sizes cause; 0 for other errors, (nodes, lanes). [m]"""
         is_clock = 1.0 - self.moves.max(axis=0)
         return np.asarray(self.at_nodes * (size * is_clock))
 
 
 class SmallErrors(NamedTuple):
-    """List of unit errors, the same for all cases, so small that their effects are proportional to them.
+    """List of small unit errors that all cases have in common; their effects are proportional to their sizes.
 
     `courses` (courses, nodes, cases) are the distinct error histories over the aperture. [m/unit] `course` (errors,)
     is the index of each error's history. `ways` (errors, 7, cases) are the components of a unit of each error:
@@ -287,7 +288,7 @@ class SmallErrors(NamedTuple):
 
     @classmethod
     def of(cls, errors: Sequence[Lanes]) -> "SmallErrors":
-        """Combine one `Lanes` per error, each with one lane per case."""
+        """Combine a list of errors; each is a `Lanes` object with one lane per case."""
         keys = [int(lanes.order[0]) if lanes.platforms else -index for index, lanes in enumerate(errors, 1)]
         courses = dict(zip(keys, (lanes.at_nodes for lanes in errors), strict=True))
         cases = max((lanes.directions.shape[-1] for lanes in errors), default=1)
@@ -302,7 +303,7 @@ class SmallErrors(NamedTuple):
         return cls(np.array(list(courses.values())), course, ways, turning)
 
     def there(self, case: Indices) -> "SmallErrors":
-        """Return the same errors for the cases selected by `case`, like `Lanes.there`."""
+        """Errors of the collections that `ExactRanges.at` returns for the same `case`."""
         courses, ways, *turning = _take_cases([self.courses, self.ways, *self.turning.values()], case)
         return SmallErrors(courses, self.course, ways, dict(zip(self.turning, turning, strict=True)))
 
@@ -313,7 +314,7 @@ class ImagePoints(NamedTuple):
     `is_settled` is True where the search converged. `east` and `north` are the displacement. [m] `quadratic` and
     `cubic` are the phases at the aperture edge, with the sign of the range error. `hidden` is the hidden phase, and
     `rest` the rms phase beyond the cubic. [rad] `turn` is the root of the determinant of H at the point (the area
-    that the gradient g spans), as a fraction of its value at the scene centre.
+    that the gradient g spans), as a fraction of its value at the scene centre. It is negative beyond a fold.
     """
 
     is_settled: Booleans
@@ -331,8 +332,8 @@ class ExactEffect:
     """Effect of one error, computed from exact ranges, in plain numbers.
 
     `displacement` is the displacement east and north. [m] `quadratic` and `cubic` are the phases at the aperture
-    edge, with the sign of the range error. `hidden` is the phase that the band and the turn of the line of sight do
-    not resolve. `rest` is the rms phase beyond the cubic. [rad]
+    edge, with the sign of the range error. `hidden` is the hidden phase: its range error is one that the band and the
+    turn of the line of sight do not resolve. `rest` is the rms phase beyond the cubic. [rad]
     """
 
     displacement: GroundVector
@@ -373,8 +374,8 @@ class ExactRanges:
     Attributes
     ----------
     gradient : (2, 4, n)
-        Change of the range error per metre east (first) and per metre north (second): mean, P₁ part at the aperture
-        edge, quadratic and cubic part.
+        Change of the range error if the point moves a metre east (first) or north (second). The four values are the
+        mean of the change, and its P₁, quadratic and cubic part at the aperture edge. [m/m]
     """
 
     def __init__(
@@ -449,7 +450,7 @@ class ExactRanges:
 
     @cached_property
     def slopes(self) -> Floats:
-        """Sum of the lines of sight on the ground, u_t + u_r, (2, nodes, n).
+        """Horizontal components of u_t + u_r, the sum of both lines of sight, (2, nodes, n). [m/m]
 
         It is the decrease of the range sum if the point moves a metre east (first row) or north (second row).
         """
@@ -464,20 +465,20 @@ class ExactRanges:
 
     @cached_property
     def sine(self) -> Floats:
-        """Sine of the angle between the directions that band and turn resolve, at the scene centre, (n,).
+        """Sine of the angle between the ground direction that the band resolves and the one that the turn resolves.
 
-        See `GroundMatrix.sine`.
+        It applies to the scene centre, (n,). The turn is that of the line of sight. See `GroundMatrix.sine`.
         """
         return self.matrix.sine
 
     @cached_property
     def product_weights(self) -> Floats:
-        """Weights of the scalar product ⟨a, c⟩ of V for histories from `Sampling.centred`, (nodes + 1, n)."""
+        """Weights of the scalar product ⟨a, c⟩ of V, for histories mapped by `Sampling.centred`, (nodes + 1, n)."""
         return np.concatenate(((1 + self.band) * self.mean, self.band[None]))
 
     @cached_property
     def near_fold(self) -> Floats:
-        """Determinant of H below which a point is near a fold, (n,)."""
+        """Threshold for the determinant of H; with a smaller determinant, a point is near a fold, (n,)."""
         return np.asarray(POINT_SETTINGS.near_fold_fraction**2 * self.matrix.determinant)
 
     @cached_property
@@ -511,7 +512,7 @@ class ExactRanges:
 
     @cached_property
     def rounding(self) -> Floats:
-        """Smallest phase that is distinct from rounding in a phase history in double precision, (n,). [rad]"""
+        """Smallest phase that exceeds the rounding errors of a phase history in double precision, (n,). [rad]"""
         recorded = (self.ranges[0] + self.ranges[1]).max(axis=0)
         if self.has_direct_path:
             recorded = recorded + self.baselines.max(axis=0)
@@ -530,16 +531,20 @@ class ExactRanges:
 
     @cached_property
     def heard_along(self) -> tuple[VectorArrays, VectorArrays]:
-        """Unit vectors from receiver to transmitter and from transmitter to receiver, at the nodes."""
+        """Unit vectors at the nodes from receiver to transmitter, and from transmitter to receiver.
+
+        Each vector has three components (nodes, n).
+        """
         x, y, z = (component / self.baselines for component in self._between)
         return ((x, y, z), (-x, -y, -z))
 
     # ------------------------------------------------------------------ small errors
     @cached_property
     def powers(self) -> dict[str, Floats]:
-        """Position error at the nodes caused by one unit of a polynomial error of (22), (nodes, n).
+        """Position error at the nodes for one unit of each coefficient of the error polynomial (22), (nodes, n).
 
-        The keys are the units of the error: `m` for 1, `m/s` for τ, and `m/s^2` for τ²/2.
+        The keys are the units of the coefficients: `m` for the factor of 1, `m/s` for that of τ, and `m/s^2` for
+        that of τ²/2.
         """
         return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
 
@@ -551,7 +556,7 @@ class ExactRanges:
         return SPEED_OF_LIGHT_MPS * seconds
 
     def along(self, platform: int, direction: Vectors) -> Floats:
-        """Change of the range at the nodes per metre that a platform moves along a direction.
+        """Range error at the nodes per metre of position error of a platform along a direction, (nodes, n). [m/m]
 
         It is −u·d, or −(u − b)·d if the direct path is the clock; u is the line of sight to the platform, d the
         direction, and b the unit vector from the other platform to this one.
@@ -560,9 +565,9 @@ class ExactRanges:
         return change + dot(self.heard_along[platform], direction) if self.has_direct_path else change
 
     def range_error(self, lanes: Lanes) -> Floats:
-        """Range error at the nodes caused by one unit of each of a set of small errors, (nodes, lanes). [m/unit]
+        """Range error at the nodes for one unit of each small error in `lanes`, (nodes, lanes). [m/unit]
 
-        The lanes are one error for each case, or any number of errors of a single case.
+        `lanes` has one error for each case, or any number of errors of a single case.
         """
         moved = lanes.clock(1.0)
         for platform in lanes.platforms:
@@ -571,9 +576,9 @@ class ExactRanges:
         return np.asarray(moved)
 
     def quadratics_of(self, errors: SmallErrors) -> Floats:
-        """Quadratic phase per unit of small errors, with the effect of the displacement, (errors, cases). [rad/unit]
+        """Quadratic phase at the displaced point for one unit of each small error, (errors, cases). [rad/unit]
 
-        The values are those that `effect` gives.
+        The values are the same as those of `effect`, computed faster for many errors.
         """
         weights = self.phase_weights[0]
         along = np.empty((7, *weights.shape))  # range change at the nodes per metre along each component of `ways`
@@ -599,10 +604,10 @@ class ExactRanges:
 
     @cached_property
     def order_weights(self) -> Floats:
-        """Weights that give Legendre orders 0 to 3 at the displaced point from range errors at the nodes. [m/m]
+        """Legendre orders 0 to 3 of the remaining range error, per metre of range error at each node. [m/m]
 
-        The array is (4, nodes, n). The weights include the effect of the displacement. They give the value of each
-        order at the aperture edge.
+        The array is (4, nodes, n). The remaining range error is that at the displaced point. The value of each order
+        is taken at the aperture edge.
         """
         (by_east, by_north), (east, north) = self.gradient, self.place_weights
         return np.asarray(self.fit[..., None] + by_east[:, None] * east + by_north[:, None] * north)
@@ -611,17 +616,17 @@ class ExactRanges:
     def phase_weights(self) -> Floats:
         """Quadratic and cubic phase per metre of range error at each node, (2, nodes, n). [rad/m]
 
-        The phases include the effect of the displacement.
+        The phases are those at the displaced point.
         """
         return np.asarray(self.k * self.order_weights[2:])
 
     @cached_property
     def hidden_weights(self) -> Floats:
-        """Parts of the hidden phase from Legendre orders 0 to 3, per metre of range error at each node. [rad/m]
+        """Contributions of Legendre orders 0 to 3 to the hidden phase, per metre of range error at a node. [rad/m]
 
-        The array is (4, nodes, n). The square of the hidden phase is the sum of the squares of the four parts. Range
-        errors beyond order 3 are not included. Their weight in the hidden phase is only b², which is small, unless a
-        line of sight turns by more than `MAX_TURN_RAD`.
+        The array is (4, nodes, n). The square of the hidden phase is the sum of the squares of its contributions.
+        Range errors beyond order 3 are not included. Their weight in the hidden phase is only b², which is small,
+        unless a line of sight turns by more than `MAX_TURN_RAD`.
         """
         of_orders = np.array([self.band, (1 + self.band) / 3, self.band / 5 / 1.5**2, self.band / 7 / 2.5**2])
         of_orders[3] += self.is_turned / (7 * 2.5**2)
@@ -631,7 +636,7 @@ class ExactRanges:
     def most_per_metre(self) -> Floats:
         """Upper bounds of the effects of any range error whose magnitude is at most one metre, (4, n).
 
-        The rows are quadratic, cubic and hidden phase [rad], and displacement. [m]
+        The first three rows bound the quadratic, cubic and hidden phase. [rad] The last bounds the displacement. [m]
         """
         mean, slope, quadratic, cubic = np.abs(self.order_weights).sum(axis=1)
         # V of such an error, and the variance as a part of V, are at most 1 + b². The displacement never increases V.
@@ -641,10 +646,10 @@ class ExactRanges:
         return np.array((self.k * quadratic, self.k * cubic, self.k * hidden, np.hypot(east, north)))
 
     def effect(self, range_error: Floats) -> FullEffect:
-        """Displacement and remaining phases caused by small range errors.
+        """Displacement that small range errors cause, and the phases that remain at the displaced point.
 
-        `range_error` is the range error at the nodes, (..., nodes, cases). [m] The phases include the effect of the
-        displacement. Results that are only rounding errors are set to 0.
+        `range_error` is the range error at the nodes, (..., nodes, cases). [m] Results that are only rounding errors
+        are set to 0.
         """
         size = np.abs(range_error)
         (east, seen_east), (north, seen_north) = (
@@ -663,7 +668,7 @@ class ExactRanges:
         return FullEffect(_unless_rounding(east, seen_east), _unless_rounding(north, seen_north), *phases)
 
     def left_of_small(self, range_error: Floats, moved: tuple[PerCase, PerCase]) -> Floats:
-        """Range error that remains at the displaced point after small errors. [m]
+        """Range error that remains at the point to which small errors displace the response. [m]
 
         `range_error` is the range error at the nodes, (..., nodes, cases). [m] `moved` is the displacement east and
         north, (..., cases). [m]
@@ -681,7 +686,7 @@ class ExactRanges:
         return _unresolved(np.moveaxis(orders, -2, 0), squares, self.k, self.band, self.is_turned)
 
     def mean_squares(self, remaining: Floats, orders: Floats) -> tuple[Floats, Floats]:
-        """Mean squares of remaining range errors and of their part beyond Legendre order 3, (..., cases) each. [m²]
+        """Mean squares over the aperture of range errors and of their part beyond order 3, (..., cases) each. [m²]
 
         `remaining` (..., nodes, cases) are the range errors at the nodes, and `orders` (..., 4, cases) their orders 0
         to 3. [m]
@@ -695,15 +700,18 @@ class ExactRanges:
     ) -> ImagePoints:
         """Find the points to which errors of given sizes displace the scene centre, and the phases that remain there.
 
-        Newton's method searches from `near`, east and north. [m] With `is_at_fold` a descent of V from the same start
-        replaces it. Use `point_paths` to follow a point as an error grows. On the ground there may be a line on which
-        the gradients of range and Doppler are parallel. Points beyond it are not returned, because no growing error
-        leads there.
+        Newton's method searches from the point `near`, east and north. [m] If `is_at_fold`, a descent on V from the
+        same point is used instead. Use `point_paths` to follow an image point as an error grows. On the ground there
+        may be a line, the fold, on which the gradients of range and Doppler are parallel. Points beyond it are not
+        returned, because no growing error leads there.
         """
         return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
     def left_over(self, lanes: Lanes, size: Floats, point: tuple[PerCase, PerCase]) -> Floats:
-        """Range error that remains at ground points for errors of given sizes, at the nodes, (nodes, lanes). [m]"""
+        """Range error at the nodes, for a ground point and an error of given size per lane, (nodes, lanes). [m]
+
+        `point` has the coordinates of the ground points, east and north. [m]
+        """
         lane_count = lanes.case.size
         room = self._room(lane_count)
         clock, measured = self._measured(lanes.clock(size), lanes.shifts(size), lanes.case, room)
@@ -719,7 +727,7 @@ class ExactRanges:
         return np.asarray(grown / (baseline + np.sqrt(np.abs(baseline * baseline + grown))))
 
     def way(self, lanes: Lanes, size: Floats, point: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-        """Displacement of image points per unit of growth of the errors, east and north. [m/unit]
+        """Rate at which image points move as the errors grow, east and north. [m/unit]
 
         `point` are the image points for errors of the sizes `size`. The image point is the minimum of V. The result
         follows from the second derivative of V and from the change of the slope of V with the error.
@@ -750,11 +758,11 @@ class ExactRanges:
     def settled(
         self, clock: Floats, shifts: Iterable[Any], near: Any, case: Indices, *, is_at_fold: bool = False
     ) -> ImagePoints:
-        """Find the minimum of V for each lane by Newton's method, or by a descent if `is_at_fold`.
+        """Find the image point of each lane, the minimum of V, by Newton's method, or by a descent if `is_at_fold`.
 
         `clock` are the range errors by clocks, (nodes, lanes). [m] `shifts` are the three components of the shift of
-        each platform at the nodes. [m] `near` is the start of the search, east and north. [m] `case` are the cases of
-        the lanes.
+        each platform at the nodes. [m] `near` is the point at which the search starts, east and north. [m]
+        `case` are the cases of the lanes.
         """
         lanes = clock.shape[1]
         size = max(1, min(lanes, POINT_SETTINGS.samples_at_once // self.fit.shape[1]))
@@ -775,11 +783,14 @@ class ExactRanges:
         return points
 
     def _room(self, lanes: int) -> Floats:
-        """Allocate the work arrays of a search once, because allocation takes longer than filling them."""
+        """Allocate the work arrays of a search for `lanes` image points.
+
+        All blocks of lanes use the same arrays, because allocation takes longer than filling.
+        """
         return np.empty((_ARRAY_COUNT, 2, self.fit.shape[1], lanes))
 
     def _measured(self, clock: Floats, shifts: Iterable[Any], case: Indices, room: Floats) -> tuple[Floats, Floats]:
-        """Prepare errors for `_grown`: return the clock error and five arrays (2, nodes, lanes) in `room`.
+        """Prepare what `_grown` needs: return the clock error, and write five arrays (2, nodes, lanes) into `room`.
 
         If a platform's position vector r changes by d, its range R grows by p/(R + √(R² + p)), with p = d·(2r + d).
         This form has no rounding error of the size of the range. For a ground point at g = (east, north) instead of
@@ -812,8 +823,9 @@ class _PointSearch:
     """Search for the image points of lanes by Newton's method or by a descent.
 
     `lane` are the indices of the lanes that have not settled, `of` their cases, and `point` their current points,
-    east and north. [m] `settled` has one entry for each step in which lanes settled. An entry holds their indices,
-    `_GroundView.seen` before the step, the determinant of H there, the step, and the points after it.
+    east and north. [m] `settled` has one entry for each step with which the search of some lanes converged. An entry
+    holds the indices of these lanes, `_GroundView.seen` before the step, the determinant of H there, the step, and
+    the points after it.
     """
 
     def __init__(
@@ -913,7 +925,7 @@ class _PointSearch:
         return _GroundView(seen, looks, distances, self.exact.sampling.centred, self.weights)
 
     def _last_step(self, view: "_GroundView") -> Floats:
-        """Square of the largest last step of each lane's search, divided by the range of the nearer platform. [m]"""
+        """Threshold below which each lane's search ends, for the square of a step over the nearest range. [m]"""
         is_near_fold = view.determinant < self.near_fold
         smaller, usual = (
             POINT_SETTINGS.last_step_near_fold_fraction * POINT_SETTINGS.last_step_rad,
@@ -997,9 +1009,9 @@ class _GroundView:
         return np.asarray(np.einsum("anc,nc->ac", self._weighted[1:], self._centred @ values))
 
     def step(self, slope: Floats) -> Floats:
-        """Newton step that removes the half slope `slope` of V, (2, lanes). [m]
+        """Newton step that brings half the slope of V from `slope` to zero, (2, lanes). [m]
 
-        It uses half the second derivative of V, or H where V has no minimum nearby.
+        The step uses half the second derivative of V, or H where V has no minimum nearby.
         """
         xx, xy, yy = self.bends
         is_bowl = (xx * yy - xy * xy > POINT_SETTINGS.bowl_fraction * self.determinant) & (xx > 0)
@@ -1010,7 +1022,7 @@ class _GroundView:
 
 
 def _solved(bends: Sequence[Floats], slope: Floats) -> Floats:
-    """Solve for the step that removes half a slope of V, from half the second derivatives of V, (2, lanes). [m]"""
+    """Step that brings half the slope of V to zero, by `bends`, half the second derivatives of V, (2, lanes). [m]"""
     (xx, xy, yy), (x, y) = bends, slope
     return np.asarray((xy * y - yy * x, xy * x - xx * y) / (xx * yy - xy * xy))
 
@@ -1018,10 +1030,11 @@ def _solved(bends: Sequence[Floats], slope: Floats) -> Floats:
 def _unresolved(
     orders: Floats, squares: tuple[Floats, Floats], k: Floats, band: Floats, is_turned: Booleans
 ) -> tuple[Floats, Floats]:
-    """Hidden phase and rms phase beyond the cubic. [rad]
+    """Hidden phase and rms phase beyond the cubic, computed from a range error at the displaced point. [rad]
 
     `orders` are the Legendre orders 0 to 3 of the range error at the aperture edge. [m] `squares` are the mean square
-    of the range error and the mean square of its part beyond order 3. [m²]
+    of the range error and the mean square of its part beyond order 3. [m²] The other parameters are attributes of
+    `ExactRanges`.
     """
     _, slope, _, cubic = orders
     square, beyond_cubic = squares
@@ -1035,10 +1048,11 @@ def _unless_rounding(value: Floats, seen: Floats) -> Floats:
 
 
 def _grown(measured: Floats, point: Floats, room: Floats) -> tuple[Floats, Floats, Floats]:
-    """Measured ranges of both platforms to points (2, lanes) minus their true ranges to the centre. [m]
+    """Measured ranges from both platforms to the points `point`, minus the true ranges to the scene centre. [m]
 
-    Returns three views of the work arrays `room`. The first is the difference of the ranges, (2, nodes, lanes). The
-    second are the horizontal vectors from the points to the platforms, (2, 2, nodes, lanes), by axis and platform.
+    `point` is (2, lanes), east and north. `measured` are the arrays that `ExactRanges._measured` prepares. Returns
+    three views of the work arrays `room`. The first is the difference of the ranges, (2, nodes, lanes). The second
+    are the horizontal vectors from the points to the platforms, (2, 2, nodes, lanes), by axis and platform.
     The third are the measured ranges, (2, nodes, lanes). All are in metres.
     """
     (p, true_range, squared_range), over_ground, point = measured[2:], measured[:2], point[:, None, None]
@@ -1097,7 +1111,7 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -
 
 
 def _within_ends(points: ImagePoints) -> ImagePoints:
-    """Replace points beyond the end of their path by NaN, and mark them as not settled."""
+    """Replace points that lie beyond the end of their path (see `point_paths`) by NaN; they are not settled."""
     is_gone = (np.abs(points.turn) < POINT_SETTINGS.folded_fraction) & (points.hidden > POINT_SETTINGS.end_rad)
     return ImagePoints(points.is_settled & ~is_gone, *(np.where(is_gone, math.nan, column) for column in points[1:]))
 

@@ -41,7 +41,7 @@ class SearchSettings:
         applies where the value is almost linear in the size, the second where its slope changes by more than
         `bent_fraction` within the interval.
     bent_fraction : float
-        Change of a slope within an interval, as a fraction of the slope.
+        Change of a slope within an interval above which the interval counts as bent, as a fraction of the slope.
     crest_fraction : float
         Tolerance below the limit, as a fraction of the limit. A local maximum of an interpolation within this
         tolerance counts as possibly above the limit.
@@ -129,9 +129,9 @@ class LimitSearches:
         return LimitSearches(*(getattr(self, field.name)[index] for field in fields(self)))
 
     def square(self, points: Floats) -> Floats:
-        """Square of the value divided by the square of its limit, (searches, points).
+        """Squared ratio of each phase or displacement to its limit, at known points of paths, (searches, points).
 
-        `points` are known points of the paths, (rows, searches, points).
+        `points` are the known points, (rows, searches, points), with the rows of `point_paths.ROWS`.
         """
         requirement, gain = self.requirement[:, None], self.gain[:, None]
         judged = points[QUADRATIC_ROW] ** 2 + (gain * points[HIDDEN]) ** 2
@@ -222,9 +222,9 @@ class _SearchState:
         self.slope[every, last] = 2 * chord[every, last - 1] - self.slope[every, last - 1]
 
     def _doubtful_sizes(self, first_above: Indices) -> Floats:
-        """Size to try next within each interval below the limit, (searches, intervals). [unit]
+        """Size to try next within each interval between known points below the limit, (searches, intervals). [unit]
 
-        NaN where no value within the interval can exceed the limit.
+        The size is NaN where no value within the interval can exceed the limit.
         """
         low, width = self.size[:, :-1], self.width
         start, stop = self.square[:, :-1], self.square[:, 1:]
@@ -305,9 +305,9 @@ class _SearchState:
         return ahead, is_close
 
     def next_sizes(self, going: Indices, *, is_several: bool) -> tuple[Indices, Floats]:
-        """Indices of searches and the error sizes that they try next, (tries,) each.
+        """Choose the error sizes to try next; return indices of searches and a size for each, (tries,) each.
 
-        Each lane tries one size, or several if `is_several`.
+        `going` are the indices of the unfinished searches. One size is tried per lane, or several if `is_several`.
         """
         growth = SEARCH_SETTINGS.growth_factor
         low, bound, is_between = self.low[going], self.bound[going], self.is_between[going]
@@ -341,14 +341,20 @@ class _SearchState:
 
 
 def _on_cubic(position: Floats, start: Floats, rise: Floats, slope_low: Floats, slope_high: Floats) -> Floats:
-    """Value of a cubic at `position`, 0 to 1 within an interval, from its start, rise, and slopes at both ends."""
+    """Value of a cubic at a position from 0 to 1 within an interval.
+
+    `start` is its value at 0, `rise` its increase from 0 to 1. The slopes are those at 0 and at 1.
+    """
     square, cube = position**2, position * position * position
     height = start + slope_low * (position - 2 * square + cube) + slope_high * (cube - square)
     return np.asarray(height + rise * (3 * square - 2 * cube))
 
 
 def _crests(slope_low: Floats, rise: Floats, slope_high: Floats) -> tuple[Floats, Floats]:
-    """Positions within an interval at which a cubic has zero slope; not finite if there is no such position."""
+    """Positions, in units of an interval, at which the cubic of `_on_cubic` has zero slope.
+
+    They are not finite if there is no such position.
+    """
     b, c = 3 * rise - 2 * slope_low - slope_high, slope_low + slope_high - 2 * rise
     far = -(b + np.copysign(np.sqrt(b * b - 3 * c * slope_low), b))
     return far / (3 * c), slope_low / far

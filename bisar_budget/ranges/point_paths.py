@@ -39,7 +39,7 @@ class PathSettings:
         Largest distance of a point from its prediction, as a fraction of the step. A point farther away belongs to
         another path.
     stray_m : float
-        Distance that is allowed in addition, because steps may have almost no length. [m]
+        Distance that is allowed in addition to `stray_fraction`, because steps may have almost no length. [m]
     fade_fraction : float
         Largest distance between a peak that is lost at a fold and the peak into which it fades, as a fraction of the
         displacement.
@@ -55,11 +55,11 @@ class PathSettings:
         Half width of an interval that contains the end of a path, as a fraction of the size. Linear interpolation
         within the interval is then accurate to 1e-9.
     early_fraction : float
-        Fraction of the first size at which the curvature of the path at its start is measured.
+        Size at which the curvature of a path at its start is measured, as a fraction of the first size that is tried.
     same_size_fraction : float
         Difference between two sizes below which they count as equal, as a fraction of the size.
     few_lanes_count : int
-        Number of lanes from which a step tries one size per lane.
+        Number of lanes below which a step tries several sizes per lane.
     """
 
     stray_fraction: float = 0.15
@@ -122,16 +122,16 @@ class PointPaths:
         self._missed_ever = np.zeros(lane_count, dtype=bool)  # if so, the path's start predicts no point
 
     def known(self, lane: Indices, size: Floats) -> Floats:
-        """Known points of paths at given sizes, (rows, lanes). `follow_to` must have reached these sizes before.
+        """Known point of each path at a given size, with the rows of `ROWS`, (rows, lanes).
 
-        NaN beyond the end of a path.
+        `follow_to` must have reached the sizes before. The values are NaN beyond the end of a path.
         """
         points = self._point(lane, (self.known_points[SIZE, lane] <= size[:, None]).sum(axis=1) - 1)
         points[:, (points[SIZE] != size) | (size >= self.end[lane])] = math.nan
         return points
 
     def _point(self, lane: Indices, index: Indices) -> Floats:
-        """Known points of lanes at given positions in their lists, (rows, lanes)."""
+        """Known point of each lane at the position `index` in the lane's list, (rows, lanes)."""
         return np.asarray(self.known_points[:, lane, index])
 
     # ---------------------------------------------------------------- steps
@@ -246,7 +246,7 @@ class PointPaths:
         self._missed_last[lane] = self._missed_ever[lane] = True
 
     def _insert(self, lane: Indices, point: Floats) -> None:
-        """Insert known points; the points of each lane stay sorted by size."""
+        """Insert new points into the lists of known points, which stay sorted by size."""
         if not lane.size:
             return
         first = np.flatnonzero(_begins(lane))
@@ -346,7 +346,10 @@ def _is_near(last: Floats, point: Floats, expected: tuple[Floats, Floats]) -> Bo
 
 
 def _extrapolated(far: Floats, middle: Floats, near: Floats, size: Floats) -> tuple[Floats, Floats]:
-    """Points on the parabola through three points, or on the straight line where `far` is `middle`. [m]"""
+    """Extrapolate paths to the sizes `size` by a parabola through three points of each, east and north. [m]
+
+    Where `far` and `middle` are the same point, a straight line is used instead.
+    """
     has_three = far[SIZE] < middle[SIZE]
     reach = (size - near[SIZE]) / (near[SIZE] - middle[SIZE])
     weight = np.where(has_three, (size - middle[SIZE]) / (near[SIZE] - far[SIZE]), 0.0) * reach
@@ -360,9 +363,9 @@ def _extrapolated(far: Floats, middle: Floats, near: Floats, size: Floats) -> tu
 def _end_between(before: Floats, beyond: Floats) -> Floats:
     """Size at which the path ends, between a point before and a point beyond the end. [unit]
 
-    The path ends where two conditions are met: it is folded, and the hidden phase exceeds π. Both are found by linear
-    interpolation in the size: the first from the square of the area (the determinant of H), the second from the
-    hidden phase.
+    The path ends where two conditions are met: the determinant of H is small, as near a fold, and the hidden phase
+    exceeds π. For each condition, the size at which it begins is found by linear interpolation: of the determinant
+    and of the hidden phase.
     """
     low, high, square, square_beyond = before[HIDDEN], beyond[HIDDEN], before[AREA] ** 2, beyond[AREA] ** 2
     to_hidden = np.where(low < POINT_SETTINGS.end_rad, (POINT_SETTINGS.end_rad - low) / (high - low), 0.0)

@@ -73,10 +73,11 @@ def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aper
 
 
 def cells_of_support(sight: Floats, axes: Floats, radar: Band) -> Floats:
-    """Size of the resolution cell along each of two axes (2, axes), fine enough to sample the response. [m]
+    """Size of the resolution cell along each of several axes; samples at this spacing represent the response. [m]
 
-    `sight` is the sum of the lines of sight over the ground, (times, 2). The cell is the inverse of the extent of the
-    wave-number support along the axis, including the corners of the support.
+    `axes` (2, axes) are unit vectors on the ground. `sight` (times, 2) are the horizontal components of the sum of
+    both lines of sight. The cell is the inverse of the extent of the wave-number support along the axis, including
+    the corners of the support.
     """
     band = radar.center_frequency + np.array((-0.5, 0.5)) * radar.bandwidth
     extent: Floats = np.ptp(np.multiply.outer(band, sight @ axes), axis=(0, 1))
@@ -92,7 +93,10 @@ def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, acro
 
 
 def _slopes(geometry: BistaticGeometry, half: Floats, indices: Indices, count: int) -> Floats:
-    """Sum of both lines of sight over the ground, for the cases `indices` at `count` nodes, (2, nodes, cases)."""
+    """Horizontal components of the sum of both lines of sight at `count` nodes, (2, nodes, cases).
+
+    The cases are those with the indices `indices`. `half` is half the aperture time of all cases. [s]
+    """
     slopes = np.zeros((2, count, indices.size))
     for path in geometry.both:
         x, y, z = path.of(indices).place(nodes(count).places[:, None] * half[indices])
@@ -101,9 +105,9 @@ def _slopes(geometry: BistaticGeometry, half: Floats, indices: Indices, count: i
 
 
 def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, Floats]:
-    """Distance from peak to first null, and full width at half power. [m]
+    """Widths of the response along one direction: from peak to first null, and full width at half power. [m]
 
-    `slopes` (nodes, cases) are the changes of range per metre along the direction of the widths.
+    `slopes` (nodes, cases) are the changes of range per metre along this direction.
     """
     band = nodes(_BAND_NODE_COUNT)
     wavenumbers = k * (1 + np.multiply.outer(band.places, relative_band / 2))

@@ -1,4 +1,4 @@
-"""Errors of an image by errors of a mission. Every image of the simulator flies an error in this one way."""
+"""Conversion of the errors of a mission to the errors that the simulator applies when it forms an image."""
 
 from collections.abc import Iterable
 
@@ -8,16 +8,16 @@ from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.simulator.phase_history import Course, Errors, PathError, superposed
 
-_MOTION_SAMPLES = 513  # of a motion that a registered kind states; it is a polynomial of at most the twelfth power
+_MOTION_SAMPLES = 513  # samples of a registered kind's motion, a polynomial of degree 12 at most
 
 
 def flown(source: ErrorSource, size: float, geometry: BistaticGeometry, aperture_time_s: float) -> Errors:
-    """Errors of an image with a single error of a given size.
+    """Convert a single error of a given size to the errors that the simulator applies to an image.
 
     Parameters
     ----------
     source : ErrorSource
-        An error that displaces: of a platform or of a clock.
+        Error of a platform, a clock or the terrain, which moves the image point (`source.displaces`).
     size : float
         Signed size in the unit of the error, coverage factor included.
     geometry : BistaticGeometry
@@ -49,5 +49,8 @@ def flown(source: ErrorSource, size: float, geometry: BistaticGeometry, aperture
 def flown_together(
     sizes: Iterable[tuple[ErrorSource, float]], geometry: BistaticGeometry, aperture_time_s: float
 ) -> Errors:
-    """Superpose several errors, each with its signed size; the arguments are those of `flown`."""
+    """Superpose several errors of given sizes, as errors that the simulator applies to an image.
+
+    `sizes` are pairs of an error and its signed size. The other arguments are those of `flown`.
+    """
     return superposed(flown(source, size, geometry, aperture_time_s) for source, size in sizes)

@@ -45,7 +45,7 @@ def distance(one: Matrix, other: Matrix) -> Expr:
 
 
 def observed_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORM_SYMBOLS) -> Expr:
-    """Return ΔR̂_m of (1). [m]
+    """Observed differential range ΔR̂_m of the scatterer m, by (1). [m]
 
     It is the sum of the true distances to a scatterer, minus the measured distances to the scene centre, plus the
     clock error c·t̃.
@@ -116,7 +116,7 @@ def hold_range_constant(expression: Expr) -> Expr:
 
 
 def linear_differential_range() -> tuple[Expr, Expr]:
-    """Return β₀ and β₁ of (17). [m], [m/s]
+    """Constant and linear coefficient β₀ and β₁ of the differential range, by (17). [m], [m/s]
 
     The plus sign between the two brackets is missing in the printed equation.
     """
@@ -133,7 +133,7 @@ def coefficients(expression: Expr) -> tuple[Expr, ...]:
 
 
 def error_polynomial(platform: PlatformSymbols) -> Matrix:
-    """Return r̃(τ) of (22), (3,): p̃ + ṽτ + ãτ²/2. [m]"""
+    """Position error r̃(τ) of a platform by (22), (3,): p̃ + ṽτ + ãτ²/2. [m]"""
     return platform.position_error + platform.velocity_error * tau + platform.acceleration_error * tau**2 / 2
 
 
@@ -143,12 +143,12 @@ def clock_polynomial() -> Expr:
 
 
 def first_order_range_error(platform: PlatformSymbols) -> Expr:
-    """Return |r| − |r + r̃| of one platform to first order in r̃ of (22): −r·r̃/|r|. [m]"""
+    """Range error |r| − |r + r̃| of one platform, to first order in r̃ of (22): −r·r̃/|r|. [m]"""
     return _first_order(platform).subs(dict(zip(error_track(platform), error_polynomial(platform), strict=True)))
 
 
 def error_track(platform: PlatformSymbols) -> Matrix:
-    """Position error of a platform as a general function of slow time: x̃_t(τ), and so on, (3,). [m]"""
+    """Position error of a platform, (3,), with components that are general functions of slow time, as x̃_t(τ). [m]"""
     return ImmutableMatrix([Function(f"{axis}tilde_{platform.subscript}")(tau) for axis in AXES])
 
 
@@ -158,7 +158,10 @@ def _first_order(platform: PlatformSymbols) -> Expr:
 
 
 def _grown(expression: Expr) -> Expr:
-    """First-order part of an expression in the position errors of both platforms, functions of slow time."""
+    """Part of an expression that is of first order in the position errors of both platforms.
+
+    The position errors become general functions of slow time, as in `error_track`.
+    """
     for platform in PLATFORM_SYMBOLS:
         grown = zip(measured_error(platform), _EPSILON * error_track(platform), strict=True)
         expression = expression.subs(dict(grown))
@@ -216,7 +219,7 @@ def ground_inverse() -> tuple[Matrix, Expr]:
 
 @cache
 def look_vector() -> Matrix:
-    """Sum of the unit vectors to the platforms, on the ground, (2,): (8) without the factor f/2. [-]"""
+    """Horizontal components of the sum of the unit vectors to the platforms, (2,): (8) without the factor f/2. [-]"""
     return ImmutableMatrix([-diff(far_field_in_angles(), x) for x in point[:2]])
 
 

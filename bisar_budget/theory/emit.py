@@ -67,10 +67,11 @@ MathML the invisible times, so that numbers can be put in.
 
 @dataclass(frozen=True)
 class Evaluator:
-    """One function to write to the generated module: its arguments in order, and its rows of results.
+    """Function to be written to the generated module: its arguments in order, and its results as rows of expressions.
 
-    The rows have names if there are several. `quotients` names quotients -numerator/denominator that occur in the
-    rows. If such a quotient is itself a result, arrays are divided only once and no intermediate array is kept.
+    The rows have names if there are several. An entry of `quotients` is a name, a numerator and a denominator. The
+    name then replaces -numerator/denominator in the rows. If such a quotient is itself a result, arrays are divided
+    only once and no intermediate array is kept.
     """
 
     name: str
@@ -93,14 +94,20 @@ class _Printer(PythonCodePrinter):  # type: ignore[misc]
 
 
 def platform_arguments(platform: PlatformSymbols) -> tuple[tuple[Symbol, str], ...]:
-    """Return position, velocity and slant range of one platform as arguments without a subscript."""
+    """Arguments of an evaluator for one platform: position, velocity and slant range.
+
+    Each is a symbol and its name in the code. The names do not state which platform it is.
+    """
     names = ("x", "y", "z", "v_x", "v_y", "v_z")
     motion = zip((*platform.position, *platform.velocity), names, strict=True)
     return (*motion, (platform.slant_range, "slant_range"))
 
 
 def both_platforms_arguments() -> tuple[tuple[Symbol, str], ...]:
-    """Return the ground components of both platforms, and their slant ranges, as arguments."""
+    """Arguments of an evaluator for both platforms: horizontal position and velocity, and slant range of each.
+
+    Each is a symbol and its name in the code, which ends with `tx` or `rx`.
+    """
     arguments: list[tuple[Symbol, str]] = []
     for platform, suffix in ((TRANSMITTER, "tx"), (RECEIVER, "rx")):
         names = ("x", "y", "v_x", "v_y")
@@ -113,7 +120,7 @@ def both_platforms_arguments() -> tuple[tuple[Symbol, str], ...]:
 def effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
     """Return the effects of one unit of an error: β̃₀, β̃₁, and the quadratic and cubic phase at the aperture edge.
 
-    The phases have the sign of β̃.
+    `beta` are the coefficients β̃₀ … β̃₃ of the range error. The phases have the sign of β̃₂ and β̃₃.
     """
     per_unit = [published.sensitivity(term, error) for term in beta]
     return (
@@ -125,7 +132,7 @@ def effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
 
 
 def evaluators() -> tuple[Evaluator, ...]:
-    """Return all evaluators of the package, in the order of the generated file."""
+    """Return all evaluators that `evaluators.py` contains, in the order of that file."""
     beta = dr.coefficients(dr.range_error())
     # By kind, then axis: the order in which the tool reports them. Table I has them by axis, then kind.
     motion = (
@@ -315,7 +322,7 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
 
 
 def _decimal(expression: Expr) -> Expr:
-    """Replace factors such as 1/8 by decimals where these are exact."""
+    """Replace fractions such as 1/8 by decimal numbers if these are exact in binary."""
     dyadic = {r: Float(r) for r in expression.atoms(Rational) if r.q > 1 and r.q & (r.q - 1) == 0}
     return expression.xreplace(dyadic)
 
@@ -368,7 +375,7 @@ def equations() -> tuple[Equation, ...]:
 
 
 def named() -> Iterator[tuple[str, Expr]]:
-    """Names and expressions of the formulas that explanations use."""
+    """Yield the name and the expression of each formula that explanations use."""
     columns: tuple[tuple[FormulaTable, Sequence[int]], ...] = (
         (published.table_1(), range(4)),
         (published.table_2(), [0]),

@@ -58,7 +58,10 @@ DISPLACEMENT = ImmutableMatrix([real("xhat"), real("yhat")])
 
 
 def growth(platform: PlatformSymbols) -> dict[Symbol, Expr]:
-    """Coefficients d₁ … d₄ of |r|² = R²(1 + d₁τ + d₂τ² + d₃τ³ + d₄τ⁴) for constant acceleration. [1/sⁿ]"""
+    """Growth of the squared range for constant acceleration: |r|² = R²(1 + d₁τ + d₂τ² + d₃τ³ + d₄τ⁴).
+
+    Maps the symbol of each coefficient d₁ … d₄ to its expression. [1/sⁿ]
+    """
     track = platform.position + platform.velocity * tau + platform.acceleration * tau**2 / 2
     square = Poly(expand(track.dot(track)), tau)
     return {
@@ -84,14 +87,17 @@ def look_series(platform: PlatformSymbols) -> tuple[Matrix, ...]:
 
 
 def range_error_at(platform: PlatformSymbols) -> Expr:
-    """Range error of one platform at one slow time to first order: −u·r̃(τ), for the position at τ. [m]"""
+    """Range error of one platform at a slow time τ, to first order: −u·r̃(τ), with the line of sight u at τ. [m]"""
     first_order = dr.first_order_range_error(platform)
     return first_order.subs(platform.exact_slant_range(), platform.slant_range)
 
 
 @cache
 def range_error() -> tuple[Expr, ...]:
-    """Coefficients β̃₀ … β̃₄ of −Σ u(τ)·r̃(τ) + c·t̃(τ), in terms of the derivatives of u. [m/sⁿ]"""
+    """Coefficients β̃₀ … β̃₄ of the range error −Σ u(τ)·r̃(τ) + c·t̃(τ) as a polynomial in slow time. [m/sⁿ]
+
+    They are expressed by the derivatives of u at τ = 0.
+    """
     total = c * dr.clock_polynomial()
     for platform in PLATFORM_SYMBOLS:
         look = sum(
@@ -117,13 +123,16 @@ def direct_range_error(platform: PlatformSymbols) -> Expr:
 
 
 def direct_sight(platform: PlatformSymbols) -> Matrix:
-    """Decrease of the range per metre of a platform's error if the direct path is the clock: u_t − b or u_r + b."""
+    """Vector that replaces a platform's line of sight if the direct path is the clock: u_t − b or u_r + b, (3,).
+
+    A component is the decrease of the range error per metre of the platform's position error along that axis. [-]
+    """
     unit_sight = dict(zip(platform.position, platform.slant_range * platform.look[0], strict=True))
     return Matrix([-direct_range_error(platform).coeff(e).subs(unit_sight) for e in dr.error_track(platform)])
 
 
 def ground_history() -> tuple[Matrix, ...]:
-    """Derivatives of s = u_t + u_r on the ground, orders 0 to 4, (2,) each.
+    """Derivatives at τ = 0 of s, the horizontal components of u_t + u_r, orders 0 to 4, (2,) each. [1/sⁿ]
 
     The range of a ground point x, relative to the scene centre, is −s(τ)·x.
     """
@@ -142,9 +151,10 @@ def gradient_inverse() -> tuple[tuple[Symbol, ...], Matrix, Expr]:
 
 
 def amplitude_share(own: Expr, other: Expr) -> Expr:
-    """Fraction of an amplitude that one platform gets if both platforms share it.
+    """Fraction of an allowable amplitude that one platform gets if both platforms share it.
 
-    The amplitudes of the platforms are proportional to the square roots of their shares of power.
+    `own` and `other` are the shares of power of this and of the other platform. The amplitudes of the platforms are
+    proportional to the square roots of the shares.
     """
     platform_part = positive("a")
     (solution,) = solve(Eq(platform_part * sqrt(other), (1 - platform_part) * sqrt(own)), platform_part)
@@ -159,7 +169,7 @@ def motion_of_phase(phase: Expr) -> Expr:
 
 
 def quartic_as_quadratic() -> Expr:
-    """Quadratic coefficient of the cubic that is fitted to x⁴ over −1 … 1: 6/7.
+    """Coefficient of x² in the cubic polynomial that is fitted to x⁴ over −1 … 1: 6/7.
 
     It follows from the projection on the second Legendre polynomial, the only one up to the third order that has an
     x².
@@ -170,7 +180,10 @@ def quartic_as_quadratic() -> Expr:
 
 
 def quadratic_phase(coefficients: Sequence[Expr]) -> Expr:
-    """Phase at the aperture edge of the quadratic polynomial that is fitted to β₀ … β₄ over the aperture. [rad]"""
+    """Quadratic phase at the aperture edge, of the cubic that is fitted to the polynomial β₀ … β₄ in slow time. [rad]
+
+    The fit extends over the aperture, so that β₄ also has a part in the quadratic phase.
+    """
     quadratic, quartic = (published.edge_phase(coefficients[n], n) for n in (2, 4))
     return quadratic + quartic_as_quadratic() * quartic
 
@@ -194,7 +207,10 @@ def effective_coefficients() -> tuple[Expr, Expr, Expr]:
 
 @cache
 def table() -> FormulaTable:
-    """Table of all first-order coefficients of the range error, without the effect of the displacement."""
+    """Table of the coefficients β̃₀ … β̃₄ of the range error to first order, for the clock and each motion error.
+
+    The terms that the displacement adds are not included.
+    """
     return FormulaTable(
         number="Full model",
         title="Differential range errors with the line of sight turning as it does",

@@ -1,4 +1,4 @@
-"""Rigling & Moses as published: all numbered equations (1) to (31), Tables I and II, vibration and pull-in.
+"""Rigling & Moses as published: equations (1) to (31), Tables I and II, limits of vibration, and autofocus pull-in.
 
 An equation is either defined as in the paper, or derived from earlier equations. The rows of the tables are derived
 in printed order. Errors of the printed paper are noted at the equation, and the equation given here is correct.
@@ -67,7 +67,10 @@ EQUAL_SHARE_QPE_RAD = pi / 8  # for each platform: half of the usual monostatic 
 
 @dataclass(frozen=True)
 class TableRow:
-    """Row of a table: its printed number, its error, and its cells from left to right."""
+    """Row of a table: its printed number, the symbol of its error, and its cells from left to right.
+
+    `label` is what the row shows for the error, such as the error as a function of slow time.
+    """
 
     number: int | None
     error: Symbol
@@ -78,7 +81,7 @@ class TableRow:
 
 @dataclass(frozen=True)
 class FormulaTable:
-    """Table with the number in the paper, the column heads, and the rows in printed order."""
+    """Table of formulas: its number in the paper or its name, the column heads, and the rows in printed order."""
 
     number: str
     title: str
@@ -89,7 +92,11 @@ class FormulaTable:
 
 @dataclass(frozen=True)
 class Equation:
-    """Numbered equation, with a note whether it is `defined` or `derived` and what the printed paper has wrong."""
+    """Equation with its number in the paper; the number is empty for an equation that is not in the paper.
+
+    `origin` is `defined` for a definition and `derived` for an equation that SymPy derives. `slip` states what is
+    wrong in the printed paper, if anything.
+    """
 
     number: str
     title: str
@@ -100,19 +107,25 @@ class Equation:
 
 
 def motion_errors(platform: PlatformSymbols) -> tuple[Symbol, ...]:
-    """Return the nine error symbols of a platform in the order of Table I: x p v a, y p v a, z p v a."""
+    """Return the nine error symbols of a platform in the order of Table I.
+
+    For each of the axes x, y and z these are the position, velocity and acceleration error.
+    """
     kinds = (platform.position_error, platform.velocity_error, platform.acceleration_error)
     return tuple(kind[axis] for axis in range(3) for kind in kinds)
 
 
 def single_error(expression: Expr, error: Symbol) -> Expr:
-    """Effect of one error: the expression with all other errors set to zero."""
+    """Part of an expression that one error causes: the expression with all other errors set to zero."""
     every = [*clock_coefficients, *(e for platform in PLATFORM_SYMBOLS for e in motion_errors(platform))]
     return expression.xreplace({other: Integer(0) for other in every if other != error})
 
 
 def coefficient_rows(beta: Sequence[Expr], *, is_numbered: bool) -> tuple[TableRow, ...]:
-    """Rows of a table with the coefficients of the range error: for the clock error, then for each motion error."""
+    """Rows of a table of range-error coefficients: the first for the clock error, then one for each motion error.
+
+    `beta` are the coefficients with all errors. If `is_numbered`, the rows have the numbers of Table I.
+    """
     motion_free = {e: 0 for platform in PLATFORM_SYMBOLS for e in motion_errors(platform)}
     clock = Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False)
     number = 1 if is_numbered else None
@@ -292,14 +305,14 @@ def rotation(x: Expr, y: Expr) -> Matrix:
 
 
 def unrotated(x: Expr, y: Expr) -> Matrix:
-    """Inverse of `rotation`, (2,)."""
+    """Components along x and y of a vector that is given in the rotated coordinates of (9) and (10), (2,)."""
     return rotation(x, y).subs(phi_b, -phi_b)
 
 
 def exponent(products: Expr) -> Expr:
-    """Exponent −jΦ of a far-field filter, by (2).
+    """Exponent −jΦ of the matched filter in the far field, with the phase Φ of (2).
 
-    `products` is x·f_x + y·f_y + z·f_z, which replaces −f·ΔR/2 by (6) and (8).
+    `products` is x·f_x + y·f_y + z·f_z. By (6) and (8) it equals −f·ΔR/2.
     """
     together = real("products")
     return (-I * phase(-2 * together / f_i)).subs(together, products)
@@ -311,13 +324,13 @@ def turned_products(f_x: Expr, f_y: Expr) -> Expr:
 
 
 def summed(over_frequencies_and_pulses: Expr) -> Expr:
-    """Mean over frequencies and pulses, as in (4)."""
+    """Mean of an expression over all frequencies and pulses, as in (4)."""
     inner = Sum(over_frequencies_and_pulses, (i, 1, frequencies), (k, 1, pulses))
     return inner / (frequencies * pulses)
 
 
 def received() -> Expr:
-    """Symbol of the samples S(f_i, τ_k), a function of frequency and slow time."""
+    """Symbol S(f_i, τ_k) of the received samples, a function of frequency and slow time."""
     return Function("S")(f_i, tau_k)
 
 
@@ -334,7 +347,10 @@ def half_angle(theta: Expr) -> Expr:
 
 
 def geometric_sum(step: Expr, count: Expr) -> tuple[Expr, Expr]:
-    """Sum of exp(−j·step·n) over n = 0 … count − 1, as the exponent of a phasor and a quotient of sines."""
+    """Sum of exp(−j·step·n) over n = 0 … count − 1, as a phasor times a quotient of sines.
+
+    Returns the exponent of the phasor, and the quotient.
+    """
     total = half_angle(count * step) / half_angle(step)  # Σ qⁿ = (1 − q^N)/(1 − q)
     turns = [factor for factor in total.args if factor.func is exp]
     return Add(*(turn.args[0] for turn in turns)), total / Mul(*turns)
@@ -377,7 +393,10 @@ def tangent() -> tuple[Expr, Expr]:
 
 @cache
 def piece_inverse() -> tuple[Matrix, Expr]:
-    """Adjugate (2, 2) and determinant of Q_i in (30), for the platforms at τ_i with constant ranges."""
+    """Adjugate (2, 2) and determinant of Q_i in (30): of Q for platforms at their positions at τ_i.
+
+    The ranges keep their values at mid-aperture.
+    """
     moved = {
         coordinate: coordinate + speed * tau_i
         for platform in PLATFORM_SYMBOLS
@@ -399,7 +418,7 @@ def product(*factors: Expr) -> Expr:
 
 @cache
 def equations() -> tuple[Equation, ...]:
-    """Return all numbered equations of the paper in order, and the gain by autofocus of Section VI."""
+    """Return all numbered equations of the paper in order, and the autofocus gain of Section VI."""
     return (*_data(), *_images(), *_point_response(), *_ground_point(), *_errors(), *_effects())
 
 

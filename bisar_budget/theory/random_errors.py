@@ -61,7 +61,11 @@ _x, _m, _M, _w = real("xi"), positive("m"), positive("M"), positive("w")
 
 
 class Moments(NamedTuple):
-    """Mean squares over an aperture: quadratic and cubic part at its edge, and the rest beyond the cubic part."""
+    """Mean squares of the parts of an error over an aperture.
+
+    `quadratic` and `cubic` are those of the quadratic and of the cubic part at the aperture edge. `left` is that of
+    the remainder beyond the cubic part, averaged over the aperture.
+    """
 
     quadratic: Expr
     cubic: Expr
@@ -73,11 +77,11 @@ class Moments(NamedTuple):
 
 
 class PlaceMoments(NamedTuple):
-    """Moments of the Legendre orders 0 and 1, which displace: mean squares, and products with orders 2 and 3.
+    """Moments of Legendre orders 0 and 1 of an error, the constant and the linear part, which displace the response.
 
-    The mean squares are of the constant part and of the linear part at the aperture edge. The products are constant
-    times quadratic part and linear times cubic part. For processes that are symmetric in time, even and odd orders
-    are uncorrelated.
+    `constant` and `linear` are the mean squares of the two parts. `constant_quadratic` and `linear_cubic` are the
+    mean products of constant and quadratic part, and of linear and cubic part. All parts are taken at the aperture
+    edge. For processes that are symmetric in time, even and odd orders are uncorrelated.
     """
 
     constant: Expr
@@ -101,11 +105,11 @@ def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
 
 # ---------------------------------------------------------------------- inertial sensors
 def _from_middle(response: Callable[[Expr], Expr]) -> Callable[[Expr, Expr], Expr]:
-    """Return the covariance function of an error that white noise drives from mid-aperture on.
+    """Covariance function of an error that is zero at mid-aperture and that white noise drives from there.
 
-    Its arguments are two times m ≤ M after mid-aperture. `response` is the error at a time after a unit impulse of
-    the noise. Both sides of mid-aperture are independent: an error that is zero at mid-aperture results from
-    different noise before and after.
+    The arguments of the function are two times m ≤ M after mid-aperture. `response` is the error at a time after a
+    unit impulse of the noise. Both sides of mid-aperture are independent: the error results from different noise
+    before and after mid-aperture.
     """
 
     def covariance(m: Expr, M: Expr) -> Expr:
@@ -201,9 +205,9 @@ def _gauss_markov_coefficients(m: int, n: int) -> Expr:
 
 @cache
 def gauss_markov() -> Moments:
-    """Moments of a stationary process of variance 1 and correlation exp(−|t|/τ_c).
+    """Moments of a Gauss-Markov process, which is stationary, of variance 1 and correlation exp(−|t|/τ_c).
 
-    They are expressed by the symbols `ratio` and `decay`.
+    They are expressed by the symbols `ratio`, T/(2τ_c), and `decay`, exp(−T/τ_c).
     """
     return moments(tuple(_gauss_markov_coefficients(n, n) for n in range(ORDER_COUNT)), Integer(1))
 
@@ -216,7 +220,11 @@ def gauss_markov_place() -> PlaceMoments:
 
 @cache
 def gauss_markov_slow() -> tuple[Expr, ...]:
-    """Series in `ratio` of `gauss_markov` and `gauss_markov_place`, for a long correlation time."""
+    """Power series in `ratio` of the moments of `gauss_markov` and `gauss_markov_place`.
+
+    They are for a correlation time much longer than the aperture. The terms of the exact expressions nearly cancel
+    then.
+    """
     exact = (*gauss_markov(), *gauss_markov_place())
     return tuple(_series(moment.subs(decay, exp(-2 * ratio)), ratio) for moment in exact)
 
@@ -242,7 +250,10 @@ def _series(expression: Expr, variable: Symbol) -> Expr:
 
 # ---------------------------------------------------------------------- spectra
 def spherical_bessel(n: int) -> Expr:
-    """Spherical Bessel function jₙ(x), the part of a tone in order n: ½∫ Pₙ(t)·cos(xt − nπ/2) dt over −1 … 1."""
+    """Spherical Bessel function jₙ(x), as the integral ½∫ Pₙ(t)·cos(xt − nπ/2) dt over −1 … 1.
+
+    A tone of amplitude 1 has the amplitude (2n + 1)·jₙ(x) in Legendre order n, with x = πfT.
+    """
     tone = sin(angle * _x) if n % 2 else cos(angle * _x)
     sign = (1, 1, -1, -1)[n % 4]
     return expand(sign * integrate(expand(legendre(n, _x) * tone), (_x, -1, 1)) / 2)
@@ -250,9 +261,9 @@ def spherical_bessel(n: int) -> Expr:
 
 @cache
 def tone() -> Moments:
-    """Quadratic and cubic phase of a tone of amplitude 1, and the share of its power beyond the cubic phase.
+    """Quadratic and cubic phase of a phase tone of amplitude 1, and the share of its power beyond the cubic phase.
 
-    The phases are amplitudes at the aperture edge.
+    Unlike in other `Moments`, the two phases are not mean squares but amplitudes at the aperture edge.
     """
     amplitudes = [spherical_bessel(n) for n in range(ORDER_COUNT)]
     remaining_share = 1 - sum((2 * n + 1) * amplitude**2 for n, amplitude in enumerate(amplitudes))
@@ -268,12 +279,12 @@ def tone_place() -> tuple[Expr, Expr]:
 
 @cache
 def tone_in_terms() -> tuple[Expr, ...]:
-    """Expressions of `tone` and `tone_place` in terms of `sine` and `cosine` of `angle`."""
+    """Expressions of `tone` and `tone_place`, with symbols for the sine and the cosine of `angle`, which is πfT."""
     return tuple(expression.subs({sin(angle): sine, cos(angle): cosine}) for expression in (*tone(), *tone_place()))
 
 
 def tone_slow() -> tuple[Expr, ...]:
-    """Series in `angle` of `tone` and `tone_place`, for a slow tone."""
+    """Power series of `tone` and `tone_place` in `angle`, πfT, for a tone that is slow compared with the aperture."""
     return tuple(_series(expression, angle) for expression in (*tone(), *tone_place()))
 
 
@@ -307,7 +318,10 @@ def power_law_integral(n: int, slope: int) -> Expr:
 
 @cache
 def power_law(order: int) -> tuple[Expr, ...]:
-    """Mean squares of the quadratic (2) or cubic (3) phase for spectra f⁻ⁿ of density 1, n = 0 … 4. [s^(n−1)]"""
+    """Mean squares of a phase at the aperture edge, for phase spectra f⁻ⁿ of density 1, n = 0 … 4. [s^(n−1)]
+
+    `order` is 2 for the quadratic and 3 for the cubic phase.
+    """
     return tuple(
         (LEADING_RATIONALS[order] * (2 * order + 1)) ** 2 * power_law_integral(order, slope) * T ** (slope - 1)
         for slope in range(5)
@@ -337,7 +351,7 @@ def interpolated() -> Expr:
 
 
 def interpolated_noise() -> Expr:
-    """Mean square of the straight lines between independent samples of variance 1."""
+    """Mean square of straight lines that connect independent samples of variance 1, averaged over time."""
     fraction = positive("nu")
     return integrate((1 - fraction) ** 2 + fraction**2, (fraction, 0, 1))
 
@@ -348,7 +362,10 @@ _acceleration, _frequency, _time = positive("a"), positive("f"), real("t")
 
 
 def vibrating_oscillator() -> Expr:
-    """Peak phase at the centre frequency of an oscillator under the acceleration a·cos(2πft): ∫2πf₀·y dt. [rad]"""
+    """Peak of the phase error ∫2πf₀·y dt of an oscillator under the acceleration a·cos(2πft). [rad]
+
+    y is its relative frequency error, and f₀ the centre frequency of the radar.
+    """
     y = sensitivity * _acceleration * cos(2 * pi * _frequency * _time)
     phase = integrate(2 * pi * center_frequency * y, _time)
     return simplify(phase / sin(2 * pi * _frequency * _time))
@@ -361,9 +378,9 @@ def vibrating_path() -> Expr:
 
 
 def of_spectrum(amplitude: Expr) -> Expr:
-    """Power spectrum of an effect of accelerations with the spectrum S_a.
+    """Power spectrum of an effect, such as a phase, that accelerations with the power spectrum S_a cause.
 
-    `amplitude` is the amplitude of the effect for a tone of acceleration, to which it is proportional.
+    `amplitude` is the amplitude of the effect of a sinusoidal acceleration. It is proportional to the acceleration.
     """
     return amplitude.subs(_acceleration, 1) ** 2 * positive("S_a")
 
@@ -398,7 +415,11 @@ def table() -> FormulaTable:
 
 
 def equations() -> tuple[Equation, ...]:
-    """Equations for the parts of a tone, integrals of power laws, remainders after synchronisation, and vibration."""
+    """Equations of random errors, in the order of the module.
+
+    They give the phases of a tone, the mean squares for power-law spectra, the errors that remain after interpolation
+    between synchronisations, and the effects of vibration.
+    """
     quadratic, cubic, left = tone()
     names = (("quadratic", "phi_2", quadratic), ("cubic", "phi_3", cubic))
     laws = (

@@ -198,7 +198,10 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
         return row
 
     def without_fences(self, node: Any) -> Any:
-        """Write brackets as operators, because browsers no longer draw the `mfenced` of SymPy 1.13; 1.14 has none."""
+        """Replace each `mfenced` element by brackets that are operators.
+
+        SymPy 1.13 writes `mfenced`, which browsers no longer draw. SymPy 1.14 writes brackets itself.
+        """
         for child in list(node.childNodes):
             node.replaceChild(self.without_fences(child), child)
         if node.nodeName != "mfenced":
@@ -291,7 +294,7 @@ def derivation(selection: str, format_name: str) -> str:
 
 
 def numbered(number: int, format_name: str) -> str:
-    """Write all parts of one equation of the paper."""
+    """Write all equations of the paper that have the number `number`, in the format `format_name`."""
     return _EQUATION_RENDERERS[format_name](
         _TITLE, tuple(e for e in published.equations() if e.number == f"({number})")
     )

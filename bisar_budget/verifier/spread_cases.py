@@ -1,12 +1,12 @@
 """Verdicts on the limits of errors that make echoes or spread power: vibration, sensors and clocks.
 
-A sigma applies to many flights. It is measured from full time series through exact ranges. Images of a few of the
-series show whether a response has the phase that exact ranges give.
+The sigma of an effect describes many flights. It is measured from drawn time series, whose effects follow from exact
+ranges. For a few of the series, images show whether a response has the phase that exact ranges give.
 
-Spread power is measured in images of as many draws as the verdict needs. These are lines across range, each the
-transform of the aperture under its window. The mainlobe lies within the first nulls of the error-free response, and
-the sidelobes are the rest of one repeat interval. By Parseval's theorem, only the mainlobe has to be transformed.
-Energies are means over the draws.
+Spread power is measured in as many drawn images as the verdict needs. Each is a cut across range: the Fourier
+transform of the phasor over the aperture under its window. The mainlobe lies within the first nulls of the error-free
+response, and the sidelobes are the remainder of one repeat interval. By Parseval's theorem, only the mainlobe has to
+be transformed. Energies are means over the draws.
 """
 
 import math
@@ -71,34 +71,34 @@ from bisar_budget.verifier.phase_cases import TOLERANCE_FRACTION, compare
 from bisar_budget.verifier.study import Study
 
 TOLERANCE_DB = 0.5
-UNDECLARED_CYCLES = 10  # per aperture of a vibration, if the file gives no frequency
+UNDECLARED_CYCLES = 10  # cycles per aperture of a vibration whose frequency the file does not state
 
-_ECHO_UPSAMPLING_FACTOR = 8  # of a cut before its peak is read
+_ECHO_UPSAMPLING_FACTOR = 8  # interpolation factor of a cut, before its peak is measured
 _MIN_WALK_CELLS = 0.3  # range cells of smear from which a reason mentions it
-_COMMON_DRAWS = 32  # of a vibration that both platforms share
+_COMMON_DRAWS = 32  # draws of a vibration that both platforms share
 
-_SIGMA_DRAWS, _CLOCK_DRAWS = 4000, 1000  # give a sigma to 1.1 %, and to 2.2 %
-_SYNCHRONIZED_DRAWS = 400  # in which fast tones are drawn too, because they are folded
-_MAX_TONE_CYCLES = 100  # per aperture; a faster tone has a negligible quadratic phase
-_SHAKE_FREQUENCY_FACTOR = 16  # over the lowest frequency of a vibration; above it, less than 3 % of a phase is added
-_STEPS_PER_CYCLE, _MAX_TONE_STEPS = 8, 1 << 17  # of a fast tone, and in all
-_MARGIN_SIGMA = 3.0  # standard errors of a sigma
-_IMAGE_DRAWS = 6  # time series of which images are formed
-_SERIES_SAMPLES = 513  # of a time series in an image
-_DELAY_BLOCK_DRAWS = 250  # in memory at once
-_CUBIC_ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
+_SIGMA_DRAWS, _CLOCK_DRAWS = 4000, 1000  # draws for a sigma to 1.1 % and to 2.2 %
+_SYNCHRONIZED_DRAWS = 400  # draws that include fast tones, because synchronization folds them
+_MAX_TONE_CYCLES = 100  # cycles per aperture; faster tones have a negligible quadratic phase
+_SHAKE_FREQUENCY_FACTOR = 16  # times the lowest frequency of a vibration; faster parts add < 3 % to a phase
+_STEPS_PER_CYCLE, _MAX_TONE_STEPS = 8, 1 << 17  # time steps per cycle of a fast tone, and most steps in all
+_MARGIN_SIGMA = 3.0  # standard errors of a sigma that the tolerance includes
+_IMAGE_DRAWS = 6  # number of time series for which images are formed
+_SERIES_SAMPLES = 513  # samples of a time series in an image
+_DELAY_BLOCK_DRAWS = 250  # draws in memory at once
+_CUBIC_ORDER = 3  # highest order that displaces or defocuses; higher orders spread
 
 _ISLR_SAMPLES = (
-    1024  # of an aperture whose spread power is measured; the mask holds two of these cells of white noise
+    1024  # samples of an aperture whose spread power is measured; of as many cells of noise, two are mainlobe
 )
 _FIRST_ISLR_DRAWS, _MAX_ISLR_DRAWS = 64, 8192
-_BLOCK_ISLR_DRAWS = 256  # in memory at once
+_BLOCK_ISLR_DRAWS = 256  # draws in memory at once
 _INTERVAL_95_SIGMA = 1.96  # standard errors on either side of a mean
-_DECISION_SIGMA = 3.3  # standard errors within one verdict, 99.9 %: another seed must not give another verdict
-_MAX_HALF_INTERVAL_DB = 0.25  # of a decided verdict: a wider interval, of few draws, may be off
+_DECISION_SIGMA = 3.3  # standard errors of a decision (99.9 %), so that another seed gives the same verdict
+_MAX_HALF_INTERVAL_DB = 0.25  # half width of the interval below which a verdict is decided; wider ones are unreliable
 _FOLLOWED = (*MOVING, "propagation")  # kinds whose histories go directly through exact ranges
-_MAINLOBE_NODES = 32  # of the mainlobe's integral
-_STEPS_PER_CELL = 64  # of the search for the first null, where the response and thus the energy of a step is 0
+_MAINLOBE_NODES = 32  # nodes of the integral over the mainlobe
+_STEPS_PER_CELL = 64  # of the search for the first null; an inexact null hardly changes the energy
 _MIN_ENERGY_FRACTION = 1e-300  # keeps logarithms finite
 
 Case = Callable[[], Verdict]
@@ -109,10 +109,10 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
     """Yield the subject of each vibration limit, and the function that verifies the limit.
 
     The limits are those of one platform alone and of both together. With the published limits at equal shares, the
-    echoes of a sinusoid of one platform are 9 dB below the requirement, and the echoes of both in phase are 3 dB
-    below it. Independent noise-like vibration of both platforms exceeds the requirement by 0.44 dB with a uniform
-    window. With the limits of the full model, sinusoids of both in phase meet the requirement exactly, and so does
-    noise.
+    echoes of a sinusoid of one platform are 9 dB below the requirement. If both platforms vibrate in phase, the
+    echoes are 3 dB below the requirement. Independent noise-like vibration of both platforms exceeds the requirement
+    by 0.44 dB with a uniform window. With the limits of the full model, sinusoids of both platforms in phase meet the
+    requirement exactly, and so does noise-like vibration.
     """
     mission, T = study.mission, study.collection.aperture_time
     pslr, islr = mission.requirements.pslr, mission.requirements.islr
@@ -137,7 +137,7 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
         for index, (_, frequency, per_metre) in enumerate(lines[name] or [Line(0.0, None)]):
             cycles = UNDECLARED_CYCLES if frequency is None else frequency * T
             if cycles < SLOWEST_ECHO_CYCLES or not tone:
-                continue  # a phase, verified by `phase_cases`; or no requirement limits it
+                continue  # verified as a phase in `phase_cases`, or limited by no requirement
             vibration, alone = subject(name, "vibration", "sinusoidal", entry=index), {name: tone[name]}
             unseen = blank(vibration, alone, pslr, float(per_metre))
             if pslr is not None:
@@ -165,9 +165,10 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
 
 
 def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], declared: float | None) -> Verdict:
-    """Measure the paired echo of a sinusoid and compare it with the requirement.
+    """Verdict on a sinusoidal vibration at its limit: its paired echo, compared with the requirement.
 
-    The echo is measured in the difference from the error-free image, whose sidelobes would hide it.
+    The echo is measured in the difference from the error-free image, whose sidelobes would mask it. `limits` are the
+    amplitudes by platform [m], and `declared` is the declared frequency. [Hz]
     """
     frequency = UNDECLARED_CYCLES / study.collection.aperture_time if declared is None else declared
     sinusoids = {name: (PathSinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
@@ -176,9 +177,10 @@ def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], decla
 
 
 def _near(study: Study, blank: Verdict, name: str, limit: float, lines: Sequence[Line]) -> Verdict:
-    """Verdict on a group of neighbouring lines, scaled together to their common limit.
+    """Verdict on a group of tones of neighbouring frequencies, scaled together to their common limit.
 
-    The lines have the ratio of their declared amplitudes and their worst phases.
+    The amplitudes keep their declared ratios, and the tones have their worst phases. `limit` is the amplitude of a
+    single tone with the same echo. [m]
     """
     cycles = [line.frequency * study.collection.aperture_time for line in lines]
     worst = worst_phases([line.amplitude for line in lines], cycles)
@@ -202,7 +204,10 @@ def echo(
     *,
     is_assumed: bool = False,
 ) -> Verdict:
-    """Measure the paired echoes of sinusoids, and compare them with the requirement that `blank` holds."""
+    """Verdict on sinusoidal motions of platforms: their paired echoes, compared with the requirement in `blank`.
+
+    `sinusoids` are the motions of each platform, by name. `who` describes them in the reason of the verdict.
+    """
     collection = study.collection
     cycles_of_all = [
         sinusoid.frequency * collection.aperture_time
@@ -233,7 +238,10 @@ def echo(
 
 
 def _wideband(study: Study, blank: Verdict, limits: Mapping[str, float]) -> Verdict:
-    """Measure the ISLR that white vibration adds over the repeat interval, with as many draws as needed."""
+    """Verdict on a noise-like vibration at its limit: the ISLR that white vibration adds over the repeat interval.
+
+    `limits` are the rms displacements by platform. [m] The ISLR is measured in as many draws as needed.
+    """
     collection, seed = study.collection, (study.mission.simulation or Simulation()).seed
     slow_time = cell_centres(collection.aperture_time, _ISLR_SAMPLES)
     clean = collection.flight(Errors(), slow_time).paths
@@ -249,10 +257,10 @@ def _wideband(study: Study, blank: Verdict, limits: Mapping[str, float]) -> Verd
                 np.linalg.norm(flown_path.measured, axis=1) - np.linalg.norm(clean_path.measured, axis=1)
                 for flown_path, clean_path in zip(flown, clean, strict=True)
             ]
-            if collection.has_direct_path:  # each platform's part alone
+            if collection.has_direct_path:  # subtract the direct path, separately for the motion of each platform
                 shifts[0] -= SPEED_OF_LIGHT_MPS * direct_path_error((flown[0], clean[1]))
                 shifts[1] -= SPEED_OF_LIGHT_MPS * direct_path_error((clean[0], flown[1]))
-            if is_common:  # the second platform makes the first one's motion, at its own limit
+            if is_common:  # the second platform has the first one's motion, scaled to its own limit
                 first, second = limits.values()
                 shifts[1] = shifts[0] * second / first
             phase[:] = 2 * math.pi / collection.wavelength * (shifts[0] + shifts[1])
@@ -272,9 +280,10 @@ def _wideband(study: Study, blank: Verdict, limits: Mapping[str, float]) -> Verd
 def measured_power(
     collection: PointCollection, blank: Verdict, draw: Callable[[int], Floats], basis: Note
 ) -> Verdict:
-    """Verdict on the ISLR that drawn phases (draws, _ISLR_SAMPLES) add.
+    """Verdict on the ISLR that random phases add, compared with the requirement in `blank`.
 
-    The ISLR is compared with the requirement that `blank` holds.
+    `draw` takes a number of draws and returns phases, (draws, _ISLR_SAMPLES). [rad] `basis` is the beginning of the
+    reason for the verdict.
     """
     required = blank.requirement_db or 0.0
     added = added_islr(collection.window(_ISLR_SAMPLES), draw, required)
@@ -294,7 +303,7 @@ def measured_power(
 
 # ---------------------------------------------------------------------- sensors and clocks
 def limits_of(study: Study, error: RandomError) -> dict[str, float]:
-    """Size at which an error reaches each of its requirements, by key, without autofocus.
+    """Size at which a random error reaches each requirement that limits it, without autofocus, by requirement.
 
     The result is empty if no requirement limits the error.
     """
@@ -305,7 +314,7 @@ def limits_of(study: Study, error: RandomError) -> dict[str, float]:
 
 
 def _model(study: Study, error: RandomError) -> str:
-    """Return the name of the gating model under which the error has the larger effect."""
+    """Name of the gating model in which the error has the largest quadratic or cubic phase."""
     return max((model.name for model in study.models), key=lambda name: max(error.effect(name)[:2]))
 
 
@@ -340,16 +349,19 @@ def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
 
 
 def _spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cycles: float) -> Verdict:
-    """Verdict on a tone at its limit by ISLR.
+    """Verdict on a tone at the limit that the ISLR requirement sets.
 
-    The tone is a motion with an amplitude [m] and a number of `cycles` per aperture.
+    The tone is a motion of the platform `owner` with an amplitude [m] and a number of `cycles` per aperture.
     """
     phase = 2 * math.pi * amplitude / study.collection.wavelength
     return _power(study, blank, [], owner, echoes=[(phase / math.sqrt(2), cycles)])
 
 
 def verify_pslr(study: Study) -> Verdict:
-    """Verify the PSLR of the tones that make the highest echo, in their worst phases, scaled to the required PSLR."""
+    """Verdict on the PSLR of the declared tones that together make the highest echo.
+
+    The tones have their worst phases, and are scaled together so that their echo has the required PSLR.
+    """
     required = study.mission.requirements.pslr or 0.0
     row_id = subject("mission", "pslr").id
     blank = study.blank(row_id, required, "dB", requirement_db=required)
@@ -368,9 +380,9 @@ def verify_pslr(study: Study) -> Verdict:
 
 
 def verify_random(study: Study, error: RandomError) -> Verdict:
-    """Verdict on the limit of a random error.
+    """Verdict on the limit of a random error, which is the smallest of the sizes that its requirements allow.
 
-    The limit is its smallest allowable by all requirements, without autofocus.
+    The limit does not include autofocus.
     """
     sizes = limits_of(study, error)
     binding = min(sizes, key=lambda name: sizes[name])
@@ -405,7 +417,7 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
             image_phases.append(reading.cubic if is_cubic else reading.quadratic)
     except ValueError as fault:
         return blank._replace(budget_rad=budget, reason=phrases.note("no-image-of-a-time-series", why=str(fault)))
-    # Phases in images over phases by exact ranges; large ones have more weight.
+    # Ratio of phases in images to phases from exact ranges; large phases have more weight.
     image_ratio = float(np.dot(exact_phases, image_phases) / np.dot(exact_phases, exact_phases))
     measured = predicted * image_ratio
     tolerance = TOLERANCE_FRACTION + _MARGIN_SIGMA / math.sqrt(2 * draws)
@@ -420,7 +432,7 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
 
 
 def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Generator) -> Verdict:
-    """Verify the limit on a random error that its displacement sets.
+    """Verdict on the displacement of a random error at the limit that the location requirement sets.
 
     The sigma of the displacement, times the coverage factor, is compared with the requirement.
     """
@@ -461,12 +473,12 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
 
 
 def _stream(study: Study, row_id: str) -> np.random.Generator:
-    """Random number generator for a row, independent of the other rows that are verified."""
+    """Random number generator for a row, seeded by the mission's seed and the id of the row."""
     return np.random.default_rng([(study.mission.simulation or Simulation()).seed, *row_id.encode()])
 
 
 def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
-    """Standard deviation of a phase over many time series [rad], and the number of time series."""
+    """Standard deviation of the quadratic or cubic phase over many time series [rad], and the number of series."""
     if error.subject.kind in _FOLLOWED:
         effects = _effects_of_draws(study, error, rng)
         return float(np.nanstd(effects.cubic if is_cubic else effects.quadratic)), _SIGMA_DRAWS
@@ -475,9 +487,9 @@ def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic:
 
 
 def _effects_of_draws(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
-    """Compute the effects of many drawn histories of a sensor or of the atmosphere from exact ranges, (draws,)."""
+    """Effects, from exact ranges, of many drawn histories of a position error or of a delay of the air, (draws,)."""
     moments = aperture_nodes(study.collection.aperture_time)
-    if error.subject.kind in CORRELATED:  # not smooth between the nodes, unlike integrated noise
+    if error.subject.kind in CORRELATED:  # between the nodes it is not smooth, unlike integrated noise
         return study.exact_effects(_smooth_noise(study, error, rng))
     if error.subject.kind != "propagation":
         return study.exact_effects(position_courses(study.mission, error, moments, _SIGMA_DRAWS, rng))
@@ -487,9 +499,9 @@ def _effects_of_draws(study: Study, error: RandomError, rng: np.random.Generator
 
 
 def _remaining_range_error(study: Study, error: RandomError, times: Floats, group: Floats) -> Floats:
-    """Range error due to group delays that remains at the displaced point, (draws, times). [m]
+    """Range error due to delays of the air that remains at the displaced image point, (draws, times). [m]
 
-    `group` are the delays, (draws, times).
+    `group` are the group delays, (draws, times). [m] `times` are slow times. [s]
     """
     half, geometry = study.collection.aperture_time / 2, study.geometry
     mean = group.mean(axis=1, keepdims=True)
@@ -511,7 +523,7 @@ def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[F
     draws, highest, count = _CLOCK_DRAWS, _MAX_TONE_CYCLES / T, 257
     if mission.synchronization is not None and mission.synchronization.interval is not None:
         draws = _SYNCHRONIZED_DRAWS
-    if fastest_shake(mission, error):  # which may begin at far higher frequencies than other quadratic phases
+    if fastest_shake(mission, error):  # vibration may begin above the frequencies that otherwise matter
         draws, highest = _SYNCHRONIZED_DRAWS, max(highest, _SHAKE_FREQUENCY_FACTOR * slowest_shake(mission, error))
         highest = min(highest, fastest_shake(mission, error))
         count = 1 + fast_steps(min(_MAX_TONE_STEPS, max(count - 1, math.ceil(_STEPS_PER_CYCLE * highest * T))))
@@ -539,7 +551,10 @@ def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator)
 
 
 def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
-    """Smooth part of drawn correlated noise at the nodes of exact ranges, (draws, nodes, 3) for each platform. [m]"""
+    """Smooth part of drawn correlated position noise at the nodes of exact ranges, by platform. [m]
+
+    Each array is (draws, nodes, 3). The smooth part is that of `_smooth_at_nodes`.
+    """
     T, correlation_time = study.collection.aperture_time, process_of(study.mission, error).correlation_time
     times = _moments(study, _SERIES_SAMPLES)
     at_nodes = _smooth_at_nodes(T, times)
@@ -555,9 +570,10 @@ def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) ->
 
 
 def _smooth_at_nodes(aperture_time: float, times: Floats) -> Floats:
-    """Matrix that converts values at times to their smooth part at the nodes of exact ranges, (nodes, times).
+    """Matrix that converts values at slow times to their smooth part at the nodes of exact ranges, (nodes, times).
 
-    If noise with a short correlation time were sampled at the nodes alone, its phase would appear too large.
+    The smooth part is a least-squares fit of Legendre polynomials up to `SMOOTH_ORDER`. If noise with a short
+    correlation time were sampled at the nodes alone, its phase would appear too large.
     """
     legendre = np.polynomial.legendre
     fit = np.linalg.pinv(legendre.legvander(2 * times / aperture_time, SMOOTH_ORDER))
@@ -581,9 +597,9 @@ def _moments(study: Study, count: int) -> Floats:
 
 
 def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[Errors]:
-    """Draw a few time series and convert them to errors of an image, up to the cubic phase.
+    """Draw a few time series of an error, and convert them to errors that the simulator applies to images.
 
-    Phases of higher order spread power and would hide the response.
+    Only orders up to the cubic are kept, because higher orders spread power and would mask the response.
     """
     times = _moments(study, _SERIES_SAMPLES)
     if error.subject.kind in MOVING:
@@ -609,7 +625,10 @@ def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[
 
 # ---------------------------------------------------------------------- what spreads
 def verify_islr(study: Study, row_subject: Subject) -> Verdict:
-    """Verify the ISLR of all errors that spread power, scaled together to the limit of the row's owner."""
+    """Verdict on the ISLR of all declared errors that spread power, scaled together to the limit of an owner.
+
+    The owner is that of the row, `row_subject`.
+    """
     mission, model = study.mission, study.models[-1].name
     limit = spread_limit(mission, study.allocation, row_subject.owner, model) or 0.0
     level = islr_db(limit**2, model, mainlobe_energy(mission))
@@ -642,22 +661,22 @@ def _power(
     cubic: float = 0.0,
     order: int = _CUBIC_ORDER,
 ) -> Verdict:
-    """Verdict on the ISLR that time series at a limit add to an image, compared with the ISLR that an owner may add.
+    """Verdict on the ISLR that errors at a limit add to an image, compared with the ISLR that an owner may add.
 
-    `members` are errors of sensors and clocks. `white` noise, `echoes` (tones with their cycles per aperture) and a
-    `cubic` phase are added, each with its rms over the aperture [rad]. Phases up to `order` are removed from the time
-    series.
+    `members` are random errors, of which time series are drawn. Their Legendre orders up to `order` are removed. The
+    other phases have random starts: `white` is the rms of white noise, `echoes` are pairs of the rms and the cycles
+    per aperture of tones, and `cubic` is the rms of a cubic phase over the aperture. [rad]
     """
     mission, collection = study.mission, study.collection
     rng = _stream(study, blank.id)
-    # Each moment represents a step; faster phases are noise between steps.
+    # Each sample represents one time step; faster phases appear as independent noise from step to step.
     times = cell_centres(collection.aperture_time, _ISLR_SAMPLES)
     scaled_time = 2 * times / collection.aperture_time
     legendre = np.polynomial.legendre.legvander(scaled_time, _CUBIC_ORDER)
     fitted = legendre[:, : order + 1] @ np.linalg.pinv(legendre[:, : order + 1])
 
     def draw_phases(draws: int) -> Floats:
-        """Draw phases, and remove the orders that displace and defocus the response."""
+        """Draw phases without the orders that displace and defocus the response, (draws, _ISLR_SAMPLES). [rad]"""
         phases = white * rng.standard_normal((draws, times.size))
         for error in members:
             if error.subject.kind in MOVING:
@@ -672,11 +691,11 @@ def _power(
         for rms, cycles in echoes:
             starts = 2 * math.pi * rng.random((draws, 1))
             phases += math.sqrt(2) * rms * np.cos(math.pi * cycles * scaled_time + starts)
-        if cubic:  # of P₃, whose mean square over the aperture is a seventh
+        if cubic:  # P₃ has a mean square of 1/7 over the aperture
             phases += math.sqrt(7) * cubic * rng.standard_normal((draws, 1)) * legendre[:, 3]
         return phases
 
-    allowed = spread_limit(mission, study.allocation, owner, "full") or 0.0  # ISLR that an image may show
+    allowed = spread_limit(mission, study.allocation, owner, "full") or 0.0  # rms phase of the owner's limit
     required = float(islr_of(mission, allowed**2)) if allowed else 0.0
     return measured_power(
         collection, blank._replace(requirement_db=required), draw_phases, phrases.note("power-of-time-series")
@@ -686,7 +705,7 @@ def _power(
 # ---------------------------------------------------------------------- ISLR that noise adds
 @dataclass(frozen=True, slots=True)
 class AddedIslr:
-    """ISLR that noise adds, the ends of its 95 % interval [dB], and the number of draws of the mean."""
+    """ISLR that noise adds, with the ends of its 95 % confidence interval [dB], and the number of draws."""
 
     level: float
     low: float
@@ -701,8 +720,8 @@ class AddedIslr:
     def verdict(self, required_db: float) -> str:
         """Verdict on a limit, given the required ISLR; `not_evaluated` if more draws may change the verdict.
 
-        If the value is on the border of confirmed and conservative after all draws, the verdict is `conservative`,
-        because such a limit does not add too much.
+        If the maximum number of draws does not decide between confirmed and conservative, the verdict is
+        `conservative`, because such a limit does not add too much.
         """
         excess, doubt = self.level - required_db, _DECISION_SIGMA * self.error
         low, high = excess - doubt, excess + doubt
@@ -716,7 +735,7 @@ class AddedIslr:
 
 
 class Mainlobe:
-    """The mainlobe of an error-free response, which lies within its first nulls.
+    """Mainlobe of an error-free response, between its first nulls.
 
     Parameters
     ----------
@@ -736,22 +755,25 @@ class Mainlobe:
         self.energy = float(self._clean**2 @ self._steps)
 
     def lost(self, phases: Floats) -> Floats:
-        """Energy that phases (draws, moments) take from the mainlobe, divided by the image's energy, (draws,)."""
+        """Energy that phases remove from the mainlobe, as a fraction of the energy of the image, (draws,).
+
+        `phases` are (draws, moments). [rad]
+        """
         # exp(jφ) - 1 without rounding: a limit of -100 dB is an energy of 1e-10.
         change = (-2 * np.sin(phases / 2) ** 2 + 1j * np.sin(phases)) @ self._waves
         energy_loss: Floats = -(2 * self._clean * change.real + np.abs(change) ** 2) @ self._steps
         return energy_loss
 
     def added_db(self, lost: float) -> float:
-        """Convert the mean energy lost from the mainlobe to an added ISLR. [dB]"""
+        """Added ISLR for a mean energy that the mainlobe loses, as a fraction of the energy of the image. [dB]"""
         remaining_energy = max(self.energy - lost, _MIN_ENERGY_FRACTION)
         return 10 * math.log10(max(lost, _MIN_ENERGY_FRACTION) / (self.energy * remaining_energy))
 
 
 def added_islr(weights: Floats, draw: Callable[[int], Floats], required_db: float) -> AddedIslr:
-    """Draw phases until the interval of the added ISLR permits only one verdict.
+    """Measure the ISLR that random phases add, with as many draws as the verdict needs.
 
-    Drawing also ends at the maximum number of draws.
+    Drawing ends when the confidence interval permits only one verdict, or at the maximum number of draws.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A mission with its analysis and simulated collection, and the images from which limits are verified."""
+"""Study of one mission: its analysis, its simulated collection, and the images by which limits are verified."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -44,17 +44,17 @@ from bisar_budget.verifier.aperture_reading import (
 )
 
 Sizes = Sequence[tuple[ErrorSource, float]]  # errors and their signed sizes
-_MAX_DIFFERENCE_RAD = 0.5  # of the phase between lines on which one phase is estimated
-_SCALING_FRACTION, _MAX_SCALING_STEPS = 1e-4, 40  # of a budget, to which errors are scaled
-_HIDDEN_FRACTION = 0.1  # of the equal-loss phase; if less is hidden, the phase is measured better than a loss
-_SINGLE_PEAK_RAD2 = math.log(2)  # variance of a phase that takes half the peak's power
+_MAX_DIFFERENCE_RAD = 0.5  # largest difference of quadratic phase between lines that share an estimate
+_SCALING_FRACTION, _MAX_SCALING_STEPS = 1e-4, 40  # accuracy, and most steps, of scaling errors to a budget
+_HIDDEN_FRACTION = 0.1  # of the equal-loss phase; if less is hidden, the loss is not used to measure it
+_SINGLE_PEAK_RAD2 = math.log(2)  # variance of a phase that halves the power of the peak
 _DIRECT_SUM_SAMPLES = 256  # pulses, and frequencies, of a direct sum
-_ROUND_CELLS = 6  # around the middle line; they distinguish moments that look alike along the line
-_MIN_DOPPLER_RATE_FRACTION = 0.02  # of the highest rate of Doppler; slower parts of the aperture are not followed
+_ROUND_CELLS = 6  # range cells around the middle line; they distinguish moments with equal positions along the line
+_MIN_DOPPLER_RATE_FRACTION = 0.02  # of the highest Doppler rate; lower rates are set to this value
 
 
 class Spread(NamedTuple):
-    """Number of resolution cells over which a response is smeared along its line, and walks in range.
+    """Extent of a response in resolution cells: smear along its line, and walk in range.
 
     If Doppler turns back within the aperture (`is_round`), the response spreads in all directions, and both numbers
     are equal. A range cell has `finer` times as many pixels as a cross-range cell.
@@ -67,7 +67,11 @@ class Spread(NamedTuple):
 
 
 class Responses(NamedTuple):
-    """Image of a point with errors around its displaced position, and of an error-free point at that position."""
+    """Images of a point with errors and of an error-free point, both around the displaced position of the first.
+
+    `chip` is the image with errors, and `reference` the error-free image. `effect` is the effect of the errors from
+    exact ranges.
+    """
 
     errors: Errors
     effect: ExactEffect
@@ -81,7 +85,7 @@ VerdictFields = dict[str, Any]
 
 
 class Study:
-    """One mission, with the analysis and the collection that all its rows share."""
+    """One mission, with the analysis and the simulated collection that the verdicts on all rows share."""
 
     def __init__(self, mission: Mission, analysis: Analysis | None = None) -> None:
         self.mission, self.analysis = mission, analysis or Analysis(mission)
@@ -91,22 +95,25 @@ class Study:
         self.collection = PointCollection(mission, self.geometry)
 
     def blank(self, row_id: str, limit: float, unit: str, **fields: Any) -> Verdict:
-        """Create a verdict on a limit of the gating model, to be completed after the image is formed."""
+        """Create a verdict on a limit of the gating model, without the results of measurements.
+
+        `fields` are further fields of the verdict.
+        """
         return Verdict(id=row_id, model=self.model, boundary_error=limit, unit=unit, **fields)
 
     @property
     def is_full(self) -> bool:
-        """Whether displacement and cubic phase follow from exact ranges; else they follow from Table I and (25)."""
+        """Whether displacement and cubic phase follow from exact ranges instead of Table I and (25)."""
         return self.model != "published"
 
     @property
     def models(self) -> tuple[Model, ...]:
-        """Models that decide the verdicts: one model, or both models under `strictest`."""
+        """Gating models, by which verdicts are decided: one model, or both models under `strictest`."""
         return tuple(getattr(self.analysis, name) for name in self.analysis.gates)
 
     @property
     def declared(self) -> list[ErrorSource]:
-        """Declared errors that an image can show.
+        """Declared errors that a simulated image can contain.
 
         `other` errors are phases without a motion and are not included.
         """
@@ -126,16 +133,20 @@ class Study:
         return tuple(getattr(analysis, name) for name in analysis.gates)
 
     def boundary(self, source: ErrorSource, limit: float, *, is_focused: bool = False) -> float | None:
-        """Smallest size at which an error reaches a quadratic phase by a gating model; None if it never does.
+        """Smallest size at which an error reaches a limit on quadratic phase in a gating model.
 
-        `limit` is this phase [rad]. If `is_focused`, it includes the gain of autofocus.
+        The size is in the unit of the error; None if the error never reaches the limit. `limit` is the quadratic
+        phase. [rad] `is_focused` tells whether it includes the gain of autofocus.
         """
         models = self.models if is_focused else self.unfocused_models
         sizes = (model.allowable(source, QUADRATIC, limit) for model in models)
         return min((size for size in sizes if size is not None), default=None)
 
     def allowed(self, source: ErrorSource) -> tuple[float | None, str | None]:
-        """Allowable of an error by all requirements, autofocus included, and the requirement that sets it."""
+        """Allowable size of an error under all requirements, autofocus included, and the requirement that sets it.
+
+        Both are None if no requirement limits the error.
+        """
         limit = self.allocation.qpe_allowed(source.owner)
         needs = self.mission.requirements
         limits = (limit, needs.cubic_phase_error, needs.location_error)
@@ -143,11 +154,11 @@ class Study:
         return min(allowables, key=lambda allowable: math.inf if allowable[0] is None else allowable[0])
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
-        """Convert a single error of a given size to the errors of an image."""
+        """Convert a single error of a given size to the errors that the simulator applies to an image."""
         return flown(source, size, self.geometry, self.collection.aperture_time)
 
     def together(self, sizes: Sizes, scale: float = 1.0) -> Errors:
-        """Superpose several errors, each with `scale` times its size."""
+        """Superpose several errors, each with `scale` times its size, as errors that the simulator applies."""
         scaled = ((source, scale * size) for source, size in sizes)
         return flown_together(scaled, self.geometry, self.collection.aperture_time)
 
@@ -187,10 +198,10 @@ class Study:
         return max(phases, key=lambda sign: phases[sign])
 
     def summed(self, members: Sequence[ErrorSource], budget: float) -> list[tuple[ErrorSource, float]]:
-        """Scale the declared errors until the sum of their phases by the gating model equals a budget.
+        """Scale declared errors until the sum of their quadratic phases in the gating model equals a budget [rad].
 
-        Each error has its worse sign. In the result the signs make the phases add. The list is empty if there is no
-        phase.
+        Returns pairs of an error and its scaled size. The signs of the sizes are such that the phases add. The list
+        is empty if no error has a phase.
         """
         model = self.models[-1]
 
@@ -216,24 +227,28 @@ class Study:
         ]
 
     def _worst(self, model: Model, source: ErrorSource, size: float) -> float:
-        """Equal-loss quadratic phase of an error with its worse sign. [rad]
+        """Equal-loss quadratic phase of an error in a model, with the worse sign of the error. [rad]
 
-        The result has the sign of the phase of a small error.
+        The result has the sign of the quadratic phase of a small error. It is infinite if the phase is not finite.
         """
         effect = model.does(source, size)
         return math.copysign(effect.equal_loss, effect.qpe) if math.isfinite(effect.qpe) else math.inf
 
     def at_limit(self, subject: Subject, limit: float, room: float = 1.0) -> Responses:
-        """Form the images at the limit of a quadratic-phase row, with the worse sign of the errors."""
+        """Form the images for the errors of a row at its quadratic-phase limit, with the worse sign of the errors.
+
+        For the row of a single error, `limit` is the size of the error; for a sum, it is the budget. [rad] `room` is
+        described in `images`.
+        """
         source = next((s for s in self.sources if s.subject == subject), None)
         sizes = [(source, limit)] if source is not None else self.summed(self.members(subject.owner), limit)
         return self.images(self.together(sizes, self.worse_sign(sizes)), room=room)
 
     def images(self, errors: Errors, range_cells: int = RANGE_CELLS, room: float = 1.0) -> Responses:
-        """Form images of errors that are large enough for the smear.
+        """Form the images of a point with errors and of an error-free point, on patches large enough for the smear.
 
-        `room` is the smallest permitted ratio of the width of the patch to the smear. Autofocus fails in a narrower
-        patch.
+        `room` is the smallest permitted ratio of the width of a patch to the smear, because autofocus fails in a
+        narrower patch. `range_cells` is the height of a patch without range walk, in range cells.
 
         Raises
         ------
@@ -248,7 +263,10 @@ class Study:
         return Responses(errors, effect, spread, *chips)
 
     def read(self, images: Responses, *, is_focused: bool = False) -> ApertureReading:
-        """Measure the quadratic and cubic phase of a response."""
+        """Measure the quadratic and cubic phase over the aperture of a response in an image. [rad]
+
+        `is_focused` tells whether autofocus has been applied to the image.
+        """
         spread = images.spread
         cells = spread.walk + (_ROUND_CELLS if spread.is_round else READ_CELLS if spread.walk else 0)
         return read_aperture(
@@ -262,15 +280,15 @@ class Study:
         )
 
     def equal_loss(self, images: Responses, reading: ApertureReading) -> float:
-        """Equal-loss quadratic phase that an image shows: its peak loss as a purely quadratic phase. [rad]
+        """Equal-loss quadratic phase of an image: the purely quadratic phase with the same peak loss. [rad]
 
-        The part of the loss due to the cubic phase and higher orders is taken out first.
+        The part of the loss due to the cubic phase and higher orders is subtracted first.
 
-        If only a small phase is hidden, the phase over the aperture is the best measure, otherwise the loss of the
-        peak is. The loss is compared with the loss of a direct sum by exact ranges under the same window, because a
-        loss equals the variance of the phase only to second order and depends on the window. Beyond about 3 dB of
-        loss an image has no single peak. In that case the hidden phase by exact ranges is added to the measured phase
-        as a root-sum-square.
+        If the hidden phase is small, the result follows from the phase over the aperture, otherwise from the loss of
+        the peak. The loss is compared with the loss of a direct sum from exact ranges under the same window, because
+        a loss equals the variance of the phase only to second order and depends on the window. With a loss of more
+        than about 3 dB, an image has no single peak. In that case the result is the root-sum-square of the measured
+        quadratic phase and the hidden phase from exact ranges.
         """
         effect = images.effect
         variance, other_variance = _phase_variances(effect)
@@ -284,15 +302,19 @@ class Study:
     def shift(self, images: Responses, reading: ApertureReading) -> Shift:
         """Displacement of a response from its position by exact ranges, and the line of its smear.
 
-        Up to a loss of about 3 dB, the response lies at the peak of the image. It also does so whenever Doppler turns
-        back, because then no slope over the aperture locates a response along a line.
+        Up to a loss of about 3 dB, the position of the response is that of the peak of the image. The same applies
+        whenever Doppler turns back, because then no slope of the phase over the aperture locates a response along a
+        line.
         """
         variance, other_variance = _phase_variances(images.effect)
         has_line = variance + other_variance > _SINGLE_PEAK_RAD2 and not images.spread.is_round
         return measured_shift(images.chip, images.reference, reading if has_line else None)
 
     def _expected_loss(self, images: Responses) -> float:
-        """Minus the logarithm of the peak power under the window, from a direct sum over pulses by exact ranges."""
+        """Expected loss of an image: minus the natural logarithm of its relative peak power under the window.
+
+        The peak power follows from a direct sum over pulses and frequencies with exact ranges.
+        """
         collection = self.collection
         times = cell_centres(collection.aperture_time, _DIRECT_SUM_SAMPLES)
         remaining_range = collection.flight(images.errors.slow(), times).range_error(
@@ -304,9 +326,10 @@ class Study:
         return -2 * math.log(abs(weights @ phases @ weights) / weights.sum() ** 2)
 
     def focused(self, images: Responses) -> Responses:
-        """Refocus a response by the mission's algorithm. The phase is estimated on the lines that share it.
+        """Refocus a response with the autofocus algorithm of the mission.
 
-        If range cells are long, the lines beside the response show it with a different quadratic phase.
+        The quadratic phase differs from image line to image line. Only the lines whose phase is nearly that of the
+        middle line are used for the estimate.
         """
         algorithm = ALGORITHMS[self.mission.autofocus.algorithm]
         lines = images.chip.image.shape[0]
@@ -315,21 +338,24 @@ class Study:
         return images._replace(chip=refocused(self.collection, images.errors, centre, images.chip, algorithm, half))
 
     def shared_lines(self, spread: Spread) -> int:
-        """Number of lines on either side of the middle that share its quadratic phase or contain the response."""
+        """Number of image lines on either side of the middle line that are used to estimate its quadratic phase.
+
+        They have nearly the quadratic phase of the middle line, or contain part of the response.
+        """
         exact = self.analysis.exact
         (a, c, east, _), (b, d, north, _) = (gradient[:, 0] for gradient in exact.gradient)
-        # A metre of range along equal Doppler leads by (d, −c) over the determinant.
+        # At equal Doppler, one metre of range is a displacement on the ground by (d, −c)/(ad − bc).
         area, bends = abs(a * d - b * c), abs(float(exact.k[0]) * (d * east - c * north))
         per_line = bends * self.collection.range_cell / (OVERSAMPLING_FACTOR * spread.finer)
         shared = int(min(_MAX_DIFFERENCE_RAD * area / per_line if per_line else 1e6, 1e6))
         return max(shared, round(spread.walk * OVERSAMPLING_FACTOR * spread.finer / 2))
 
     def spread(self, errors: Errors, effect: ExactEffect) -> Spread:
-        """Spread of a response due to an error, from the range error that remains over the aperture.
+        """Spread of a response due to errors, from the range error that remains over the aperture.
 
-        Each part of the aperture places the response at the point on the line of equal range that has the remaining
-        Doppler. Where Doppler changes slowly, in part of a long aperture or with nearly parallel gradients, a small
-        slope corresponds to a long distance.
+        Each part of the aperture places the response on the line of equal range, at the point whose Doppler matches
+        the remaining slope of the range error. Where Doppler changes slowly, in part of a long aperture or with
+        nearly parallel gradients, a small slope corresponds to a long distance.
         """
         half = self.collection.aperture_time / 2
         time = np.linspace(-half, half, 257)
@@ -339,7 +365,7 @@ class Study:
         slopes = -look_sum(*(path.measured - point for path in flight.paths))[:, :2]
         lines = self.collection.range_lines(errors)
         cells = lines.cells(effect.displacement, self.mission.radar)
-        if lines.turns_back:  # each moment displaces the point along the turn of the line of sight
+        if lines.turns_back:  # each moment displaces the point in the direction in which the line of sight turns
             turn = np.hypot(*np.gradient(slopes, time, axis=0).T)
             reach = 2 * math.ceil(
                 min(float(np.abs(np.gradient(remaining_range, time) / turn).max()) / min(cells), 1e6)

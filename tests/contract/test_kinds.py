@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from bisar_budget.budget.random_rows import REASONS_FOR_NO_EFFECT, WORDINGS
 from bisar_budget.error_kinds import ErrorKind, SourceKind, StateKind, SumKind, kinds
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.row import SPECIFICATION
@@ -37,6 +38,13 @@ def test_random_steps() -> None:
     """A random error has steps, and so has an error of which the file states only the effect."""
     expected = names(kind for kind in SOURCES if kind.is_random or kind.moves == "image")
     assert set(RANDOM_STEPS) == expected | {"oscillator.acceleration"}
+
+
+def test_wordings_and_reasons_for_no_effect() -> None:
+    """A random error has texts for its row, and so has an error of which the file states only the effect."""
+    expected = names(kind for kind in SOURCES if kind.is_random or kind.moves == "image")
+    assert set(WORDINGS) == expected | {"lever_arm.uncertainty", "oscillator.acceleration"}
+    assert set(REASONS_FOR_NO_EFFECT) == expected
 
 
 def test_row_steps() -> None:
