@@ -183,10 +183,13 @@ def register(kind: ErrorKind) -> None:
         raise ValueError(f"a kind of error named {kind.name!r} is registered already")
 
 
+POSITION = StateKind(name="position", order=0, unit="m")
+VELOCITY = StateKind(name="velocity", order=1, unit="m/s")
+ACCELERATION = StateKind(name="acceleration", order=2, unit="m/s^2")
+STATE_KINDS = (POSITION, VELOCITY, ACCELERATION)  # by order
+
 for _kind in (
-    StateKind(name="position", order=0, unit="m"),
-    StateKind(name="velocity", order=1, unit="m/s"),
-    StateKind(name="acceleration", order=2, unit="m/s^2"),
+    *STATE_KINDS,
     SourceKind(name="time_tag", moves="platform", flown_as="time_tag", common_id_form="common.{kind}"),
     SourceKind(name="terrain", moves="platform", flown_as="height", is_covered=False),
     SourceKind(name="vibration", moves="platform", is_random=True),

@@ -27,6 +27,7 @@ from bisar_budget.effects.range_processes import (
 )
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.spectra import Parts
+from bisar_budget.error_kinds import SourceKind
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.image_plane import LEGENDRE_LEADING, nodes_for
@@ -157,12 +158,19 @@ class RandomError(NamedTuple):
         return self.subject.owner
 
     @property
+    def kind(self) -> SourceKind:
+        """The kind of the error, with all that is known about it."""
+        facts = self.subject.facts
+        assert isinstance(facts, SourceKind)
+        return facts
+
+    @property
     def is_covered(self) -> bool:
         """Whether the declared size or its effect includes the coverage factor.
 
         False only for an error of the kind `other`, for which the file states an effect determined elsewhere.
         """
-        return self.subject.kind != "other"
+        return self.kind.is_covered
 
     def coverage(self, mission: Mission) -> PerCase:
         """Coverage factor included in the effect of the declared size; 1 if `is_covered` is false."""
