@@ -9,10 +9,10 @@ when a mission file or an option uses a kind that is not known yet, because read
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from bisar_budget import units
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from bisar_budget.arrays import Floats
     from bisar_budget.geometry import PlatformState
 
+_Entry = TypeVar("_Entry")
 ENTRY_POINT_GROUP = "bisar_budget.kinds"
 _OWNER_WORDS = {"clock": "timing"}  # owners that ids name otherwise
 
@@ -54,6 +55,14 @@ class ErrorKind:
         }
         return ".".join(filter(None, (part.format_map(names) for part in form.split("."))))
 
+    def find_in(self, table: Mapping[str, _Entry], axis: str = "") -> _Entry:
+        """Entry of a table by kind: the entry `KIND.AXIS` if the table has one, else the entry `KIND`.
+
+        Raises `KeyError` if the table has neither.
+        """
+        name = f"{self.name}.{axis}"
+        return table[name] if name in table else table[self.name]
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SourceKind(ErrorKind):
@@ -68,6 +77,9 @@ class SourceKind(ErrorKind):
         Whether the coverage factor multiplies the declared size.
     flown_as : str
         Field of the simulator's `PathError` that has the size of the error; empty if its motion is flown otherwise.
+    drawn_as : str
+        What is drawn of a random error over time: the `motion` of platforms, or the `delay` or `phase` of the echoes.
+        Empty if nothing is drawn.
     is_random : bool
         Whether the error is random: it has a sigma and no sign.
     is_correlated : bool
@@ -79,6 +91,7 @@ class SourceKind(ErrorKind):
     moves: str
     is_covered: bool = True
     flown_as: str = ""
+    drawn_as: str = ""
     is_random: bool = False
     is_correlated: bool = False
     has_names: bool = False
@@ -183,35 +196,37 @@ def register(kind: ErrorKind) -> None:
         raise ValueError(f"a kind of error named {kind.name!r} is registered already")
 
 
-POSITION = StateKind(name="position", order=0, unit="m")
-VELOCITY = StateKind(name="velocity", order=1, unit="m/s")
-ACCELERATION = StateKind(name="acceleration", order=2, unit="m/s^2")
-STATE_KINDS = (POSITION, VELOCITY, ACCELERATION)  # by order
+POSITION_KIND = StateKind(name="position", order=0, unit="m")
+VELOCITY_KIND = StateKind(name="velocity", order=1, unit="m/s")
+ACCELERATION_KIND = StateKind(name="acceleration", order=2, unit="m/s^2")
+STATE_KINDS = (POSITION_KIND, VELOCITY_KIND, ACCELERATION_KIND)  # by order
 
 for _kind in (
     *STATE_KINDS,
     SourceKind(name="time_tag", moves="platform", flown_as="time_tag", common_id_form="common.{kind}"),
     SourceKind(name="terrain", moves="platform", flown_as="height", is_covered=False),
-    SourceKind(name="vibration", moves="platform", is_random=True),
-    SourceKind(name="imu", moves="platform", is_random=True),
-    SourceKind(name="lever_arm", moves="platform", is_random=True),
+    SourceKind(name="vibration", moves="platform", drawn_as="phase", is_random=True),
+    SourceKind(name="imu", moves="platform", drawn_as="motion", is_random=True),
+    SourceKind(name="lever_arm", moves="platform", drawn_as="motion", is_random=True),
     SourceKind(
         name="random",
         moves="platform",
+        drawn_as="motion",
         common_id_form="common.{kind}.{axis}",
         is_random=True,
         is_correlated=True,
         has_names=True,
     ),
-    SourceKind(name="trajectory", moves="platform", is_random=True, is_correlated=True),
+    SourceKind(name="trajectory", moves="platform", drawn_as="motion", is_random=True, is_correlated=True),
     SourceKind(name="timing", moves="clock", id_form="{kind}.{axis}"),
     SourceKind(name="time", moves="clock"),
     SourceKind(name="frequency", moves="clock"),
-    SourceKind(name="synchronization", moves="clock", is_random=True),
-    SourceKind(name="oscillator", moves="clock", is_random=True),
+    SourceKind(name="synchronization", moves="clock", drawn_as="phase", is_random=True),
+    SourceKind(name="oscillator", moves="clock", drawn_as="phase", is_random=True),
     SourceKind(
         name="propagation",
         moves="air",
+        drawn_as="delay",
         id_form="{kind}.{owner}.{axis}",
         common_id_form="{kind}.{axis}",
         is_random=True,
