@@ -140,8 +140,6 @@ _PROCESSES: Mapping[str, Callable[[Mission, RandomError], tuple[GaussMarkov, dic
 
 
 # ---------------------------------------------------------------------- inertial sensors
-
-
 def specific_force(mission: Mission, state: PlatformState) -> Vectors:
     """Specific force of a platform, f = a − g, in the axes of the scene. [m/s²]
 

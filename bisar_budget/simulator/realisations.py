@@ -162,9 +162,9 @@ _MOTION_DRAWS: Mapping[
 def _drawn_by_axis(
     motion: MotionError, figure: InertialFigure, times: Floats, draws: int, rng: np.random.Generator
 ) -> Iterator[tuple[int, Floats, Floats]]:
-    """Draw the position error and the tilt of each axis that has an error, (draws, times) each, with its index.
+    """Draw the errors of a sensor along each axis, for one unit of the figure along its largest axis.
 
-    They are relative to a unit acceleration, and to a unit error, along the largest axis.
+    Yields the index of the axis, the position error per unit of acceleration, and the tilt, (draws, times) each.
     """
     _, sizes = parts_of_largest(np.array(getattr(motion.imu, figure.name, None) or (1.0, 1.0, 1.0)))
     for axis, size in enumerate(sizes):
