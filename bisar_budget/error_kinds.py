@@ -98,6 +98,9 @@ class SourceKind(ErrorKind):
         Whether the coverage factor multiplies the declared size.
     flown_as : str
         Field of the simulator's `PathError` that takes the size of the error; empty if the error has no such field.
+    drawn_as : str
+        What is drawn of a random error over time: the `motion` of platforms, or the `delay` or `phase` of the echoes.
+        Empty if nothing is drawn.
     is_random : bool
         Whether the error is random: it has a sigma and no sign.
     is_correlated : bool
@@ -117,6 +120,7 @@ class SourceKind(ErrorKind):
     moves: str
     is_covered: bool = True
     flown_as: str = ""
+    drawn_as: str = ""
     is_random: bool = False
     is_correlated: bool = False
     has_names: bool = False
@@ -241,23 +245,30 @@ def register(kind: ErrorKind) -> None:
 POSITION = StateKind(name="position", order=0, unit="m")
 VELOCITY = StateKind(name="velocity", order=1, unit="m/s")
 ACCELERATION = StateKind(name="acceleration", order=2, unit="m/s^2")
-SPREAD_POWER = SumKind(name="islr", is_sum=True, is_level=True)
+STATE_KINDS = (POSITION, VELOCITY, ACCELERATION)  # by order
 MEASURED_KINDS = (POSITION, VELOCITY)  # which sources of paths and covariances state
+SPREAD_POWER = SumKind(name="islr", is_sum=True, is_level=True)
 
 for _kind in (
-    POSITION,
-    VELOCITY,
-    ACCELERATION,
+    *STATE_KINDS,
     SourceKind(name="time_tag", moves="platform", flown_as="time_tag", common_id_form="common.{kind}"),
     SourceKind(
         name="terrain", moves="platform", flown_as="height", is_covered=False, owes_source=False, direction="height"
     ),
-    SourceKind(name="vibration", moves="platform", is_random=True, is_vibration=True, spectrum_axis="spectrum"),
-    SourceKind(name="imu", moves="platform", is_random=True, is_largest_of_axes=True),
-    SourceKind(name="lever_arm", moves="platform", is_random=True),
+    SourceKind(
+        name="vibration",
+        moves="platform",
+        drawn_as="phase",
+        is_random=True,
+        is_vibration=True,
+        spectrum_axis="spectrum",
+    ),
+    SourceKind(name="imu", moves="platform", drawn_as="motion", is_random=True, is_largest_of_axes=True),
+    SourceKind(name="lever_arm", moves="platform", drawn_as="motion", is_random=True),
     SourceKind(
         name="random",
         moves="platform",
+        drawn_as="motion",
         common_id_form="common.{kind}.{axis}",
         is_random=True,
         is_correlated=True,
@@ -267,6 +278,7 @@ for _kind in (
     SourceKind(
         name="trajectory",
         moves="platform",
+        drawn_as="motion",
         is_random=True,
         is_correlated=True,
         is_of_log=True,
@@ -275,11 +287,14 @@ for _kind in (
     SourceKind(name="timing", moves="clock", id_form="{kind}.{axis}", owes_source=False),
     SourceKind(name="time", moves="clock", owes_source=False),
     SourceKind(name="frequency", moves="clock", owes_source=False),
-    SourceKind(name="synchronization", moves="clock", is_random=True),
-    SourceKind(name="oscillator", moves="clock", is_random=True, is_computed=True, spectrum_axis=""),
+    SourceKind(name="synchronization", moves="clock", drawn_as="phase", is_random=True),
+    SourceKind(
+        name="oscillator", moves="clock", drawn_as="phase", is_random=True, is_computed=True, spectrum_axis=""
+    ),
     SourceKind(
         name="propagation",
         moves="air",
+        drawn_as="delay",
         id_form="{kind}.{owner}.{axis}",
         common_id_form="{kind}.{axis}",
         is_random=True,

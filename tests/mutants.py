@@ -325,14 +325,14 @@ MUTANTS = (
     Mutant(
         "simulate: sensors flown without the coverage factor",
         "bisar_budget/simulator/realisations.py",
-        "Course(times, factor * series[0])",
-        "Course(times, series[0])",
+        "Course(self.times, self.factor * series[0])",
+        "Course(self.times, series[0])",
         (f"{_SEAMS}test_the_coverage_factor_is_in_the_time_series_of_sensors_and_clocks",),
     ),
     Mutant(
         "simulate: clocks flown without the coverage factor",
         "bisar_budget/simulator/realisations.py",
-        "series = factor * phase_courses",
+        "series = self.factor * phase_courses",
         "series = phase_courses",
         (f"{_SEAMS}test_the_coverage_factor_is_in_the_time_series_of_sensors_and_clocks",),
     ),

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
-from bisar_budget.effects.navigation_errors import TILTS
+from bisar_budget.effects.navigation_errors import INERTIAL_FIGURES
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
 from bisar_budget.error_kinds import registered_names
 from bisar_budget.findings.requirement import DeclaredKinds, ShiftedFigure
@@ -44,7 +44,9 @@ def swings_nothing(platform: Platform) -> bool:
     lever, imu = platform.motion_error.lever_arm, platform.motion_error.imu
     if lever is None or lever.arm is None or not any(map(np.any, lever.arm)):
         return False
-    return imu is None or all(getattr(imu, figure) is None for figure in TILTS)
+    return imu is None or all(
+        getattr(imu, figure.name) is None for figure in INERTIAL_FIGURES.values() if figure.tilts
+    )
 
 
 def _lacks_an_attitude(mission: Mission, name: str) -> str:

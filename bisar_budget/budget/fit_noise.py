@@ -13,6 +13,7 @@ import numpy as np
 from bisar_budget.arrays import Floats
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.sources import ErrorListing, exact_ranges
+from bisar_budget.error_kinds import POSITION, VELOCITY
 from bisar_budget.geometry import PlatformState
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
@@ -22,7 +23,6 @@ MAX_UNSAID_CHANGE_FRACTION = 0.05  # largest change of an allowable without a wa
 _DECISIVE_EFFECT_FRACTION = (
     0.1  # of the largest effect per unit of a kind; errors with smaller effects do not decide a verdict
 )
-_MOTION_KINDS = ("position", "velocity")
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
     exact = exact_ranges(cases, geometry, int(np.max(count)), cases=len(sides))
     listing = ErrorListing(cases, geometry, exact)
     worst = AllowableNoise(sigma, 0.0, "")
-    for kind in _MOTION_KINDS:
+    for kind in (POSITION, VELOCITY):
         units = np.array(
             [
                 [np.broadcast_to(effect.qpe, (len(sides),)) for effect in listing.full_legs(place, kind)]
@@ -77,7 +77,7 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
         changes = _changes(np.abs(units))
         place, axis = np.unravel_index(int(changes.argmax()), changes.shape)
         if changes[place, axis] > worst.change:
-            row_id = subject(PLATFORMS[place], kind, "xyz"[axis]).id
+            row_id = subject(PLATFORMS[place], kind.name, "xyz"[axis]).id
             worst = replace(worst, change=float(changes[place, axis]), row_id=row_id)
     return worst
 

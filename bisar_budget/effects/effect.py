@@ -13,7 +13,7 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.arrays import PerCase, PerCaseFlag
-from bisar_budget.error_kinds import ErrorKind, Motion, MotionKind, SourceKind, kind_of
+from bisar_budget.error_kinds import STATE_KINDS, ErrorKind, Motion, MotionKind, SourceKind, kind_of
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import (
     BistaticGeometry,
@@ -30,7 +30,7 @@ from bisar_budget.ranges.exact_ranges import Effect, FullEffect
 if TYPE_CHECKING:
     from bisar_budget.mission.instruments import Overridden
 
-MOTION = ("position", "velocity", "acceleration")  # kinds of error that a platform's measured path can have
+MOTION = tuple(kind.name for kind in STATE_KINDS)
 
 
 class Subject(NamedTuple):
@@ -67,7 +67,7 @@ def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: 
 
 PLATFORMS = ("transmitter", "receiver")
 _PLATFORMS_OF = {name: (index,) for index, name in enumerate(PLATFORMS)}  # indices by owner of an error
-MOTION_UNITS = dict(zip(MOTION, ("m", "m/s", "m/s^2"), strict=True))
+MOTION_UNITS = {kind.name: kind.unit for kind in STATE_KINDS}
 CLOCK_UNITS = {"constant": "s", "linear": "s/s", "quadratic": "1/s", "cubic": "1/s^2"}  # t̃₀ … t̃₃ of (1)
 NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of an error that is no motion
 
@@ -200,7 +200,7 @@ class ErrorSource(NamedTuple):
 
         On a turning path the effect of such an error is not proportional to its size.
         """
-        return self.subject.kind == "time_tag"
+        return self.kind.flown_as == "time_tag"
 
     @property
     def kind(self) -> SourceKind:

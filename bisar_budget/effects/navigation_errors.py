@@ -19,6 +19,7 @@ both effects. A further row shows the effect of attitude through the arm alone; 
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from itertools import product
 from typing import NamedTuple
@@ -40,66 +41,105 @@ from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import PlatformState, Vectors, cross, unit, without_rounding
 from bisar_budget.image_plane import nodes
-from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, LeverArm
+from bisar_budget.mission.instruments import GaussMarkov, LeverArm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import RAW, CommonMotionError, FlownPath, LogNoise, MotionError
 
-_IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
-SPREADING_NOISE = ("velocity_random_walk", "angle_random_walk")  # noise of an inertial sensor, part of which spreads
-TILTS = ("attitude", "gyro_bias", "angle_random_walk")
-# The covariance of a position error over the aperture grows as this power of the aperture time.
-_GROWS = {
-    "accelerometer_bias": 4,
-    "accelerometer_scale_factor": 4,
-    "attitude": 4,
-    "gyro_bias": 6,
-    "velocity_random_walk": 3,
-    "angle_random_walk": 5,
-}
-
-
-# ---------------------------------------------------------------------- inertial sensors
 CORRELATED = ("random", "trajectory")  # kinds of error that are correlated noise of a position
 _CONSTANT_S = 1e9  # correlation time of an error that is constant over any aperture
 _UNIFORM_SIGMA_RATIO = 12**-0.5  # ratio of sigma to step for an error that is uniformly distributed over the step
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class InertialFigure:
+    """A figure of an inertial sensor, such as the bias of its gyros.
+
+    Attributes
+    ----------
+    name : str
+        Key of the figure in the file, and the axis of its row.
+    unit : str
+        Unit of the figure in SI.
+    integrals : int
+        Number of integrations over time from the figure to the position error. A constant figure that is integrated
+        n times becomes τⁿ/n!.
+    spreads : bool
+        Whether the figure is noise, which spreads power. Any other figure is a constant random error.
+    tilts : bool
+        Whether the figure tilts the axes of the sensor. A tilt rotates the specific force, and the lever arm.
+    is_scale : bool
+        Whether the figure is a fraction of the specific force.
+    """
+
+    name: str
+    unit: str
+    integrals: int
+    spreads: bool = False
+    tilts: bool = False
+    is_scale: bool = False
+
+    @property
+    def growth_power(self) -> int:
+        """Power of the aperture time with which the covariance of the position error grows."""
+        return 2 * self.integrals - self.spreads
+
+
+# Figures of an inertial sensor by name, in the order of `evaluators.inertial_phases`.
+INERTIAL_FIGURES: Mapping[str, InertialFigure] = {
+    figure.name: figure
+    for figure in (
+        InertialFigure(name="accelerometer_bias", unit="m/s^2", integrals=2),
+        InertialFigure(name="accelerometer_scale_factor", unit="1", integrals=2, is_scale=True),
+        InertialFigure(name="attitude", unit="rad", integrals=2, tilts=True),
+        InertialFigure(name="gyro_bias", unit="rad/s", integrals=3, tilts=True),
+        InertialFigure(name="velocity_random_walk", unit="m/s/sqrt(s)", integrals=2, spreads=True),
+        InertialFigure(name="angle_random_walk", unit="rad/sqrt(s)", integrals=3, spreads=True, tilts=True),
+    )
+}
+
+
+# ---------------------------------------------------------------------- correlated noise of a position
 def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
     """Gauss–Markov process of an error that is correlated noise of a position, along `process_axes`."""
-    if error.subject.kind == "trajectory":
-        return _log_process(mission, error.owner, error.subject.axis)[0]
-    motion: MotionError | CommonMotionError | None = mission.common_motion_error
-    if error.owner in PLATFORMS:
-        motion = getattr(mission.platforms, error.owner).motion_error
-    assert motion is not None
-    return next(process for process in motion.random if process.name == error.subject.axis)
+    return _PROCESSES[error.kind.name](mission, error)[0]
 
 
 def process_axes(mission: Mission, error: RandomError) -> dict[str, Floats]:
-    """Axes (3, 3) of the correlated position noise `error` for each platform that it moves, by platform name."""
-    if error.subject.kind == "trajectory":
-        return {error.owner: _log_process(mission, error.owner, error.subject.axis)[1]}
-    common, names = mission.common_motion_error, [error.owner]
-    if error.owner not in PLATFORMS and common is not None:
-        names, frame = [*PLATFORMS], common.frame
-    else:
-        frame = getattr(mission.platforms, error.owner).motion_error.frame
-    return {name: np.array(getattr(mission.platforms, name).state.frame(frame)) for name in names}
+    """Axes (3, 3) along which a process moves each platform, as a mapping from the platform's name."""
+    return _PROCESSES[error.kind.name](mission, error)[1]
 
 
-def _log_process(mission: Mission, name: str, figure: str) -> tuple[GaussMarkov, Floats]:
-    """Process and axes (3, 3) of the noise of a platform's log, for one case.
+def _declared_process(mission: Mission, error: RandomError) -> tuple[GaussMarkov, dict[str, Floats]]:
+    """Process that the file declares for a platform or for both platforms, and its axes on each platform."""
+    motion: MotionError | CommonMotionError | None = mission.common_motion_error
+    names: tuple[str, ...] = PLATFORMS
+    if error.owner in PLATFORMS:
+        motion, names = getattr(mission.platforms, error.owner).motion_error, (error.owner,)
+    assert motion is not None
+    process = next(process for process in motion.random if process.name == error.subject.axis)
+    return process, {name: np.array(getattr(mission.platforms, name).state.frame(motion.frame)) for name in names}
 
-    The processor uses the fixes of the log without smoothing. `figure` is `residual` or `grid`, see `_log_parts`.
-    """
-    path: FlownPath | None = getattr(mission.platforms, name).path
+
+def _log_process(mission: Mission, error: RandomError) -> tuple[GaussMarkov, dict[str, Floats]]:
+    """Noise, and its axes, of a log whose fixes the processor uses without smoothing, for one case."""
+    path: FlownPath | None = getattr(mission.platforms, error.owner).path
     assert path is not None
     assert path.log_noise is not None
+    figure = error.subject.axis
     sizes, axes, correlation_time = _log_parts(path.log_noise, 1)[figure]
     x, y, z = sizes[:, 0].tolist()
-    return GaussMarkov(figure, (x, y, z), float(np.ravel(correlation_time)[0])), axes[:, :, 0]
+    process = GaussMarkov(figure, (x, y, z), float(np.ravel(correlation_time)[0]))
+    return process, {error.owner: axes[:, :, 0]}
 
 
+# Functions, by kind of correlated noise, that give its process and the axes of the process on each platform.
+_PROCESSES: Mapping[str, Callable[[Mission, RandomError], tuple[GaussMarkov, dict[str, Floats]]]] = {
+    "random": _declared_process,
+    "trajectory": _log_process,
+}
+
+
+# ---------------------------------------------------------------------- inertial sensors
 def specific_force(mission: Mission, state: PlatformState) -> Vectors:
     """Specific force of a platform, f = a − g, in the axes of the scene. [m/s²]
 
@@ -113,16 +153,16 @@ def specific_force(mission: Mission, state: PlatformState) -> Vectors:
     return (x - u, y - v, z - w)
 
 
-def acceleration_errors(kind: str, axes: Floats, force: Floats) -> Floats:
-    """Acceleration error due to one unit of a sensor error on each axis, (axes, 3, ...). [m/s²/unit]
+def acceleration_errors(figure: InertialFigure, axes: Floats, force: Floats) -> Floats:
+    """Acceleration error per unit of a sensor error about or along each axis, (axes, 3, ...). [m/s²/unit]
 
     `axes` has the same shape. `force` (3, ...) is the specific force. [m/s²] A tilt about an axis rotates the
     specific force. A scale factor adds a fraction of its component along the axis. Any other sensor error is an
     acceleration along the axis.
     """
-    if kind in TILTS:
+    if figure.tilts:
         return np.asarray(np.cross(axes, force, axisa=1, axisb=0, axisc=1))
-    if kind == "accelerometer_scale_factor":
+    if figure.is_scale:
         return np.asarray(axes * (axes * force).sum(axis=1, keepdims=True))
     return axes
 
@@ -136,34 +176,39 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
     stated = None if error.lever_arm is None else error.lever_arm.arm
     arm = None if stated is None else arm_at(state, stated, seen.exact.times)
     force = seen.vector(specific_force(seen.mission, state))
-    for index, (kind, unit_of_figure) in enumerate(_IMU_UNITS.items()):
-        values, key = getattr(error.imu, kind), error.key_of(kind)
+    for index, figure in enumerate(INERTIAL_FIGURES.values()):
+        values, key = getattr(error.imu, figure.name), error.key_of(figure.name)
         declared, about = None, axes
-        directions = acceleration_errors(kind, axes, force)
+        directions = acceleration_errors(figure, axes, force)
         if values is not None:
             declared, sizes = parts_of_largest(seen.vector(values))
             directions, about = directions * sizes[:, None], axes * sizes[:, None]
         along = seen.along(name, directions)
         row = _at_mid_aperture(seen.mission, index, along)
-        if arm is not None and kind in TILTS:
-            published, full = _with_arm(seen, platform_index, kind, directions, about, arm)
+        if arm is not None and figure.tilts:
+            published, full = _with_arm(seen, platform_index, figure, directions, about, arm)
         else:
-            published = RandomEffect(row[0], row[1], row[2] / seen.factor, *_moved_by_imu(seen, kind, along))
-            full = _over_aperture(seen, platform_index, kind, directions)
+            published = RandomEffect(row[0], row[1], row[2] / seen.factor, *_moved_by_imu(seen, figure, along))
+            full = _over_aperture(seen, platform_index, figure, directions)
         yield RandomError(
-            subject=subject(name, "imu", kind),
-            unit=unit_of_figure,
+            subject=subject(name, "imu", figure.name),
+            unit=figure.unit,
             declared=None if declared is None else declared * seen.factor,
-            path=("platforms", name, "motion_error", *(("imu", kind) if key == kind else (key,))),
+            path=("platforms", name, "motion_error", *(("imu", key) if key == figure.name else (key,))),
             published=published,
             full=full,
-            spreads=kind in SPREADING_NOISE,
-            moves=_moves_by_imu(seen, platform_index, kind, directions, about, arm) if seen.has_edge else (),
+            spreads=figure.spreads,
+            moves=_moves_by_imu(seen, platform_index, figure, directions, about, arm) if seen.has_edge else (),
         )
 
 
 def _moves_by_imu(
-    seen: SensorCases, platform_index: int, kind: str, directions: Floats, about: Floats, arm: Floats | None
+    seen: SensorCases,
+    platform_index: int,
+    figure: InertialFigure,
+    directions: Floats,
+    about: Floats,
+    arm: Floats | None,
 ) -> tuple[Moves, ...]:
     """Motion of a platform per unit of a sensor error, due to the acceleration error and to the lever arm.
 
@@ -171,12 +216,12 @@ def _moves_by_imu(
     axes of the sensor error. `arm` (3, nodes, cases) is the lever arm [m]; None without an arm.
     """
     ways, half = directions[:, :, None], seen.exact.half
-    if arm is None or kind not in TILTS:
-        courses = _courses(kind, len(seen.exact.times))
-        return (Moves(platform_index, ways, courses[..., None] * half ** (_GROWS[kind] / 2)),)
+    if arm is None or not figure.tilts:
+        courses = _courses(figure, len(seen.exact.times))
+        return (Moves(platform_index, ways, courses[..., None] * half ** (figure.growth_power / 2)),)
     swings = swung(about, arm)
-    if kind != "angle_random_walk":
-        order, times = (2 if kind == "attitude" else 3), seen.exact.times
+    if not figure.spreads:
+        order, times = figure.integrals, seen.exact.times
         grows, swing = times**order / math.factorial(order), times ** (order - 2)
         return Moves(platform_index, ways, grows[None]), Moves(platform_index, swings, swing[None])
     twice, once = _courses_of_both_walks(len(seen.exact.times))
@@ -199,60 +244,60 @@ def _at_mid_aperture(mission: Mission, index: int, along: PerCase) -> tuple[PerC
     return _inertial_phases(along, along, along, wavelength, T)[index]
 
 
-def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> tuple[PerCase, PerCase]:
-    """Sigmas of the displacement east and north due to one unit of a sensor error, in the published model. [m/unit]
+def _moved_by_imu(seen: SensorCases, figure: InertialFigure, along: Floats) -> tuple[PerCase, PerCase]:
+    """Sigmas of the displacement per unit of a sensor error, in the published model. [m]
 
     `along` is the component of the acceleration error of one unit along the line of sight at mid-aperture.
     [m/s²/unit]
     """
     fit = seen.exact.fit[:2]
-    if kind in SPREADING_NOISE:
-        orders = fit @ _walk_of(kind, len(seen.exact.times)).at_nodes @ fit.T
+    if figure.spreads:
+        orders = fit @ _walk_of(figure, len(seen.exact.times)).at_nodes @ fit.T
         constant, linear = np.diagonal(orders)
     else:
-        constant, linear = np.square(fit @ _courses(kind, len(seen.exact.times))[0])
-    scale = along**2 * seen.exact.half ** _GROWS[kind]
+        constant, linear = np.square(fit @ _courses(figure, len(seen.exact.times))[0])
+    scale = along**2 * seen.exact.half**figure.growth_power
     return seen.moved(constant * scale, linear * scale)
 
 
-def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions: Floats) -> RandomEffect:
-    """Effect of one unit of the sensor error `kind`, in the full model along the exact paths.
+def _over_aperture(
+    seen: SensorCases, platform_index: int, figure: InertialFigure, directions: Floats
+) -> RandomEffect:
+    """Effect of one unit of a figure of a sensor, in the full model along the exact paths.
 
     `directions` (axes, 3, cases) is the acceleration error due to one unit on each axis. [m/s²/unit] The motion error
     is computed for an aperture of 2 s. Its square is then scaled by a power of half the aperture time.
     """
     count, along = len(seen.exact.times), seen.range_errors(platform_index, directions[:, :, None])
-    scale = seen.exact.half ** _GROWS[kind]
-    if kind not in SPREADING_NOISE:
-        courses = along * (_courses(kind, count)[0, :, None] * np.sqrt(scale))
+    scale = seen.exact.half**figure.growth_power
+    if not figure.spreads:
+        courses = along * (_courses(figure, count)[0, :, None] * np.sqrt(scale))
         return seen.of_courses(courses, courses)[1]
-    walk = _walk_of(kind, count)
+    walk = _walk_of(figure, count)
     covariance = np.einsum("anc,amc->nmc", along, along) * walk.at_nodes[..., None] * scale
     power = seen.exact.fit[0] @ np.square(along).sum(axis=0)
     return seen.of_process(covariance, power * walk.beyond * scale)
 
 
-def _walk_of(kind: str, count: int) -> "_Walks":
-    """Covariance of the position error due to noise of an inertial sensor, for an aperture of 2 s.
+def _walk_of(figure: InertialFigure, count: int) -> "_Walks":
+    """Position error by the noise of a sensor, as integrals of white noise.
 
     The position error is an integral of white noise. The noise is a white acceleration, or a white tilt rate whose
     tilt rotates the specific force.
     """
-    order = 1 if kind == "velocity_random_walk" else 2
-    return _walks(order, order, count)
+    return _walks(figure.integrals - 1, figure.integrals - 1, count)
 
 
 @cache
-def _courses(kind: str, count: int) -> Floats:
-    """Position errors over an aperture of 2 s due to a unit sensor error of a kind, (courses, nodes). [m/unit]
+def _courses(figure: InertialFigure, count: int) -> Floats:
+    """Independent variations of the position by a unit acceleration, or by its noise, over 2 s, (courses, nodes).
 
     Noise has several independent components. Every other kind has one: the motion due to an acceleration of 1 m/s²,
     or, for a gyro bias, due to an acceleration that grows by 1 m/s² per second. All are zero at mid-aperture.
     """
-    if kind in SPREADING_NOISE:
-        return factor(_walk_of(kind, count).at_nodes).T
-    order = 3 if kind == "gyro_bias" else 2
-    return nodes(count).places[None] ** order / math.factorial(order)
+    if figure.spreads:
+        return factor(_walk_of(figure, count).at_nodes).T
+    return nodes(count).places[None] ** figure.integrals / math.factorial(figure.integrals)
 
 
 # ---------------------------------------------------------------------- lever arms
@@ -318,7 +363,7 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def _with_arm(
-    seen: SensorCases, platform_index: int, kind: str, directions: Floats, about: Floats, arm: Floats
+    seen: SensorCases, platform_index: int, figure: InertialFigure, directions: Floats, about: Floats, arm: Floats
 ) -> tuple[RandomEffect, RandomEffect]:
     """Effects, in both models, of one unit of tilt, tilt rate or tilt noise of a platform with a lever arm.
 
@@ -327,8 +372,8 @@ def _with_arm(
     """
     state, times = seen.geometry.both[platform_index], seen.exact.times
     swings = swung(about, arm)
-    if kind != "angle_random_walk":
-        order = 2 if kind == "attitude" else 3
+    if not figure.spreads:
+        order = figure.integrals
         grows = times**order / math.factorial(order)
         return seen.of_motion(platform_index, directions[:, :, None] * grows + swings * times ** (order - 2))
     # The tilt is a random walk. Its double integral is also a position error. Both follow from the same noise.

@@ -68,6 +68,12 @@ def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     return Noise(_of_power_law(law, center_frequency, bandwidth), tuple(notes), beyond, misfit)
 
 
+def noise_in_case(mission: Mission, name: str) -> Noise:
+    """One-sided phase spectrum of a platform's oscillator in the mission of one case. [rad²/Hz]"""
+    oscillator: Oscillator = getattr(mission.platforms, name).oscillator
+    return noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time)
+
+
 def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
     points = oscillator.phase_noise or ()
     scale = 2 * (center_frequency / (oscillator.frequency or 1.0)) ** 2
@@ -224,7 +230,9 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
         subject(name, "oscillator"), "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor)
     )
     yield error._replace(
-        continued=_continued(seen, name, oscillator, scale), is_in_doubt=_is_in_doubt(seen, oscillator)
+        continued=_continued(seen, name, oscillator, scale),
+        is_in_doubt=_is_in_doubt(seen, oscillator),
+        noise_in_case=noise_in_case,
     )
 
 

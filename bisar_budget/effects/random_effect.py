@@ -9,7 +9,7 @@ Numbers of a mission may be arrays (cases,). The geometry then has the same case
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -126,8 +126,9 @@ class RandomError(NamedTuple):
 
     `declared` is the largest size of all axes, coverage factor included. The sizes of all axes are proportional to
     it. It is None if the file declares no size. The unit of an oscillator is `dB`, and its noise is declared as an
-    amplitude factor of 1. `noise` is the spectrum of an oscillator, for a single case only. `spreads` is true for
-    noise, and false for an error whose variation over the aperture has only a few orders.
+    amplitude factor of 1. `noise` is the spectrum of an oscillator, for a single case only. `noise_in_case` computes
+    it from the mission of one case and the name of the platform. `spreads` is true for noise, and false for an error
+    whose variation over the aperture has only a few orders.
 
     `counted_in` is the id of another row that already includes this effect; this error then enters no other sum.
     `moves` is the motion of platforms by one unit, used for the edge of a scene. It is empty for clocks and the air.
@@ -148,6 +149,7 @@ class RandomError(NamedTuple):
     moves: tuple[Moves, ...] = ()
     continued: RandomEffect | None = None
     is_in_doubt: PerCaseFlag = False
+    noise_in_case: "Callable[[Mission, str], Noise] | None" = None
 
     @property
     def id(self) -> str:
@@ -172,7 +174,7 @@ class RandomError(NamedTuple):
 
         False only for an error of the kind `other`, for which the file states an effect determined elsewhere.
         """
-        return self.subject.kind != "other"
+        return self.kind.is_covered
 
     def coverage(self, mission: Mission) -> PerCase:
         """Coverage factor included in the effect of the declared size; 1 if `is_covered` is false."""

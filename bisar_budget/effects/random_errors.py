@@ -21,11 +21,10 @@ from bisar_budget.effects.navigation_errors import (
     position_noise,
 )
 from bisar_budget.effects.oscillator_acceleration import oscillator_acceleration
-from bisar_budget.effects.oscillators import link_noise, noise_of, oscillator_noise
+from bisar_budget.effects.oscillators import link_noise, oscillator_noise
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
 from bisar_budget.effects.vibration import vibration_spectrum
 from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 
 # Effects, the same in both models, of a stated cubic phase of 1 rad and of a stated displacement of 1 m.
@@ -76,10 +75,7 @@ def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomEr
     `mission` is the mission of that case.
     """
     published, full = error.published.of(case), error.full.of(case)
-    noise = None
-    if error.subject.kind == "oscillator" and not error.subject.axis:
-        oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
-        noise = noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time)
+    noise = None if error.noise_in_case is None else error.noise_in_case(mission, error.owner)
     declared = None if error.declared is None else plain(error.declared, case)
     continued = None if error.continued is None else error.continued.of(case)
     is_in_doubt = bool(plain(error.is_in_doubt, case))

@@ -16,7 +16,6 @@ from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.combined import squared
 from bisar_budget.effects.effect import (
     CLOCK_UNITS,
-    MOTION_UNITS,
     NOWHERE,
     PLATFORMS,
     ErrorSource,
@@ -24,7 +23,7 @@ from bisar_budget.effects.effect import (
     override_notes,
     subject,
 )
-from bisar_budget.error_kinds import MotionKind, kind_of
+from bisar_budget.error_kinds import POSITION, STATE_KINDS, MotionKind, StateKind, kind_of
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, VectorArrays, Vectors, dot
 from bisar_budget.image_plane import nodes_for
@@ -41,6 +40,11 @@ AnyVector = TypeVar("AnyVector", VectorArrays, Vectors)
 _UNIT_VECTORS: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _PUBLISHED_UNIT = Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0)  # effect of a pure phase error
 _FULL_UNIT = FullEffect(east=0.0, north=0.0, qpe=1.0, cubic=0.0)
+# Vectors along which an error has to be to defocus the image, singular and plural. A position error never does.
+_DEFOCUSING_VECTORS: Mapping[str, tuple[str, str]] = {
+    "velocity": ("velocity", "velocities"),
+    "acceleration": ("line of sight", "lines of sight"),
+}
 
 
 def exact_ranges(
@@ -95,7 +99,7 @@ class ErrorListing:
     ) -> None:
         self.mission, self.geometry, self.exact, self.shown = mission, geometry, exact, shown
         self.factor = mission.allocation.coverage_factor
-        self._full_legs: dict[tuple[int, str], list[FullEffect]] = {}
+        self._full_legs: dict[tuple[int, int], list[FullEffect]] = {}
 
     def listed(self) -> Iterator[ErrorSource]:
         """Yield the errors in the order of the contract.
@@ -104,8 +108,8 @@ class ErrorListing:
         tags, of registered kinds, of the terrain, and quadratic phases that the file states directly.
         """
         for platform_index, name in enumerate(PLATFORMS):
-            for kind, unit in MOTION_UNITS.items():
-                yield from self._of_motion(platform_index, name, kind, unit)
+            for kind in STATE_KINDS:
+                yield from self._of_motion(platform_index, name, kind)
         yield from self._of_clock()
         yield from self._of_both_platforms()
         yield from self._of_time_tags()
@@ -124,25 +128,22 @@ class ErrorListing:
             for path in self.geometry.both
         ]
 
-    def published_legs(self, platform_index: int, kind: str) -> list[Effect]:
-        """Effects of one unit of a platform's error along x, y and z, according to Tables I and II.
-
-        `kind` is the kind of the error: position, velocity or acceleration.
-        """
-        first = 3 * list(MOTION_UNITS).index(kind)
+    def published_legs(self, platform_index: int, kind: StateKind) -> list[Effect]:
+        """Effects of one unit of a kind of error of one platform along x, y and z by Tables I and II."""
+        first = 3 * kind.order
         return [Effect._make(row) for row in self._published[platform_index][first : first + 3]]
 
-    def full_legs(self, platform_index: int, kind: str) -> list[FullEffect]:
-        """Effects of one unit of a platform's error along x, y and z, in the full model.
+    def full_legs(self, platform_index: int, kind: StateKind) -> list[FullEffect]:
+        """Effects of one unit of a kind of error of one platform along x, y and z by the full model.
 
         `kind` is the kind of the error: position, velocity or acceleration. The motion errors are the polynomials of
         (22). For a platform in free fall, `_flown` gives the effects.
         """
-        if (platform_index, kind) not in self._full_legs:
+        if (platform_index, kind.order) not in self._full_legs:
             along = np.stack([self.exact.along(platform_index, axis) for axis in _UNIT_VECTORS])
-            effects = self.exact.effect(along * self.exact.powers[MOTION_UNITS[kind]])
-            self._full_legs[platform_index, kind] = _of_each(effects)
-        return self._full_legs[platform_index, kind]
+            effects = self.exact.effect(along * self.exact.powers[kind.unit])
+            self._full_legs[platform_index, kind.order] = _of_each(effects)
+        return self._full_legs[platform_index, kind.order]
 
     @cached_property
     def _motions(self) -> list[Any]:
@@ -160,8 +161,8 @@ class ErrorListing:
         """Whether any of the platforms, given by index, is in free fall."""
         return any(self._motions[platform_index] is not None for platform_index in platforms)
 
-    def _flown(self, kind: str, errors: Sequence[Mapping[int, Vectors]], frame: str) -> list[_Flown]:
-        """Effects and motions of unit errors of platforms of which at least one is in free fall.
+    def _flown(self, kind: StateKind, errors: Sequence[Mapping[int, Vectors]], frame: str) -> list[_Flown]:
+        """Motions of errors of platforms of which at least one is in free fall, with their effects.
 
         In free fall a motion error follows the dynamics of the orbit. Velocities in the frame `ric` are relative to
         the stars, so the vector of a position error without a velocity error does not rotate relative to the stars.
@@ -169,8 +170,8 @@ class ErrorListing:
 
         Parameters
         ----------
-        kind : str
-            Position, velocity or acceleration.
+        kind : StateKind
+            Kind of the errors.
         errors : sequence of mapping of int to Vectors
             For each error, its direction on each platform that has it, by the index of the platform.
         frame : str
@@ -181,39 +182,39 @@ class ErrorListing:
         for index, directions in enumerate(errors):
             for platform_index, direction in directions.items():
                 motions, fall = self._motions[platform_index], self.geometry.both[platform_index].fall
-                is_at_rest = kind == "position" and frame == "ric" and fall is not None
+                is_at_rest = kind.order == 0 and frame == "ric" and fall is not None
                 rate = fall.rate_against_stars(direction) if is_at_rest and fall else NOWHERE
                 if motions is None:
-                    course = self.exact.powers[MOTION_UNITS[kind]]
+                    course = self.exact.powers[kind.unit]
                     x, y, z = (component * course for component in direction)
                 else:
-                    state = motions[list(MOTION_UNITS).index(kind)]
+                    state = motions[kind.order]
                     x, y, z = sum(state[axis] * direction[axis] for axis in range(3))
                     if is_at_rest:
                         turned = sum(motions[1][axis] * rate[axis] for axis in range(3))
                         x, y, z = x + turned[0], y + turned[1], z + turned[2]
                 rates[index][platform_index], shifts[index][platform_index] = rate, (x, y, z)
                 moved[index] += self.exact.along(platform_index, (x, y, z))
-        has_rates = kind == "position" and frame == "ric"
+        has_rates = kind.order == 0 and frame == "ric"
         return [
             _Flown(full, _of_both_platforms(shift), _of_both_platforms(rate) if has_rates else None)
             for full, shift, rate in zip(_of_each(self.exact.effect(moved)), shifts, rates, strict=True)
         ]
 
-    def _of_motion(self, platform_index: int, name: str, kind: str, unit: str) -> Iterator[ErrorSource]:
+    def _of_motion(self, platform_index: int, name: str, kind: StateKind) -> Iterator[ErrorSource]:
         error: MotionError = getattr(self.mission.platforms, name).motion_error
-        values = error.stated(kind)
+        values = error.stated(kind.name)
         scene_rows = _scene_axes(name, kind)
         if not any(self._is_listed(row_subject, values) for row_subject, *_ in scene_rows):
             return
         in_scene = error.frame == "scene"
         published = self.published_legs(platform_index, kind)
         axes = self.geometry.both[platform_index].frame(error.frame)
-        covariance = error.covariance if kind != "acceleration" else None
-        key = "covariance" if covariance is not None else error.key_of(kind)
+        covariance = error.covariance if kind.order < 2 else None  # which has no accelerations
+        key = "covariance" if covariance is not None else error.key_of(kind.name)
         path: KeyPath = ("platforms", name, "motion_error", key)
-        notes, evidence = override_notes(name, error.overridden, kind), error.evidence(kind)
-        # If the errors are stated in another frame, rows along scene axes are listed only if all or these are shown.
+        notes, evidence = override_notes(name, error.overridden, kind.name), error.evidence(kind.name)
+        # Where the file states an error along other axes, its scene axes are listed only if all rows are.
         listed_axes = [
             axis
             for axis, (row_subject, *_) in enumerate(scene_rows)
@@ -233,13 +234,13 @@ class ErrorListing:
                     on_axis = self.factor * _along_scene_axis(values, axes, axis, error.distribution)
                 else:
                     on_axis = self.factor * _along_covariance(
-                        covariance, kind, [frame_axis[axis] for frame_axis in axes]
+                        covariance, kind.name, [frame_axis[axis] for frame_axis in axes]
                     )
             if covariance is not None:
-                row_path = (*path, *covariance.path(kind, axis))
+                row_path = (*path, *covariance.path(kind.name, axis))
             yield ErrorSource(
                 subject=row_subject,
-                unit=unit,
+                unit=kind.unit,
                 declared=on_axis,
                 path=row_path if in_scene and values is not None and key != "sensor" else path,
                 effect=published[axis],
@@ -258,10 +259,10 @@ class ErrorListing:
             flown = self._flown(kind, [{platform_index: direction} for direction in axes], error.frame)
         for index, (axis_name, direction) in enumerate(zip(FRAME_AXES[error.frame], axes, strict=True)):
             yield ErrorSource(
-                subject=subject(name, kind, axis_name, error.frame),
-                unit=unit,
+                subject=subject(name, kind.name, axis_name, error.frame),
+                unit=kind.unit,
                 declared=values[index] * self.factor,
-                path=(*path, *((index,) if covariance is None else covariance.path(kind, index))),
+                path=(*path, *((index,) if covariance is None else covariance.path(kind.name, index))),
                 effect=_along(published, direction),
                 full=flown[index].full if falls else _along(self.full_legs(platform_index, kind), direction),
                 direction=direction,
@@ -421,10 +422,10 @@ class ErrorListing:
         in_scene, names = error.frame == "scene", FRAME_AXES[error.frame]
         frames = [path.frame(error.frame) for path in self.geometry.both]
         falls = self._falls((0, 1))
-        for kind, unit in MOTION_UNITS.items():
-            values = getattr(error, kind)
+        for kind in STATE_KINDS:
+            values = getattr(error, kind.name)
             for axis, name in enumerate(names):
-                row_subject = subject("mission", kind, name, error.frame)
+                row_subject = subject("mission", kind.name, name, error.frame)
                 if not self._is_listed(row_subject, values):
                     continue
                 ways = [frame[axis] for frame in frames]
@@ -437,21 +438,21 @@ class ErrorListing:
                 else:
                     full_legs = [self.full_legs(platform_index, kind) for platform_index in (0, 1)]
                     full = self._of_both(full_legs, axis, None if in_scene else ways)
-                    if kind == "position" and name in ("x", "y"):
-                        # A horizontal shift of both platforms shifts the image by the same vector x̂. The phases due
-                        # to the error and to x̂ cancel. Rounding errors would give a limit that does not exist.
+                    if kind.order == 0 and name in ("x", "y"):
+                        # A horizontal shift of both platforms is a shift of the scene: x̂ is the error itself, and β̃ₙ
+                        # and ½s̈·x̂ cancel. The rest of a sum of rounded numbers would give a limit where none exists.
                         full = full._replace(qpe=0.0 * full.qpe, cubic=0.0 * full.cubic)
                 no_limit = phrases.note("no-quadratic-term-of-position")
-                if kind != "position":
-                    cause = "velocities" if kind == "velocity" else "lines of sight"
+                if kind.order > 0:
+                    _, vectors = _DEFOCUSING_VECTORS[kind.name]
                     no_limit = phrases.note(
-                        "no-common-component", cause=cause, axis=name if in_scene else _axis_of(error.frame, name)
+                        "no-common-component", cause=vectors, axis=name if in_scene else _axis_of(error.frame, name)
                     )
                 yield ErrorSource(
                     subject=row_subject,
-                    unit=unit,
+                    unit=kind.unit,
                     declared=None if values is None else values[axis] * self.factor,
-                    path=("common_motion_error", kind, axis),
+                    path=("common_motion_error", kind.name, axis),
                     effect=published,
                     full=full,
                     direction=ways[0],
@@ -508,7 +509,7 @@ class ErrorListing:
         effects = [
             _along(self.published_legs(platform_index, kind), vector)
             for platform_index in platform_indices
-            for kind, vector in zip(MOTION_UNITS, self.geometry.both[platform_index].rates, strict=False)
+            for kind, vector in zip(STATE_KINDS, self.geometry.both[platform_index].rates, strict=False)
         ]
         return ErrorSource(
             subject=subject(owner, "time_tag"),
@@ -573,8 +574,8 @@ class ErrorListing:
         height = self.mission.scene.height_error
         if height is None:
             return
-        published = _sum([self.published_legs(platform_index, "position")[2] for platform_index in (0, 1)])
-        full = _sum([self.full_legs(platform_index, "position")[2] for platform_index in (0, 1)])
+        published = _sum([self.published_legs(platform_index, POSITION)[2] for platform_index in (0, 1)])
+        full = _sum([self.full_legs(platform_index, POSITION)[2] for platform_index in (0, 1)])
         yield ErrorSource(
             subject=subject("mission", "terrain"),
             unit="m",
@@ -608,15 +609,15 @@ class ErrorListing:
 
 
 @cache
-def _scene_axes(name: str, kind: str) -> tuple[tuple[Subject, KeyPath, str, Note], ...]:
-    """Subjects and texts for the rows of a platform's errors along the axes x, y and z of the scene.
+def _scene_axes(name: str, kind: StateKind) -> tuple[tuple[Subject, KeyPath, str, Note], ...]:
+    """Texts for the rows of errors along the axes x, y and z of the scene.
 
     Each item has the row's subject, its key path in the file, its equation, and the reason why it may have no limit.
     """
     return tuple(
         (
-            subject(name, kind, letter),
-            ("platforms", name, "motion_error", kind, axis),
+            subject(name, kind.name, letter),
+            ("platforms", name, "motion_error", kind.name, axis),
             _equation(kind, axis),
             _no_limit(kind, letter),
         )
@@ -676,10 +677,10 @@ def _total(terms: Sequence[PerCase]) -> PerCase:
     return np.where(np.abs(total) > VECTOR_ROUNDING_FRACTION * sum(np.abs(term) for term in terms), total, 0.0)
 
 
-def _equation(kind: str, axis: int | None) -> str:
-    if kind == "position":
+def _equation(kind: StateKind, axis: int | None) -> str:
+    if kind.order == 0:
         return "Table I" if axis is None else f"Table I row {2 + 3 * axis}"
-    first = 1 if kind == "velocity" else 4
+    first = 3 * kind.order - 2
     return f"Table II rows {first}-{first + 2}" if axis is None else f"Table II row {first + axis}"
 
 
@@ -687,9 +688,9 @@ def _axis_of(frame: str, axis: str) -> str:
     return f"the {frame} frame's {axis} axis"
 
 
-def _no_limit(kind: str, axis: str) -> Note:
+def _no_limit(kind: StateKind, axis: str) -> Note:
     """Note on why an error has no QPE limit."""
-    if kind == "position":
+    if kind.order == 0:
         return phrases.note("no-quadratic-term-of-position")
-    cause = "velocity" if kind == "velocity" else "line of sight"
-    return phrases.note("no-component", cause=cause, axis=axis)
+    vector, _ = _DEFOCUSING_VECTORS[kind.name]
+    return phrases.note("no-component", cause=vector, axis=axis)

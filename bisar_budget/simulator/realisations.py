@@ -6,7 +6,7 @@ samples of the phase noise.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -17,8 +17,8 @@ from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.air_delays import CONTENT, DELAY, correlation_time_of, group_delay, legs_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import (
-    CORRELATED,
-    TILTS,
+    INERTIAL_FIGURES,
+    InertialFigure,
     acceleration_errors,
     arm_at,
     body_axes,
@@ -33,7 +33,7 @@ from bisar_budget.effects.oscillator_acceleration import (
     turn_courses,
 )
 from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
-from bisar_budget.effects.oscillators import noise_of, states_both_terms
+from bisar_budget.effects.oscillators import noise_in_case, states_both_terms
 from bisar_budget.effects.random_effect import RandomError, parts_of_largest
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece, density
@@ -89,43 +89,97 @@ def _drawn_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
     """Random series and directions of the motion of each platform, for a unit error along its largest axis."""
-    kind, figure = error.subject.kind, error.subject.axis
-    if kind in CORRELATED:
-        process = process_of(mission, error)
-        _, sizes = parts_of_largest(np.array(process.sigma))
-        of_axis = [
-            (axis, size * _correlated(process.correlation_time, times, draws, rng))
-            for axis, size in enumerate(sizes)
-            if size
-        ]
-        axes = process_axes(mission, error)
-        return {name: [(drawn, of_platform[axis]) for axis, drawn in of_axis] for name, of_platform in axes.items()}
+    return error.kind.find_in(_MOTION_DRAWS, error.subject.axis)(mission, error, times, draws, rng)
+
+
+def _noise_motions(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+) -> dict[str, _Motions]:
+    """Motion by correlated noise of a position. Platforms that share the noise have the same random series."""
+    process = process_of(mission, error)
+    _, sizes = parts_of_largest(np.array(process.sigma))
+    of_axis = [
+        (axis, size * _correlated(process.correlation_time, times, draws, rng))
+        for axis, size in enumerate(sizes)
+        if size
+    ]
+    axes = process_axes(mission, error)
+    return {name: [(drawn, of_platform[axis]) for axis, drawn in of_axis] for name, of_platform in axes.items()}
+
+
+def _sensor_motions(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+) -> dict[str, _Motions]:
+    """Motion by an inertial sensor: through the measured acceleration, and through the lever arm if one is stated."""
+    figure, motion = INERTIAL_FIGURES[error.subject.axis], _motion(mission, error.owner)
     state: PlatformState = getattr(mission.platforms, error.owner).state
-    motion = _motion(mission, error.owner)
-    lever, axes_now = motion.lever_arm, np.asarray(state.frame(motion.frame), float)
-    if kind == "lever_arm" and figure == "uncertainty":
-        uncertainty = lever.uncertainty if lever is not None else None
-        _, sizes = parts_of_largest(np.array(uncertainty or (1.0, 1.0, 1.0)))
-        body = np.moveaxis(body_axes(state, times), 1, 2)
-        drawn = [size * rng.standard_normal((draws, 1)) * np.ones(times.size) for size in sizes]
-        return {error.owner: list(zip(drawn, body, strict=True))}
-    figure = "attitude" if kind == "lever_arm" else figure
-    _, sizes = parts_of_largest(np.array(getattr(motion.imu, figure, None) or (1.0, 1.0, 1.0)))
-    pushes = acceleration_errors(figure, axes_now, np.array(specific_force(mission, state)))
-    swings = None
-    if lever is not None and lever.arm is not None and figure in TILTS:
-        arm = arm_at(state, lever.arm, times)
-        swings = np.cross(axes_now[:, None], arm.T[None])
+    pushes = acceleration_errors(
+        figure, np.asarray(state.frame(motion.frame), float), np.array(specific_force(mission, state))
+    )
+    swings = _swings(mission, error.owner, times) if figure.tilts else None
     motions: _Motions = []
-    for axis, size in enumerate(sizes):
-        if not size:
-            continue
-        pushed, tilted = _INERTIAL_DRAWS[figure](times, draws, rng)
-        if kind == "imu":
-            motions.append((size * pushed, pushes[axis]))
+    for axis, pushed, tilted in _drawn_by_axis(motion, figure, times, draws, rng):
+        motions.append((pushed, pushes[axis]))
         if swings is not None:
-            motions.append((size * tilted, swings[axis]))
+            motions.append((tilted, swings[axis]))
     return {error.owner: motions}
+
+
+def _swing_motions(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+) -> dict[str, _Motions]:
+    """Motion by an attitude error through the lever arm alone."""
+    motion, swings = _motion(mission, error.owner), _swings(mission, error.owner, times)
+    assert swings is not None
+    drawn = _drawn_by_axis(motion, INERTIAL_FIGURES["attitude"], times, draws, rng)
+    return {error.owner: [(tilted, swings[axis]) for axis, _, tilted in drawn]}
+
+
+def _arm_motions(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+) -> dict[str, _Motions]:
+    """Motion by an error of the lever arm itself, which turns with the body."""
+    lever = _motion(mission, error.owner).lever_arm
+    uncertainty = lever.uncertainty if lever is not None else None
+    _, sizes = parts_of_largest(np.array(uncertainty or (1.0, 1.0, 1.0)))
+    body = np.moveaxis(body_axes(getattr(mission.platforms, error.owner).state, times), 1, 2)
+    drawn = [size * rng.standard_normal((draws, 1)) * np.ones(times.size) for size in sizes]
+    return {error.owner: list(zip(drawn, body, strict=True))}
+
+
+# Functions that draw the motion of platforms, by kind of error.
+_MOTION_DRAWS: Mapping[
+    str, Callable[[Mission, RandomError, Floats, int, np.random.Generator], dict[str, _Motions]]
+] = {
+    "imu": _sensor_motions,
+    "lever_arm.attitude": _swing_motions,
+    "lever_arm.uncertainty": _arm_motions,
+    "random": _noise_motions,
+    "trajectory": _noise_motions,
+}
+
+
+def _drawn_by_axis(
+    motion: MotionError, figure: InertialFigure, times: Floats, draws: int, rng: np.random.Generator
+) -> Iterator[tuple[int, Floats, Floats]]:
+    """Draw the errors of a sensor along each axis, for one unit of the figure along its largest axis.
+
+    Yields the index of the axis, the position error per unit of acceleration, and the tilt, (draws, times) each.
+    """
+    _, sizes = parts_of_largest(np.array(getattr(motion.imu, figure.name, None) or (1.0, 1.0, 1.0)))
+    for axis, size in enumerate(sizes):
+        if size:
+            pushed, tilted = _INERTIAL_DRAWS[figure.name](times, draws, rng)
+            yield axis, size * pushed, size * tilted
+
+
+def _swings(mission: Mission, name: str, times: Floats) -> Floats | None:
+    """Motion of the antenna per unit of tilt about each axis, (axes, times, 3); None without a lever arm. [m/rad]"""
+    motion, state = _motion(mission, name), getattr(mission.platforms, name).state
+    if motion.lever_arm is None or motion.lever_arm.arm is None:
+        return None
+    arm, axes = arm_at(state, motion.lever_arm.arm, times), np.asarray(state.frame(motion.frame), float)
+    return np.cross(axes[:, None], arm.T[None])
 
 
 def _motion(mission: Mission, name: str) -> MotionError:
@@ -191,7 +245,7 @@ def drawn_errors(analysis: Analysis) -> Errors:
     is set.
     """
     mission = analysis.mission
-    seed, factor = (mission.simulation or Simulation()).seed, mission.allocation.coverage_factor
+    seed = (mission.simulation or Simulation()).seed
     half = mission.collection.aperture_time / 2
     times: Floats = np.linspace(-half, half, _COURSE_SAMPLES)
     fastest = max((_fastest(mission, error) for error in analysis.random), default=0.0)
@@ -199,53 +253,102 @@ def drawn_errors(analysis: Analysis) -> Errors:
         min(max(_COURSE_SAMPLES - 1, math.ceil(4 * _SAMPLES_PER_CYCLE * half * fastest)), _MAX_FLOWN_STEPS)
     )
     noise_times: Floats = np.linspace(-half, half, steps + 1)
-    course_times = noise_times if any(error.subject.kind == "vibration" for error in analysis.random) else times
-    platform_courses: dict[str, Floats] = {}
-    phase: Floats = np.zeros(noise_times.size)
-    air = dict.fromkeys(DELAYS, np.zeros(times.size))
+    drawn = _DrawnErrors(mission, times, noise_times)
     for error in analysis.random:
-        if not error.declared or error.counted_in or error.subject.kind == "other":  # declared only by its effect
+        if not error.declared or error.counted_in or error.kind.moves == "image":  # declared only by its effect
             continue
-        rng = np.random.default_rng([seed, *error.id.encode()])
-        if error.subject.kind in MOVING:
-            for name, series in position_courses(mission, error, times, 1, rng).items():
-                platform_courses[name] = platform_courses.get(name, 0.0) + Course(times, factor * series[0]).at(
-                    course_times
-                )
-        elif error.subject.kind == "propagation":
-            (group,) = factor * delay_courses(mission, error, times, 1, rng)
-            air[error.subject.axis] = air[error.subject.axis] + group
-        elif error.subject.kind == "vibration":
-            line_of_sight_error = (
-                phase_courses(mission, error, noise_times, 1, rng)[0] * mission.radar.wavelength / (2 * math.pi)
-            )
-            counted_fraction = float(counted(mission, error.owner, 1.0, "islr"))
-            positions = np.array(getattr(mission.platforms, error.owner).state.place(noise_times))
-            sight = positions / np.linalg.norm(positions, axis=0)
-            shaken = (
-                (factor * line_of_sight_error / counted_fraction * sight).T
-                if counted_fraction
-                else np.zeros((noise_times.size, 3))
-            )
-            platform_courses[error.owner] = platform_courses.get(error.owner, 0.0) + shaken
-        elif error.published.spread or error.published.quadratic or error.full.displacement > 0:
-            series = factor * phase_courses(mission, error, noise_times, 1, rng)[0]
-            is_clock = not error.subject.axis
-            is_free = error.displaces_unknown or (is_clock and states_both_terms(mission))
-            phase = phase + (series - Course(noise_times, series).smooth(1).values if is_free else series)
-    transmitter, receiver = (
-        PathError(course=Course(course_times, platform_courses[name]) if name in platform_courses else None)
-        for name in PLATFORMS
-    )
-    seconds = clock_seconds(phase, mission.radar.wavelength)
-    if air[DELAY].any():
-        seconds = seconds + np.interp(noise_times, times, air[DELAY]) / SPEED_OF_LIGHT_MPS
-    clock = Course(noise_times, seconds) if seconds.any() else None
-    electrons = electrons_at_1_hz(mission, times, air[CONTENT]) if air[CONTENT].any() else None
-    return Errors(transmitter, receiver, clock_course=clock, electrons=electrons)
+        error.kind.find_in(_ADDITIONS)(drawn, error, np.random.default_rng([seed, *error.id.encode()]))
+    return drawn.errors
 
 
-MOVING = ("imu", *CORRELATED, "lever_arm")  # kinds of error that move platforms
+class _DrawnErrors:
+    """Sums of the time series of errors, each multiplied by the coverage factor.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission, in one case.
+    times, noise_times : (n,)
+        Slow times of the samples of errors that change slowly, and of vibration and phase noise. [s]
+    """
+
+    def __init__(self, mission: Mission, times: Floats, noise_times: Floats) -> None:
+        self.mission, self.times, self.noise_times = mission, times, noise_times
+        self.factor = mission.allocation.coverage_factor
+        self._motions: list[tuple[str, Course]] = []
+        self._phase: Floats = np.zeros(noise_times.size)
+        self._air = dict.fromkeys(DELAYS, np.zeros(times.size))
+
+    def add_motion(self, error: RandomError, rng: np.random.Generator) -> None:
+        """Draw the motion of platforms by a sensor, by a lever arm, or by noise of a position."""
+        for name, series in position_courses(self.mission, error, self.times, 1, rng).items():
+            self._motions.append((name, Course(self.times, self.factor * series[0])))
+
+    def add_delay(self, error: RandomError, rng: np.random.Generator) -> None:
+        """Draw the delay of the echoes in the air."""
+        (group,) = self.factor * delay_courses(self.mission, error, self.times, 1, rng)
+        self._air[error.subject.axis] = self._air[error.subject.axis] + group
+
+    def add_vibration(self, error: RandomError, rng: np.random.Generator) -> None:
+        """Draw the vibration of a platform as its motion along the line of sight."""
+        mission, times = self.mission, self.noise_times
+        line_of_sight_error = (
+            phase_courses(mission, error, times, 1, rng)[0] * mission.radar.wavelength / (2 * math.pi)
+        )
+        counted_fraction = float(counted(mission, error.owner, 1.0, "islr"))
+        positions = np.array(getattr(mission.platforms, error.owner).state.place(times))
+        sight = positions / np.linalg.norm(positions, axis=0)
+        shaken = (
+            (self.factor * line_of_sight_error / counted_fraction * sight).T
+            if counted_fraction
+            else np.zeros((times.size, 3))
+        )
+        self._motions.append((error.owner, Course(times, shaken)))
+
+    def add_phase(self, error: RandomError, rng: np.random.Generator) -> None:
+        """Draw the phase of an oscillator, or of the link, if it has an effect on the image."""
+        if not (error.published.spread or error.published.quadratic or error.full.displacement > 0):
+            return
+        series = self.factor * phase_courses(self.mission, error, self.noise_times, 1, rng)[0]
+        is_clock = not error.subject.axis
+        is_free = error.displaces_unknown or (is_clock and states_both_terms(self.mission))
+        self._phase = self._phase + (
+            series - Course(self.noise_times, series).smooth(1).values if is_free else series
+        )
+
+    @property
+    def errors(self) -> Errors:
+        """All time series as errors of an image."""
+        times, noise_times = self.times, self.noise_times
+        # All motions are sampled as finely as the finest.
+        course_times = max((course.times for _, course in self._motions), key=len, default=times)
+        platform_courses: dict[str, Floats] = {}
+        for name, course in self._motions:
+            platform_courses[name] = platform_courses.get(name, 0.0) + course.at(course_times)
+        transmitter, receiver = (
+            PathError(course=Course(course_times, platform_courses[name]) if name in platform_courses else None)
+            for name in PLATFORMS
+        )
+        seconds = clock_seconds(self._phase, self.mission.radar.wavelength)
+        if self._air[DELAY].any():
+            seconds = seconds + np.interp(noise_times, times, self._air[DELAY]) / SPEED_OF_LIGHT_MPS
+        clock = Course(noise_times, seconds) if seconds.any() else None
+        content = self._air[CONTENT]
+        electrons = electrons_at_1_hz(self.mission, times, content) if content.any() else None
+        return Errors(transmitter, receiver, clock_course=clock, electrons=electrons)
+
+
+# Methods that draw the time series of a random error and add it to the others, by kind of error.
+_ADDITIONS: Mapping[str, Callable[[_DrawnErrors, RandomError, np.random.Generator], None]] = {
+    "imu": _DrawnErrors.add_motion,
+    "lever_arm": _DrawnErrors.add_motion,
+    "random": _DrawnErrors.add_motion,
+    "trajectory": _DrawnErrors.add_motion,
+    "vibration": _DrawnErrors.add_vibration,
+    "propagation": _DrawnErrors.add_delay,
+    "oscillator": _DrawnErrors.add_phase,
+    "synchronization": _DrawnErrors.add_phase,
+}
 _Draw = Callable[[Floats, int, np.random.Generator], tuple[Floats, Floats]]
 
 
@@ -300,8 +403,9 @@ def _correlated(correlation_time: float, times: Floats, draws: int, rng: np.rand
     return noise.T
 
 
-# For each figure of merit: function that draws the position error and the tilt per unit of the figure.
-_INERTIAL_DRAWS = {
+# Functions that draw the position error and the tilt per unit of a figure of an inertial sensor. The orders are
+# stated here again, because the time series check those of the budget.
+_INERTIAL_DRAWS: Mapping[str, _Draw] = {
     "accelerometer_bias": _biased(2),
     "accelerometer_scale_factor": _biased(2),
     "attitude": _biased(2),
@@ -324,54 +428,118 @@ def phase_courses(
     For an oscillator, `declared` is a factor on its amplitude. `times` are evenly spaced over the aperture. Tones
     above `highest` [Hz] may be omitted if no exchange of pulses folds them.
     """
+    return error.kind.find_in(_PHASE_DRAWS, error.subject.axis)(mission, error, times, draws, rng, highest)
+
+
+def _link_phases(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, _highest: float
+) -> Floats:
+    """Phases by the errors of the exchanges of pulses; independent at all times without a stated interval."""
     sync, T = mission.synchronization, mission.collection.aperture_time
-    size = error.declared or 0.0
-    if error.subject.kind == "synchronization":
-        size /= mission.allocation.coverage_factor
-        if sync is None or sync.interval is None:
-            white: Floats = size * rng.standard_normal((draws, times.size))
-            return white
-        series, knot_interval = [], max(sync.interval, T / _MAX_EXCHANGES_COUNT)
-        for _ in range(draws):
-            knots = _knots(times, knot_interval, rng)
-            series.append(np.interp(times, knots, rng.standard_normal(knots.size)))
-        # If not all exchanges are drawn, this scale preserves the level of the flat part of the spectrum.
-        return size * math.sqrt(sync.interval / knot_interval) * np.stack(series)
-    turn_phase: _TurnPhase | None = None
-    if error.subject.kind == "vibration":
-        pieces, sync = pieces_of_vibration(mission, error.owner), None
-    elif error.subject.axis == "acceleration":
-        pieces, turn_phase = pieces_by_acceleration(mission, error.owner), _TurnPhase(mission, error.owner)
-        size /= mission.allocation.coverage_factor
-    else:
-        oscillator = getattr(mission.platforms, error.owner).oscillator
-        pieces = noise_of(oscillator, mission.radar.center_frequency, T).pieces
-    interval = None if sync is None else sync.interval
-    turn_phases = [turn_phase.draw(rng) for _ in range(draws)] if turn_phase is not None else []
-    if interval is not None:
-        # After exchanges at shorter intervals, the remaining phase is too small to have an effect on an image.
-        residual = _between_exchanges(
-            pieces, T, max(interval, T / _MAX_EXCHANGES_COUNT), times, draws, rng, turn_phases
-        )
-        for frequency, amplitude in _folded_tones(mission, error):
-            start = rng.uniform(0, 2 * math.pi, (draws, 1))
-            residual += math.sqrt(2) * amplitude * np.cos(2 * math.pi * frequency * times + start)
-        return size * residual
+    size = (error.declared or 0.0) / mission.allocation.coverage_factor
+    if sync is None or sync.interval is None:
+        white: Floats = size * rng.standard_normal((draws, times.size))
+        return white
+    series, knot_interval = [], max(sync.interval, T / _MAX_EXCHANGES_COUNT)
+    for _ in range(draws):
+        knots = _knots(times, knot_interval, rng)
+        series.append(np.interp(times, knots, rng.standard_normal(knots.size)))
+    # If not all exchanges are drawn, this scale preserves the level of the flat part of the spectrum.
+    return size * math.sqrt(sync.interval / knot_interval) * np.stack(series)
+
+
+def _vibration_phases(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, highest: float
+) -> Floats:
+    """Phases by the random vibration of a platform, along the line of sight."""
+    pieces = _below(pieces_of_vibration(mission, error.owner), highest)
+    return (error.declared or 0.0) * _Tones(pieces, mission.collection.aperture_time).at(times, draws, rng)
+
+
+def _oscillator_phases(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, highest: float
+) -> Floats:
+    """Phases of an oscillator by its own noise, and by spurs that exchanges of pulses fold to low frequencies."""
+    sync, T, size = mission.synchronization, mission.collection.aperture_time, error.declared or 0.0
+    pieces = noise_in_case(mission, error.owner).pieces
+    spurs = [(float(spur.free), spur.left) for spur in spurs_of(mission) if spur.name == error.owner]
+    linked = _linked_phases(mission, error.owner, pieces, spurs, times, draws, rng, highest)
+    if linked is not None:
+        return size * linked
     pieces = _below(pieces, highest)
-    if sync is not None and sync.is_direct_path:
-        if error.owner == "transmitter":  # direct path and echo have its phase of the same time
-            return np.zeros((draws, times.size))
-        return size * _Tones(pieces, T).at(times, draws, rng, later=float(mission.geometry.echo_delay))
-    if sync is not None and sync.is_holdover and not error.subject.axis:
-        setting = _Setting(pieces, T, sync.age or T, sync.averaging or T)
-        slow = setting.tones.draw_slow(draws, rng)
-        phases = setting.tones.slow_at(times, slow) + setting.tones.fast_at(times, draws, rng)
-        phases -= setting.lines(slow, times, rng)
-    else:
-        phases = _Tones(pieces, T).at(times, draws, rng)
+    if sync is None or not sync.is_holdover:
+        return size * _Tones(pieces, T).at(times, draws, rng)
+    setting = _Setting(pieces, T, sync.age or T, sync.averaging or T)
+    slow = setting.tones.draw_slow(draws, rng)
+    phases = setting.tones.slow_at(times, slow) + setting.tones.fast_at(times, draws, rng)
+    phases -= setting.lines(slow, times, rng)
+    return size * phases
+
+
+def _acceleration_phases(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, highest: float
+) -> Floats:
+    """Phases of an oscillator under acceleration: by random vibration, slow tones, and turns of the platform."""
+    T, size = mission.collection.aperture_time, (error.declared or 0.0) / mission.allocation.coverage_factor
+    pieces, turn_phase = pieces_by_acceleration(mission, error.owner), _TurnPhase(mission, error.owner)
+    turn_phases = [turn_phase.draw(rng) for _ in range(draws)]
+    # `_TurnPhase` draws the tones of vibrations that are slow themselves.
+    tones = [
+        (float(tone.free), tone.left)
+        for tone in accelerated_tones(mission)
+        if tone.name == error.owner and tone.frequency * T >= SLOWEST_ECHO_CYCLES
+    ]
+    linked = _linked_phases(mission, error.owner, pieces, tones, times, draws, rng, highest, turn_phases)
+    if linked is not None:
+        return size * linked
+    phases = _Tones(_below(pieces, highest), T).at(times, draws, rng)
     if turn_phases:
         phases += np.stack([phase_at(times) for phase_at in turn_phases])
     return size * phases
+
+
+# Functions that draw phases, by kind of error. Their arguments are those of `phase_courses`.
+_PHASE_DRAWS: Mapping[str, Callable[[Mission, RandomError, Floats, int, np.random.Generator, float], Floats]] = {
+    "vibration": _vibration_phases,
+    "oscillator": _oscillator_phases,
+    "oscillator.acceleration": _acceleration_phases,
+    "synchronization": _link_phases,
+}
+
+
+def _linked_phases(
+    mission: Mission,
+    name: str,
+    pieces: tuple[PowerLawPiece, ...],
+    tones: Sequence[tuple[float, LeftTone]],
+    times: Floats,
+    draws: int,
+    rng: np.random.Generator,
+    highest: float,
+    turn_phases: Sequence[Callable[[Floats], Floats]] = (),
+) -> Floats | None:
+    """Phases of a unit error of an oscillator that a link leaves, (draws, times); None without a link. [rad]
+
+    The link exchanges pulses at a stated interval, or the receiver hears the transmitter directly. `tones` are tones
+    of the oscillator, each with its amplitude without a link, and what the exchanges leave of it.
+    """
+    sync, T = mission.synchronization, mission.collection.aperture_time
+    if sync is None:
+        return None
+    if sync.interval is not None:
+        # After exchanges at shorter intervals, the remaining phase is too small to have an effect on an image.
+        interval = max(sync.interval, T / _MAX_EXCHANGES_COUNT)
+        residual = _between_exchanges(pieces, T, interval, times, draws, rng, turn_phases)
+        for frequency, amplitude in _folded_tones(tones, T):
+            start = rng.uniform(0, 2 * math.pi, (draws, 1))
+            residual += math.sqrt(2) * amplitude * np.cos(2 * math.pi * frequency * times + start)
+        return residual
+    if not sync.is_direct_path:
+        return None
+    if name == "transmitter":  # direct path and echo have its phase of the same time
+        return np.zeros((draws, times.size))
+    delay = float(mission.geometry.echo_delay)
+    return _Tones(_below(pieces, highest), T).at(times, draws, rng, later=delay)
 
 
 def _between_exchanges(
@@ -437,18 +605,25 @@ def fastest_shake(mission: Mission, error: RandomError) -> float:
 
     The result is 0 for any other error.
     """
-    pieces: tuple[PowerLawPiece, ...] = ()
-    if error.subject.kind == "vibration":
-        pieces = pieces_of_vibration(mission, error.owner)
-    elif error.subject.kind == "oscillator" and error.subject.axis == "acceleration":
-        pieces = pieces_by_acceleration(mission, error.owner)
-    return max((piece.high for piece in pieces), default=0.0)
+    return max((piece.high for piece in _shake_pieces(mission, error)), default=0.0)
 
 
 def slowest_shake(mission: Mission, error: RandomError) -> float:
     """Lowest frequency in the spectrum of a vibration, or of the oscillator phase that a vibration causes. [Hz]"""
-    pieces = pieces_of_vibration if error.subject.kind == "vibration" else pieces_by_acceleration
-    return min((piece.low for piece in pieces(mission, error.owner)), default=0.0)
+    return min((piece.low for piece in _shake_pieces(mission, error)), default=0.0)
+
+
+def _shake_pieces(mission: Mission, error: RandomError) -> tuple[PowerLawPiece, ...]:
+    """Phase spectrum that vibration causes, directly or through an oscillator; empty for any other error."""
+    pieces_of = _SHAKES.get(f"{error.kind.name}.{error.subject.axis}")
+    return () if pieces_of is None else pieces_of(mission, error.owner)
+
+
+# Functions that give the phase spectrum caused by vibration, by kind and axis of error.
+_SHAKES: Mapping[str, Callable[[Mission, str], tuple[PowerLawPiece, ...]]] = {
+    "vibration.spectrum": pieces_of_vibration,
+    "oscillator.acceleration": pieces_by_acceleration,
+}
 
 
 def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
@@ -473,23 +648,13 @@ def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...
     )
 
 
-def _folded_tones(mission: Mission, error: RandomError) -> list[tuple[float, float]]:
-    """Oscillator tones that exchanges of pulses fold to low frequencies: frequencies [Hz] and amplitudes per unit.
-
-    Tones of vibrations that are slow themselves are not included, because `_TurnPhase` draws them.
-    """
-    T, name = mission.collection.aperture_time, error.owner
-    tones: list[tuple[float, LeftTone]] = []
-    if error.subject.axis == "acceleration":
-        of_platform = [tone for tone in accelerated_tones(mission) if tone.name == name]
-        tones = [(float(tone.free), tone.left) for tone in of_platform if tone.frequency * T >= SLOWEST_ECHO_CYCLES]
-    elif error.subject.kind == "oscillator":
-        tones = [(float(spur.free), spur.left) for spur in spurs_of(mission) if spur.name == name]
+def _folded_tones(tones: Sequence[tuple[float, LeftTone]], aperture_time: float) -> list[tuple[float, float]]:
+    """Oscillator tones that exchanges of pulses fold to low frequencies: frequencies [Hz] and amplitudes per unit."""
     return [
         (float(frequency), free * float(share))
         for free, residual in tones
         for frequency, share in zip(residual.frequencies, residual.shares, strict=True)
-        if frequency * T < SLOWEST_ECHO_CYCLES and share
+        if frequency * aperture_time < SLOWEST_ECHO_CYCLES and share
     ]
 
 

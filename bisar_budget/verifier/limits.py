@@ -134,7 +134,7 @@ def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     """Yield the ids and verifying functions of the limited rows of random errors, tones and spread power."""
     for error in study.analysis.random:
         sizes = limits_of(study, error)
-        if sizes and error.subject.kind == "other":
+        if sizes and error.kind.moves == "image":
             yield error.id, partial(phase_cases.stated, study, error.id, min(sizes.values()), error.unit)
         elif sizes:
             yield error.id, partial(verify_random, study, error)

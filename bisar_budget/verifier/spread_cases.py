@@ -24,7 +24,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.air_delays import CONTENT, correlation_time_of, seen_course
 from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
-from bisar_budget.effects.navigation_errors import CORRELATED, process_of
+from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomError
@@ -55,7 +55,6 @@ from bisar_budget.simulator.phase_history import (
     direct_path_error,
 )
 from bisar_budget.simulator.realisations import (
-    MOVING,
     clock_seconds,
     delay_courses,
     electrons_at_1_hz,
@@ -94,11 +93,10 @@ _ISLR_SAMPLES = (
 _FIRST_ISLR_DRAWS, _MAX_ISLR_DRAWS = 64, 8192
 _BLOCK_ISLR_DRAWS = 256  # draws in memory at once
 _INTERVAL_95_SIGMA = 1.96  # standard errors on either side of a mean
-_DECISION_SIGMA = 3.3  # standard errors of a decision (99.9 %), so that another seed gives the same verdict
-_MAX_HALF_INTERVAL_DB = 0.25  # half width of the interval below which a verdict is decided; wider ones are unreliable
-_FOLLOWED = (*MOVING, "propagation")  # kinds whose histories go directly through exact ranges
-_MAINLOBE_NODES = 32  # nodes of the integral over the mainlobe
-_STEPS_PER_CELL = 64  # of the search for the first null; an inexact null hardly changes the energy
+_DECISION_SIGMA = 3.3  # standard errors within one verdict, 99.9 %: another seed must not give another verdict
+_MAX_HALF_INTERVAL_DB = 0.25  # of a decided verdict: a wider interval, of few draws, may be off
+_MAINLOBE_NODES = 32  # of the mainlobe's integral
+_STEPS_PER_CELL = 64  # of the search for the first null, where the response and thus the energy of a step is 0
 _MIN_ENERGY_FRACTION = 1e-300  # keeps logarithms finite
 
 Case = Callable[[], Verdict]
@@ -438,11 +436,11 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
     """
     required = study.mission.requirements.location_error or 0.0
     factor, draws = study.mission.allocation.coverage_factor, _SIGMA_DRAWS
-    if error.subject.kind in _FOLLOWED:
-        effects = _effects_of_draws(study, error, rng)
+    if error.kind.drawn_as in _EFFECTS_OF_DRAWS:
+        effects = _EFFECTS_OF_DRAWS[error.kind.drawn_as](study, error, rng)
     else:
         fit, draws = _fits(study, error, rng)
-        if error.subject.kind == "synchronization":  # a constant phase does not displace a point
+        if error.unit == "rad":  # an error of the phase alone, which displaces no point if it is constant
             fit[0] = 0.0
         half = study.collection.aperture_time / 2
         phases = np.polynomial.legendre.legval(aperture_nodes(study.collection.aperture_time) / half, fit)
@@ -478,24 +476,35 @@ def _stream(study: Study, row_id: str) -> np.random.Generator:
 
 
 def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
-    """Standard deviation of the quadratic or cubic phase over many time series [rad], and the number of series."""
-    if error.subject.kind in _FOLLOWED:
-        effects = _effects_of_draws(study, error, rng)
+    """Standard deviation of a phase over many time series [rad], and the number of time series."""
+    if error.kind.drawn_as in _EFFECTS_OF_DRAWS:
+        effects = _EFFECTS_OF_DRAWS[error.kind.drawn_as](study, error, rng)
         return float(np.nanstd(effects.cubic if is_cubic else effects.quadratic)), _SIGMA_DRAWS
     fit, draws = _fits(study, error, rng)
     return float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2])), draws
 
 
-def _effects_of_draws(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
-    """Effects, from exact ranges, of many drawn histories of a position error or of a delay of the air, (draws,)."""
-    moments = aperture_nodes(study.collection.aperture_time)
-    if error.subject.kind in CORRELATED:  # between the nodes it is not smooth, unlike integrated noise
+def _effects_of_motion(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
+    """Compute the effects of many drawn motions of platforms from exact ranges, (draws,)."""
+    if error.kind.is_correlated:  # not smooth between the nodes, unlike integrated noise
         return study.exact_effects(_smooth_noise(study, error, rng))
-    if error.subject.kind != "propagation":
-        return study.exact_effects(position_courses(study.mission, error, moments, _SIGMA_DRAWS, rng))
+    moments = aperture_nodes(study.collection.aperture_time)
+    return study.exact_effects(position_courses(study.mission, error, moments, _SIGMA_DRAWS, rng))
+
+
+def _effects_of_delays(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
+    """Compute the effects of many drawn delays of the air from exact ranges, (draws,)."""
+    moments = aperture_nodes(study.collection.aperture_time)
     group = group_delays(study.mission, error, moments, _delays_at_nodes(study, error, rng))
     mean = (group @ nodes(FINE_NODE_COUNT).fit[0])[:, None]
     return study.exact_effects({"clock": seen_course(group, mean, error.subject.axis)})
+
+
+# Functions for errors whose time series go directly through exact ranges, by what is drawn of the kind of error.
+_EFFECTS_OF_DRAWS: Mapping[str, Callable[[Study, RandomError, np.random.Generator], ImagePoints]] = {
+    "motion": _effects_of_motion,
+    "delay": _effects_of_delays,
+}
 
 
 def _remaining_range_error(study: Study, error: RandomError, times: Floats, group: Floats) -> Floats:
@@ -601,26 +610,41 @@ def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[
 
     Only orders up to the cubic are kept, because higher orders spread power and would mask the response.
     """
-    times = _moments(study, _SERIES_SAMPLES)
-    if error.subject.kind in MOVING:
-        errors_of_images = [Errors()] * _IMAGE_DRAWS
-        for name, courses in position_courses(study.mission, error, times, _IMAGE_DRAWS, rng).items():
-            smooth = (PathError(course=Course(times, course).smooth(_CUBIC_ORDER)) for course in courses)
-            errors_of_images = [
-                errors.of(name, path_error) for errors, path_error in zip(errors_of_images, smooth, strict=True)
-            ]
-        return errors_of_images
-    if error.subject.kind == "propagation":
-        at_zenith = zenith_delays(study.mission, error, times, _IMAGE_DRAWS, rng)
-        if correlation_time_of(study.mission, error.owner) is not None:
-            at_zenith = Course(times, at_zenith.T).smooth(_CUBIC_ORDER).values.T
-        groups = group_delays(study.mission, error, times, at_zenith)
-        if error.subject.axis == CONTENT:
-            return [Errors(electrons=electrons_at_1_hz(study.mission, times, course)) for course in groups]
-        return [Errors(clock_course=Course(times, course / SPEED_OF_LIGHT_MPS)) for course in groups]
+    return _IMAGE_ERRORS[error.kind.drawn_as](study, error, _moments(study, _SERIES_SAMPLES), rng)
+
+
+def _errors_of_motion(study: Study, error: RandomError, times: Floats, rng: np.random.Generator) -> list[Errors]:
+    errors_of_images = [Errors()] * _IMAGE_DRAWS
+    for name, courses in position_courses(study.mission, error, times, _IMAGE_DRAWS, rng).items():
+        smooth = (PathError(course=Course(times, course).smooth(_CUBIC_ORDER)) for course in courses)
+        errors_of_images = [
+            errors.of(name, path_error) for errors, path_error in zip(errors_of_images, smooth, strict=True)
+        ]
+    return errors_of_images
+
+
+def _errors_of_delays(study: Study, error: RandomError, times: Floats, rng: np.random.Generator) -> list[Errors]:
+    at_zenith = zenith_delays(study.mission, error, times, _IMAGE_DRAWS, rng)
+    if correlation_time_of(study.mission, error.owner) is not None:
+        at_zenith = Course(times, at_zenith.T).smooth(_CUBIC_ORDER).values.T
+    groups = group_delays(study.mission, error, times, at_zenith)
+    if error.subject.axis == CONTENT:
+        return [Errors(electrons=electrons_at_1_hz(study.mission, times, course)) for course in groups]
+    return [Errors(clock_course=Course(times, course / SPEED_OF_LIGHT_MPS)) for course in groups]
+
+
+def _errors_of_phases(study: Study, error: RandomError, times: Floats, rng: np.random.Generator) -> list[Errors]:
     phases = phase_courses(study.mission, error, times, _IMAGE_DRAWS, rng)
     delays = [clock_seconds(course, study.collection.wavelength) for course in phases]
     return [Errors(clock_course=Course(times, course).smooth(_CUBIC_ORDER)) for course in delays]
+
+
+# Functions that draw errors of images, by what is drawn of the kind of error.
+_IMAGE_ERRORS: Mapping[str, Callable[[Study, RandomError, Floats, np.random.Generator], list[Errors]]] = {
+    "motion": _errors_of_motion,
+    "delay": _errors_of_delays,
+    "phase": _errors_of_phases,
+}
 
 
 # ---------------------------------------------------------------------- what spreads
@@ -679,14 +703,8 @@ def _power(
         """Draw phases without the orders that displace and defocus the response, (draws, _ISLR_SAMPLES). [rad]"""
         phases = white * rng.standard_normal((draws, times.size))
         for error in members:
-            if error.subject.kind in MOVING:
-                for name, courses in position_courses(mission, error, times, draws, rng).items():
-                    phases += 2 * math.pi / collection.wavelength * courses @ np.array(sight_of(mission, name))
-            elif error.subject.kind == "propagation":
-                group = delay_courses(mission, error, times, draws, rng)
-                phases += 2 * math.pi / collection.wavelength * _remaining_range_error(study, error, times, group)
-            else:
-                phases += phase_courses(mission, error, times, draws, rng)
+            for phases_of_error in _PHASES_AT_MOMENTS[error.kind.drawn_as](study, error, times, draws, rng):
+                phases += phases_of_error
         phases = phases - phases @ fitted
         for rms, cycles in echoes:
             starts = 2 * math.pi * rng.random((draws, 1))
@@ -700,6 +718,35 @@ def _power(
     return measured_power(
         collection, blank._replace(requirement_db=required), draw_phases, phrases.note("power-of-time-series")
     )
+
+
+def _phases_of_motion(
+    study: Study, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+) -> Iterator[Floats]:
+    """Draw the motion of each platform, and yield its phase along the line of sight, (draws, times). [rad]"""
+    for name, courses in position_courses(study.mission, error, times, draws, rng).items():
+        yield 2 * math.pi / study.collection.wavelength * courses @ np.array(sight_of(study.mission, name))
+
+
+def _phases_of_delays(
+    study: Study, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+) -> Iterator[Floats]:
+    """Draw delays of the air, and yield their phase at the displaced point, (draws, times). [rad]"""
+    group = delay_courses(study.mission, error, times, draws, rng)
+    yield 2 * math.pi / study.collection.wavelength * _remaining_range_error(study, error, times, group)
+
+
+def _phases_of_clock(
+    study: Study, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+) -> Iterator[Floats]:
+    """Draw the phase of an oscillator or of the link, (draws, times). [rad]"""
+    yield phase_courses(study.mission, error, times, draws, rng)
+
+
+# Functions that draw phases over the aperture, by what is drawn of the kind of error.
+_PHASES_AT_MOMENTS: Mapping[
+    str, Callable[[Study, RandomError, Floats, int, np.random.Generator], Iterator[Floats]]
+] = {"motion": _phases_of_motion, "delay": _phases_of_delays, "phase": _phases_of_clock}
 
 
 # ---------------------------------------------------------------------- ISLR that noise adds

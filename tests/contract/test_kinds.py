@@ -3,14 +3,18 @@
 from collections.abc import Iterable
 
 from bisar_budget.budget.random_rows import REASONS_FOR_NO_EFFECT, WORDINGS
-from bisar_budget.error_kinds import ErrorKind, SourceKind, StateKind, SumKind, kinds
+from bisar_budget.effects import navigation_errors, sources
+from bisar_budget.error_kinds import STATE_KINDS, ErrorKind, SourceKind, StateKind, SumKind, kinds
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.row import SPECIFICATION
+from bisar_budget.mission.instruments import IMU_KINDS
 from bisar_budget.report.compliance.rows import LIMIT_FORMS
 from bisar_budget.report.explain.explained_error import CLOCK_TERMS
 from bisar_budget.report.explain.explained_random import RANDOM_STEPS
 from bisar_budget.report.explain.explanation import ROW_STEPS
 from bisar_budget.report.explain.notation import STATE_LETTERS
+from bisar_budget.simulator import realisations
+from bisar_budget.verifier import spread_cases
 
 TONES = {"oscillator.acceleration", "oscillator.spur", "vibration", "other"}  # errors with rows of their own
 
@@ -62,3 +66,68 @@ def test_an_entry_for_an_axis_comes_before_that_of_the_kind() -> None:
     table = {"oscillator": "noise", "oscillator.spur": "tone"}
     assert oscillator.find_in(table, "spur") == "tone"
     assert oscillator.find_in(table, "acceleration") == oscillator.find_in(table) == "noise"
+
+
+RANDOM = [kind for kind in kinds() if isinstance(kind, SourceKind) and kind.is_random]
+
+
+def drawn(drawn_as: str) -> set[str]:
+    return {kind.name for kind in RANDOM if kind.drawn_as == drawn_as}
+
+
+def without_axes(keys: Iterable[str]) -> set[str]:
+    return {key.partition(".")[0] for key in keys}
+
+
+def test_state_kinds() -> None:
+    assert [kind.order for kind in STATE_KINDS] == [0, 1, 2]
+
+
+def test_every_random_kind_is_drawn() -> None:
+    assert {kind.drawn_as for kind in RANDOM} == {"motion", "delay", "phase"}
+
+
+def test_defocusing_vectors() -> None:
+    assert list(sources._DEFOCUSING_VECTORS) == [kind.name for kind in STATE_KINDS if kind.order > 0]
+
+
+def test_inertial_figures() -> None:
+    """In the order of the file's keys, which is that of the evaluator."""
+    assert tuple(navigation_errors.INERTIAL_FIGURES) == IMU_KINDS
+
+
+def test_processes() -> None:
+    assert set(navigation_errors._PROCESSES) == {kind.name for kind in RANDOM if kind.is_correlated}
+
+
+def test_inertial_draws() -> None:
+    assert tuple(realisations._INERTIAL_DRAWS) == IMU_KINDS
+
+
+def test_motion_draws() -> None:
+    assert without_axes(realisations._MOTION_DRAWS) == drawn("motion")
+
+
+def test_phase_draws() -> None:
+    assert without_axes(realisations._PHASE_DRAWS) == drawn("phase")
+
+
+def test_shakes() -> None:
+    assert without_axes(realisations._SHAKES) <= drawn("phase")
+
+
+def test_additions() -> None:
+    assert set(realisations._ADDITIONS) == {kind.name for kind in RANDOM}
+
+
+def test_effects_of_draws() -> None:
+    """The effects of drawn phases follow from their Legendre orders instead."""
+    assert set(spread_cases._EFFECTS_OF_DRAWS) == {kind.drawn_as for kind in RANDOM} - {"phase"}
+
+
+def test_image_errors() -> None:
+    assert set(spread_cases._IMAGE_ERRORS) == {kind.drawn_as for kind in RANDOM}
+
+
+def test_phases_at_moments() -> None:
+    assert set(spread_cases._PHASES_AT_MOMENTS) == {kind.drawn_as for kind in RANDOM}

@@ -26,7 +26,7 @@ from bisar_budget.effects.air_delays import (
 from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, plain
 from bisar_budget.effects.navigation_errors import (
-    TILTS,
+    INERTIAL_FIGURES,
     arm_at,
     body_axes,
     process_of,
@@ -173,7 +173,7 @@ def _without_arm(analysis: Analysis, error: RandomError) -> RandomError:
 def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     """Yield the steps for the effect of a tilt error through the lever arm."""
     lever = getattr(analysis.mission.platforms, error.owner).motion_error.lever_arm
-    if lever is None or lever.arm is None or error.subject.axis not in TILTS:
+    if lever is None or lever.arm is None or not INERTIAL_FIGURES[error.subject.axis].tilts:
         return
     yield from _arm(analysis, error)
     unit = _per_unit("rad", error)
