@@ -11,7 +11,8 @@ from bisar_budget.report.explain.explained_random import RANDOM_STEPS
 from bisar_budget.report.explain.explanation import ROW_STEPS
 from bisar_budget.report.explain.notation import STATE_LETTERS
 
-TONES = {"oscillator.acceleration", "oscillator.spur", "vibration", "other"}  # errors with rows of their own
+# Rows of errors that are no sources and no random errors: tones, a stated ISLR, and the residual of a log.
+APART = {"oscillator.acceleration", "oscillator.spur", "vibration", "other", "trajectory.residual"}
 
 
 def names(some_kinds: Iterable[ErrorKind]) -> set[str]:
@@ -40,8 +41,8 @@ def test_random_steps() -> None:
 
 
 def test_row_steps() -> None:
-    """A sum has steps, and so has an error that is judged by its tones or its power."""
-    assert set(ROW_STEPS) == names(SUMS) | TONES
+    """A sum has steps, and so has an error that is judged by its tones, its power or its log."""
+    assert set(ROW_STEPS) == names(SUMS) | APART
 
 
 def test_state_letters() -> None:
