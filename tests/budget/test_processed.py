@@ -17,6 +17,7 @@ from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.paths.flight import smoothed
+from bisar_budget.report.explain.explanation import explain
 from tests.conftest import TODAY, examples, row
 from tests.design.test_sweep import assert_as_checked, grid, swept
 from tests.mission.test_path_files import aircraft
@@ -55,6 +56,12 @@ class TestTheResidual:
         state = mission.platforms.receiver.state
         expected = 2 * math.pi / mission.radar.wavelength * 2e-3 * abs(state.look[2])
         assert float(residual_phase(mission, "receiver")) == pytest.approx(expected, rel=0.2)
+
+    def test_its_row_is_explained_by_its_reason(self, tmp_path: Path) -> None:
+        mission = logged(tmp_path, geodetic_csv(noisy(5e-3)))
+        text = explain(mission, check_mission(mission, TODAY), RESIDUAL)
+        phase = float(residual_phase(mission, "receiver"))
+        assert f"{phase:.3g} rad rms" in " ".join(text.split())
 
     @pytest.mark.parametrize("factor", [0.97, 1.03])
     def test_above_0_2_rad_nothing_is_judged_that_it_touches(self, tmp_path: Path, factor: float) -> None:

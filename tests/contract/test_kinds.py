@@ -16,7 +16,8 @@ from bisar_budget.report.explain.notation import STATE_LETTERS
 from bisar_budget.simulator import realisations
 from bisar_budget.verifier import spread_cases
 
-TONES = {"oscillator.acceleration", "oscillator.spur", "vibration", "other"}  # errors with rows of their own
+# Rows of errors that are no sources and no random errors: tones, a stated ISLR, and the residual of a log.
+APART = {"oscillator.acceleration", "oscillator.spur", "vibration", "other", "trajectory.residual"}
 
 
 def names(some_kinds: Iterable[ErrorKind]) -> set[str]:
@@ -52,8 +53,8 @@ def test_wordings_and_reasons_for_no_effect() -> None:
 
 
 def test_row_steps() -> None:
-    """A sum has steps, and so has an error that is judged by its tones or its power."""
-    assert set(ROW_STEPS) == names(SUMS) | TONES
+    """A sum has steps, and so has an error that is judged by its tones, its power or its log."""
+    assert set(ROW_STEPS) == names(SUMS) | APART
 
 
 def test_state_letters() -> None:

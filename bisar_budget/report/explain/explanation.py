@@ -609,12 +609,18 @@ def _location_aggregate(analysis: Analysis, findings: MissionFindings, row: Row)
         yield step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {key_location}")
 
 
+def _unstated(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    """Yield no step, for the residual of a log of which the file does not state how it is processed."""
+    yield from ()
+
+
 # Steps of the rows that are neither sources nor random errors, by kind.
 ROW_STEPS: Mapping[str, Callable[[Analysis, MissionFindings, Row], Iterator[Step]]] = {
     "oscillator.acceleration": _tone,
     "oscillator.spur": _spur,
     "vibration": _vibration_in_its_unit,
     "other": _power,
+    "trajectory.residual": _unstated,
     QUADRATIC: _phase_aggregate,
     CUBIC: _cubic_aggregate,
     LOCATION: _location_aggregate,
