@@ -242,11 +242,11 @@ def register(kind: ErrorKind) -> None:
         raise ValueError(f"a kind of error named {kind.name!r} is registered already")
 
 
-POSITION = StateKind(name="position", order=0, unit="m")
-VELOCITY = StateKind(name="velocity", order=1, unit="m/s")
-ACCELERATION = StateKind(name="acceleration", order=2, unit="m/s^2")
-STATE_KINDS = (POSITION, VELOCITY, ACCELERATION)  # by order
-MEASURED_KINDS = (POSITION, VELOCITY)  # which sources of paths and covariances state
+POSITION_KIND = StateKind(name="position", order=0, unit="m")
+VELOCITY_KIND = StateKind(name="velocity", order=1, unit="m/s")
+ACCELERATION_KIND = StateKind(name="acceleration", order=2, unit="m/s^2")
+STATE_KINDS = (POSITION_KIND, VELOCITY_KIND, ACCELERATION_KIND)  # by order
+MEASURED_KINDS = (POSITION_KIND, VELOCITY_KIND)  # which sources of paths and covariances state
 SPREAD_POWER = SumKind(name="islr", is_sum=True, is_level=True)
 
 for _kind in (

@@ -1,4 +1,4 @@
-"""What a command uses of its environment: files of the package, files of the user, and processors."""
+"""Files of the package, files of the user, and processors: the environment of a command."""
 
 import os
 import stat

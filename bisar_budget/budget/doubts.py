@@ -24,7 +24,7 @@ from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.constants import ONE_PEAK_DB
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import residual_subject
-from bisar_budget.error_kinds import MEASURED_KINDS, POSITION, StateKind
+from bisar_budget.error_kinds import MEASURED_KINDS, POSITION_KIND, StateKind
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, norm, unit
 from bisar_budget.mission.model import Mission
@@ -58,7 +58,7 @@ class InputDoubt:
     doubt: float
     declared: float
     note: Note
-    state: StateKind | None = POSITION
+    state: StateKind | None = POSITION_KIND
     is_stated: bool = False
     is_of_log: bool = False
 
@@ -143,7 +143,7 @@ def strays(mission: Mission, name: str) -> PerCaseFlag:
     if not is_large.any() or path.is_doubted:
         return is_large
     in_any_direction = np.multiply.outer(np.asarray(path.doubt_m, dtype=float) ** 2, np.eye(3))
-    return is_large & _matters(mission, name, POSITION, in_any_direction)
+    return is_large & _matters(mission, name, POSITION_KIND, in_any_direction)
 
 
 def declared_position_error(error: MotionError) -> Any:
@@ -156,7 +156,7 @@ def declared_position_error(error: MotionError) -> Any:
     return sum(size**2 for size in sizes) ** 0.5 if sizes else None
 
 
-def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, state: StateKind | None = POSITION) -> bool:
+def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, state: StateKind | None = POSITION_KIND) -> bool:
     """Whether a row judges a given kind of error of a platform, in the frame in which the file states the error.
 
     A `state` of None stands for the residual of a log, which spreads power. It therefore includes its own row, and
@@ -316,11 +316,11 @@ def is_coarse(mission: Mission, name: str) -> PerCaseFlag:
     platform: Platform = getattr(mission.platforms, name)
     grid = _stack(log.grid)
     squares = np.swapaxes(grid, -1, -2) @ grid
-    declared = _declared_covariance(platform, POSITION)
+    declared = _declared_covariance(platform, POSITION_KIND)
     excess = MOST_GRID_SHARE**2 * declared * (1 + _EQUAL_VARIANCE_FRACTION) + LEAST_M**2 * np.eye(3) - squares
     coarse = np.linalg.eigvalsh(excess)[..., 0] < 0
     if coarse.any() and platform.motion_error.stated("position") is None and not platform.motion_error.random:
-        coarse = coarse & _matters(mission, name, POSITION, squares / 12)
+        coarse = coarse & _matters(mission, name, POSITION_KIND, squares / 12)
     return coarse
 
 
@@ -344,7 +344,7 @@ def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
     assert platform.path.log_noise is not None
     error = platform.motion_error
     axes = np.array(platform.state.frame(error.frame), dtype=float)
-    grid, declared = np.array(platform.path.log_noise.grid), _declared_covariance(platform, POSITION)
+    grid, declared = np.array(platform.path.log_noise.grid), _declared_covariance(platform, POSITION_KIND)
     steps = np.sqrt(np.sum((grid @ axes.T) ** 2, axis=0))
     sigmas = np.sqrt(np.diag(axes @ declared @ axes.T))
     worst_axis = int(np.argmax(steps - MOST_GRID_SHARE * sigmas))
@@ -446,7 +446,7 @@ def orbit_notes(case: Case, rows: Sequence[Row]) -> Iterator[Note]:
             continue
         rate = float(norm(state.fall.orbit_rate(state)))
         sizes = math.hypot(*position), math.hypot(*velocity)
-        uses = [row.utilization or 0.0 for row in rows if row.owner == name and row.subject.facts is POSITION]
+        uses = [row.utilization or 0.0 for row in rows if row.owner == name and row.subject.facts is POSITION_KIND]
         if rate * sizes[0] > sizes[1] and max(uses, default=0.0) > NEGLIGIBLE_USE_FRACTION:
             yield phrases.orbit_errors_are_independent(name, sizes[0], rate, sizes[1])
 

@@ -13,7 +13,7 @@ import numpy as np
 from bisar_budget.arrays import Floats
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.sources import ErrorListing, exact_ranges
-from bisar_budget.error_kinds import POSITION, VELOCITY
+from bisar_budget.error_kinds import POSITION_KIND, VELOCITY_KIND
 from bisar_budget.geometry import PlatformState
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
@@ -67,7 +67,7 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
     exact = exact_ranges(cases, geometry, int(np.max(count)), cases=len(sides))
     listing = ErrorListing(cases, geometry, exact)
     worst = AllowableNoise(sigma, 0.0, "")
-    for kind in (POSITION, VELOCITY):
+    for kind in (POSITION_KIND, VELOCITY_KIND):
         units = np.array(
             [
                 [np.broadcast_to(effect.qpe, (len(sides),)) for effect in listing.full_legs(place, kind)]

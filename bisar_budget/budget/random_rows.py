@@ -470,7 +470,7 @@ _Wording = tuple[str, str | None, tuple[Note, ...]]  # equation, source and note
 
 def _wording(mission: Mission, error: RandomError) -> _Wording:
     """Return the equation, the source and the notes of the row of a random error."""
-    return error.subject.facts.find_in(WORDINGS, error.subject.axis)(mission, error)
+    return error.subject.facts.find_in(RANDOM_WORDINGS, error.subject.axis)(mission, error)
 
 
 def _link_wording(mission: Mission, error: RandomError) -> _Wording:
@@ -612,7 +612,7 @@ def _quiet(mission: Mission, error: RandomError) -> Note:
 
 
 # By kind, or by kind and axis: the texts of a row, and the reason why an error has no effect.
-WORDINGS: Mapping[str, Callable[[Mission, RandomError], _Wording]] = {
+RANDOM_WORDINGS: Mapping[str, Callable[[Mission, RandomError], _Wording]] = {
     "vibration": _vibration_wording,
     "imu": _sensor_wording,
     "lever_arm": partial(_sensor_wording, equation="lever arm"),

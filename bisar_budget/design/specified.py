@@ -12,7 +12,7 @@ from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.spectra import PowerLawPiece, density
-from bisar_budget.error_kinds import ACCELERATION, POSITION, VELOCITY
+from bisar_budget.error_kinds import STATE_KINDS
 from bisar_budget.geometry import norm
 from bisar_budget.mission.changes import ACCEPTED_ERRORS, is_error, parts_of
 from bisar_budget.mission.instruments import Oscillator
@@ -157,7 +157,7 @@ def usual_keys(mission: Mission) -> Iterator[str]:
     for name in PLATFORMS:
         platform = getattr(mission.platforms, name)
         error = platform.motion_error
-        for state in (POSITION,) if platform.state.is_still else (POSITION, VELOCITY, ACCELERATION):
+        for state in STATE_KINDS[:1] if platform.state.is_still else STATE_KINDS:
             is_fixed = error.covariance is not None and state.has_covariance
             if not is_fixed and state.name not in dict(error.of_parts):
                 yield f"platforms.{name}.motion_error.{state.name}"

@@ -23,7 +23,7 @@ from bisar_budget.effects.effect import (
     override_notes,
     subject,
 )
-from bisar_budget.error_kinds import POSITION, STATE_KINDS, MotionKind, StateKind, kind_of
+from bisar_budget.error_kinds import POSITION_KIND, STATE_KINDS, MotionKind, StateKind, kind_of
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, VectorArrays, Vectors, dot
 from bisar_budget.image_plane import nodes_for
@@ -574,8 +574,8 @@ class ErrorListing:
         height = self.mission.scene.height_error
         if height is None:
             return
-        published = _sum([self.published_legs(platform_index, POSITION)[2] for platform_index in (0, 1)])
-        full = _sum([self.full_legs(platform_index, POSITION)[2] for platform_index in (0, 1)])
+        published = _sum([self.published_legs(platform_index, POSITION_KIND)[2] for platform_index in (0, 1)])
+        full = _sum([self.full_legs(platform_index, POSITION_KIND)[2] for platform_index in (0, 1)])
         yield ErrorSource(
             subject=subject("mission", "terrain"),
             unit="m",

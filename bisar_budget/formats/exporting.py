@@ -26,7 +26,7 @@ from bisar_budget import __version__
 from bisar_budget.arrays import Records
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.effect import PLATFORMS, plain
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.error_kinds import SourceKind, StateKind
 from bisar_budget.faults import printable
@@ -168,7 +168,7 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
     reach = max(max(abs(target.east), abs(target.north)) for target in targets.points)
     exact, T = exact_ranges(mission, mission.geometry), mission.collection.aperture_time
     widths = resolution(exact, mission.geometry, mission.radar, T)
-    cell = float(widths.range), float(widths.cross_range)
+    cell = plain(widths.range), plain(widths.cross_range)
     half = float(math.ceil(reach + shift + _AREA_MARGIN_CELLS * max(cell)))
     times: Floats = np.linspace(-T / 2, T / 2, _EXTENT_SAMPLES)
     flown = collection.flight(errors.smooth(), times)

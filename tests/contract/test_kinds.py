@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from bisar_budget.budget.random_rows import REASONS_FOR_NO_EFFECT, WORDINGS
+from bisar_budget.budget.random_rows import RANDOM_WORDINGS, REASONS_FOR_NO_EFFECT
 from bisar_budget.effects import navigation_errors, sources
 from bisar_budget.error_kinds import STATE_KINDS, ErrorKind, SourceKind, StateKind, SumKind, kinds
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
@@ -48,7 +48,7 @@ def test_random_steps() -> None:
 def test_wordings_and_reasons_for_no_effect() -> None:
     """A random error has texts for its row, and so has an error of which the file states only the effect."""
     expected = names(kind for kind in SOURCES if kind.is_random or kind.moves == "image")
-    assert set(WORDINGS) == expected | {"lever_arm.uncertainty", "oscillator.acceleration"}
+    assert set(RANDOM_WORDINGS) == expected | {"lever_arm.uncertainty", "oscillator.acceleration"}
     assert set(REASONS_FOR_NO_EFFECT) == expected
 
 

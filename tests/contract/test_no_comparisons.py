@@ -62,6 +62,8 @@ LEFT = {
     "mission/covariance.py": (1, "words in the names of correlated errors"),
     "mission/platforms.py": (1, "keys of the file that a covariance replaces"),
     "mission/quantities.py": (2, "steps of a path of keys"),
+    "report/change/fallen_effects.py": (1, "the same error in two missions"),
+    "report/formats/specification_sheet.py": (1, "the last part of a key of the file, which is the name of a kind"),
 }
 
 

@@ -12,7 +12,7 @@ import pytest
 import bisar_budget as bb
 from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.sources import ErrorListing, exact_ranges
-from bisar_budget.error_kinds import POSITION
+from bisar_budget.error_kinds import POSITION_KIND
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulator.phase_history import PathError, path
@@ -98,7 +98,7 @@ def test_a_race_track_has_a_node_for_each_of_its_turns(tmp_path: Path) -> None:
     assert count >= 1.5 * mission.platforms.receiver.path.pieces
     own, fine = (
         np.array(
-            [[e.qpe, e.east, e.north] for e in ErrorListing(mission, geometry, exact).full_legs(1, POSITION)],
+            [[e.qpe, e.east, e.north] for e in ErrorListing(mission, geometry, exact).full_legs(1, POSITION_KIND)],
             float,
         )
         for exact in (exact_ranges(mission, geometry, nodes) for nodes in (count, 4 * count))
