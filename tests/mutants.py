@@ -38,6 +38,7 @@ _DERIVED = "bisar_budget/theory/differential_range.py"
 _TABLES = "bisar_budget/theory/published.py"
 _EVALUATORS = "bisar_budget/evaluators.py"
 _GEOMETRY = "bisar_budget/geometry.py"
+_KINDS = "bisar_budget/error_kinds.py"
 _POINT = "bisar_budget/simulator/point.py"
 _PIECES = "bisar_budget/effects/effect.py"
 _PHASES = "bisar_budget/verifier/phase_cases.py"
@@ -167,6 +168,34 @@ MUTANTS = (
         "tuple(size * float(term)",
         "tuple(size / 2 * float(term)",
         (f"{_IMAGES}test_the_clock_of_a_simulated_image_has_the_coverage_factor",),
+    ),
+    Mutant(
+        "registry: an error of both platforms has the id of one platform",
+        _KINDS,
+        'self.common_id_form if self.common_id_form and owner == "mission" else',
+        'self.common_id_form if self.common_id_form and owner != "mission" else',
+        ("tests/contract/test_registry.py::test_the_ids_of_rows_are_those_of_the_contract",),
+    ),
+    Mutant(
+        "registry: a wrong height of the scene is flown as a time tag",
+        _KINDS,
+        'flown_as="height", is_covered=False',
+        'flown_as="time_tag", is_covered=False',
+        ("tests/simulate/test_flown_errors.py::test_a_wrong_height_of_the_scene_is_flown",),
+    ),
+    Mutant(
+        "registry: a registered kind is not flown",
+        "bisar_budget/simulator/flown_errors.py",
+        "Course(times, size * motion.T)",
+        "Course(times, 0 * motion.T)",
+        ("tests/contract/test_extending.py::test_simulate_flies_it",),
+    ),
+    Mutant(
+        "registry: the size of a registered kind is added to its motion",
+        "bisar_budget/sampling/draws.py",
+        "moved = [component * sizes for component in source.way_of(platform)]",
+        "moved = [component + sizes for component in source.way_of(platform)]",
+        ("tests/contract/test_registry.py::test_large_draws_of_a_registered_kind_are_those_of_its_motion",),
     ),
     Mutant(
         "plot: segments of twice their length",

@@ -91,3 +91,44 @@ def test_both_platforms_may_have_it_and_its_sign_counts() -> None:
     moved = [np.array(shifted[f"{name}.shift_north"].displacement_m) for name in ("transmitter", "receiver")]
     common = bb.check(mission.replace({"common_motion_error.position": ["0 m", "1 m", "0 m"]}))["common.position.y"]
     assert moved[0] - moved[1] == pytest.approx(np.array(common.displacement_m), abs=1e-6)
+
+
+def test_the_coverage_factor_multiplies_what_its_kind_says() -> None:
+    """Sigmas of a path have the coverage factor; the height of the scene is a bound without it."""
+    bb.register(kind("covered"))
+    mission = bb.load(str(ROOT / "specs/missions/tandem_x.yaml"))
+    changes = {
+        "allocation.coverage_factor": 2.0,
+        "scene.height_error": "3 m",
+        "platforms.receiver.motion_error.registered.covered": "3 m",
+        "platforms.receiver.motion_error.time_tag": "3 us",
+    }
+    result = bb.check(mission.replace(changes))
+    assert result["mission.terrain"].declared == 3.0
+    assert result["receiver.covered"].declared == 6.0
+    assert result["receiver.time_tag"].declared == pytest.approx(6e-6)
+
+
+def test_large_draws_of_a_registered_kind_are_those_of_its_motion() -> None:
+    """So large that each draw goes through exact ranges: a velocity error, and its motion as a registered kind."""
+
+    def north(path: object, times: np.ndarray) -> np.ndarray:
+        return np.stack([0 * times, times, 0 * times])
+
+    bb.register(bb.MotionKind(name="drift_north", dimension=units.SPEED, description="Drift.", motion=north))
+    bare = bb.load(str(ROOT / "specs/missions/rigling_moses_section_v.yaml")).replace(
+        {
+            "platforms.transmitter.motion_error": None,
+            "allocation": "{model: full, combine: rss}",
+            "requirements.location_error": "1 m",
+        }
+    )
+    states = {
+        "platforms.receiver.motion_error.velocity": ["0 m/s", "20 m/s", "0 m/s"],
+        "platforms.receiver.motion_error.registered.drift_north": "20 m/s",
+    }
+    drawn = [bb.monte_carlo(bare.replace({key: value}), 4000, seed=2).to_dict() for key, value in states.items()]
+    by_velocity, by_motion = ({each["id"]: each for each in one["requirements"]} for one in drawn)
+    assert by_motion["mission.location_error"]["sigma"] == pytest.approx(
+        by_velocity["mission.location_error"]["sigma"], rel=0.05
+    )
