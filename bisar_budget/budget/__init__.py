@@ -1,4 +1,4 @@
-"""Turns an analysis into findings: limits on single errors and on sums of errors, and waivers.
+"""Judges an analysed mission: budget rows for single errors and for sums of errors, requirements, and waivers.
 
 Many mission files can be checked together.
 """

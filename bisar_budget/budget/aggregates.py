@@ -1,4 +1,8 @@
-"""Budget rows for sums of errors: quadratic and cubic phase, location, autofocus pull-in range, and scene edge."""
+"""Budget rows that judge sums of errors.
+
+They limit the quadratic and cubic phase, the displacement of the image, the total phase that autofocus can pull in,
+and the phase differences at the edge of the scene.
+"""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -49,7 +53,7 @@ class Aggregates:
     def rows(self, model: str) -> Iterator["Aggregate"]:
         """Yield all rows for sums of errors under one gating model, in the order of the JSON output.
 
-        The result of the other model may turn a pass into a warning.
+        A row that passes by the gating model becomes a warning if it exceeds its limit by the other model.
         """
         mine, theirs = self.together(model), self.together(OTHER_MODEL[model])
         if self.combine == "each":
@@ -88,9 +92,10 @@ class Aggregates:
         return aggregate.of_equal_loss(equal_loss, equal_loss if is_full else theirs.judged(full, gain=1.0))
 
     def _largest_quadratic(self, mine: Together, theirs: Together) -> "Aggregate":
-        """Build the row for the mission's quadratic phase under `combine: each`, which judges each error alone.
+        """Build the warning row for the mission's total quadratic phase under `combine: each`.
 
-        The row exists only as a warning, in the cases where the root-sum-square of all errors exceeds the total.
+        The rule `each` judges every error alone. The row exists only in the cases in which no single error exceeds
+        the limit, but the root-sum-square of all errors does.
         """
         row_subject, phases = subject("mission", QUADRATIC), mine.judged_parts(mine.phases)
         size, of_all = mine.judged(mine.phases), mine.judged(mine.phases, "rss")
@@ -148,11 +153,11 @@ class Aggregates:
         )
 
     def _of_owners(self, split: Shares, owner: str) -> Sequence[RandomError]:
-        """List the random errors (sensors, clocks, atmosphere) that count against the budget share of `owner`."""
+        """List the random errors (sensors, clocks, atmosphere) that count against the share of `owner`."""
         return [error for error in self.together("full").random if split.includes(error.owner, owner)]
 
     def _is_declared(self, members: Iterable[DeclaredPhase]) -> Booleans:
-        """Find the cases in which at least one of the given phases is declared, (cases,)."""
+        """Mark the cases, (cases,), in which at least one of the phases `members` is declared."""
         is_declared = np.zeros(self.judging.cases, dtype=bool)
         for member in members:
             is_declared |= member.is_there
@@ -177,10 +182,10 @@ class Aggregates:
     ) -> "Aggregate":
         """Judge a sum of errors against a limit, for an array of cases.
 
-        A sum without a finite value fails, because with one of its errors the point has no image. `without_value`
-        replaces the status `fail` of such a sum. `continued` is a pair: the kind of effect that the row sums, and the
-        random errors in the sum. A pass becomes a warning if it depends on phase noise below the first point of a
-        mask. A pass that depends on doubtful noise is not evaluated.
+        A declared sum without a finite value fails, because one of its errors leaves the point without an image.
+        `without_value` replaces the status `fail` of such a sum. `continued` is a pair: the kind of effect that the
+        row sums, and the random errors in the sum. A pass becomes a warning if it depends on phase noise below the
+        first point of a mask. A pass that depends on doubtful oscillator noise becomes `not_evaluated`.
         """
         rests_on: PerCaseFlag = False
         is_in_doubt: PerCaseFlag = False
@@ -221,9 +226,10 @@ class Aggregates:
 class Aggregate(FamilyRow):
     """The budget row for one sum of errors, judged by one model, for an array of cases.
 
-    `rule` is the rule that combines the `phases`. A row of displacements has no phases. `by_other` is the sum by the
-    model that does not gate. If the row holds the largest error instead of a sum, `of_all` is the root-sum-square of
-    all errors, otherwise NaN. A pass becomes a warning if `by_other` or `of_all` exceeds the limit.
+    `rule` names the rule that combines the `phases`. A row of displacements has no phases. `by_other` is the sum
+    computed by the model that does not gate. Under `combine: each` the row holds the largest error instead of a sum.
+    `of_all` is then the root-sum-square of all errors; otherwise it is NaN. A pass becomes a warning if `by_other` or
+    `of_all` exceeds the limit.
     """
 
     rule: str
@@ -238,12 +244,12 @@ class Aggregate(FamilyRow):
     is_in_doubt: PerCaseFlag = False  # result depends on doubtful noise
 
     def of_equal_loss(self, equal_loss: Floats, of_full: Floats) -> "Aggregate":
-        """Return the row with the equal-loss phase in place of the judged phase as its declared value.
+        """Return the row with the equal-loss phase as its declared value, instead of the judged phase.
 
-        The equal-loss phase may be smaller than the judged phase, because autofocus does not correct part of the
+        The equal-loss phase may be smaller than the judged phase, because autofocus cannot correct every part of the
         phase. The allowable is scaled by the same factor, so that the utilization does not change. Without a declared
-        phase the allowable stays the same. `equal_loss` is this phase by the gating model and `of_full` by the full
-        model, both (cases,) [rad].
+        phase the allowable stays the same. `equal_loss` is the equal-loss phase by the gating model, and `of_full`
+        the equal-loss phase by the full model. Both have the shape (cases,) and are in radians.
         """
         judged = self.judged
         with np.errstate(all="ignore"):
@@ -273,7 +279,7 @@ class Aggregate(FamilyRow):
             if over and size is not None and combine != "each":
                 over = over.then(self._passes_with(case, model))
         elif over and size is not None and wording.advice:
-            over = over.then(phrases.note(wording.advice))
+            over = over.then(wording.advice)
         doubt = over if row_subject.facts.only_warns else NOTHING
         doubted = NOTHING
         if case.number(self.is_in_doubt):
@@ -295,9 +301,9 @@ class Aggregate(FamilyRow):
         )
 
     def _passes_with(self, case: Case, model: str) -> Note:
-        """State the smallest pull-in range N_pull of autofocus for which the sum would pass.
+        """State the smallest pull-in range of autofocus, N_pull, with which the sum would pass.
 
-        If no autofocus can correct the sum, the note states that instead.
+        If no autofocus could correct the sum, the note states that instead.
         """
         together, owner = case.analysis.together(model), self.judged.subject.owner
         members = together.owed(case.allocation.qpe, owner)
@@ -308,10 +314,10 @@ class Aggregate(FamilyRow):
 
 # ---------------------------------------------------------------------- totals of effects
 def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
-    """Compute the phases [rad] of each declared error with one model, in three groups.
+    """Compute the cubic, spread and tone phases [rad] of each declared error with one model.
 
-    The groups are the `cubic` phase, the rms phase that spreads power (`spread`), and the peak phase of tones
-    (`tone`).
+    The result has three keys: `cubic` for cubic phases, `spread` for rms phases that spread power, and `tone` for the
+    peak phases of tones. Each value is a list of pairs (row id, phase).
     """
     array, together = analysis.errors.array, analysis.together(model)
     return {
@@ -327,8 +333,8 @@ def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
 def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> list[UntakenEffect]:
     """Find the effects that no requirement limits, and the rows of the errors that cause them.
 
-    Rows are named only for effects that are not negligible. With several gating models, the largest value of each
-    effect is used. `instead` holds errors that replace the errors with the same ids.
+    Rows are marked only in the cases in which the effect is not negligible. With several gating models, the largest
+    value of each effect is used. `instead` holds random errors that replace the errors with the same ids.
     """
     needs = analysis.mission.requirements
     level = negligible_rad(analysis.mission)
@@ -361,7 +367,10 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
 
 
 def _exchanged(parts: Mapping[str, Phases], errors: Sequence[RandomError], model: str) -> dict[str, Phases]:
-    """Replace the cubic and spread phases [rad] of the given errors, which are matched by id."""
+    """Replace the cubic and spread phases [rad] in `parts` by those of the given errors.
+
+    Errors are matched by their ids.
+    """
     ids = {error.id for error in errors}
     exchanged = {name: [phase for phase in phases if phase[0] not in ids] for name, phases in parts.items()}
     for error in errors:
@@ -372,22 +381,22 @@ def _exchanged(parts: Mapping[str, Phases], errors: Sequence[RandomError], model
 
 # ---------------------------------------------------------------------- displacements that no row holds
 def unplaced(together: Together) -> dict[str, Booleans]:
-    """Find the random errors that displace the image by an amount that the file does not state, such as unset clocks.
+    """Find the random errors that displace the image by an unknown amount, such as clocks never set.
 
-    The result maps the row id of each random error to a mask of the cases in which it does so, (cases,).
+    The result maps the row id of each random error to a mask of the cases in which the amount is unknown, (cases,).
     """
     return {error.subject.id: together.errors.array(error.displaces_unknown) > 0 for error in together.random}
 
 
 # ---------------------------------------------------------------------- in words
 class _Words(NamedTuple):
-    """Texts for a row: name and unit of the summed effect, the key of its limit in the file, and the equations."""
+    """Texts of a row that sums errors: the summed effect, its unit, the key of the file, and the equations."""
 
     what: str
     unit: str
     path: KeyPath
     equation: tuple[str, str]  # published model, full model
-    advice: str = ""  # code of the note on what autofocus does for a row that exceeds its limit
+    advice: Note = NOTHING  # what autofocus does for a row that exceeds its limit
     is_quadratic: bool = False
     is_displacement: bool = False
 
@@ -396,12 +405,18 @@ _ROW_SUM_WORDS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows"
 _PATHS: dict[str, KeyPath] = {"mission": ("platforms",), "clock": ("timing_error",)}
 _WORDINGS = {
     CUBIC: _Words(
-        "cubic phase", "rad", ("requirements", CUBIC), ("Table I, cubic column", "full model"), advice="no-gain"
+        "cubic phase",
+        "rad",
+        ("requirements", CUBIC),
+        ("Table I, cubic column", "full model"),
+        advice=phrases.note("no-gain"),
     ),
     LOCATION: _Words(
         "displacement of the image", "m", ("requirements", LOCATION), ("(25)", "full model"), is_displacement=True
     ),
-    PULL_IN: _Words("QPE", "rad", ("autofocus", "n_pull"), ("Section VI", "Section VI"), advice="one-total"),
+    PULL_IN: _Words(
+        "QPE", "rad", ("autofocus", "n_pull"), ("Section VI", "Section VI"), advice=phrases.note("one-total")
+    ),
 }
 
 
@@ -412,10 +427,10 @@ def _wording_of(row_subject: Subject, rule: str) -> _Words:
 
 
 def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, Note]:
-    """Return the row id and size of the largest error in a sum, and a note on the source of the size.
+    """Return the row id and the size of the largest error in a sum, with a note on that size.
 
-    The size is a phase [rad] or a displacement [m]. The note is empty unless the size relies on extrapolated noise or
-    on a folded spur.
+    The size is a phase [rad] or a displacement [m]. The note tells whether the size relies on extrapolated noise or
+    on a folded spur. It is empty otherwise.
     """
     together, row_subject = case.analysis.together(model), aggregate.judged.subject
     wording = _wording_of(row_subject, aggregate.rule)
@@ -435,10 +450,10 @@ def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, 
 
 
 def _folded_spur(case: Case, row_id: str, size: float, *, is_cubic: bool) -> Note:
-    """Name the folded spur that causes most of an oscillator's phase.
+    """Write a note that names the folded spur which causes most of an oscillator's phase.
 
-    Spurs fold to low frequencies if the platforms exchange pulses to synchronise. The note is empty if noise causes
-    most of the phase.
+    If the platforms exchange pulses to synchronise, spurs fold to low frequencies. The note is empty if no spur
+    causes most of the phase.
     """
     T, factor = case.mission.collection.aperture_time, case.mission.allocation.coverage_factor
     for spur in spurs_of(case.mission):
@@ -449,9 +464,9 @@ def _folded_spur(case: Case, row_id: str, size: float, *, is_cubic: bool) -> Not
 
 
 def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit: float | None) -> Note:
-    """Explain why a pass becomes a warning.
+    """Explain why a pass becomes a warning; empty if it does not.
 
-    The reason is one of the following: all errors together exceed the limit, the sum by the model that does not gate
+    There are three possible reasons. All errors together exceed the limit, the sum by the model that does not gate
     exceeds it, or the row depends on noise below the first point of a mask.
     """
     if limit is None:
@@ -476,7 +491,7 @@ def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit:
 # ---------------------------------------------------------------------- the scene's edge
 @dataclass(frozen=True, eq=False)
 class JudgedScene:
-    """Phase differences between the centre and the edge of the scene that errors cause, for an array of cases.
+    """Phase errors at the edge of the scene relative to those at its centre, for an array of cases.
 
     `edges` is None if no error is declared.
     """
@@ -486,20 +501,23 @@ class JudgedScene:
 
     @cached_property
     def corrections(self) -> Corrections | None:
-        """Distance from the scene centre within which one autofocus correction is sufficient; None without errors.
+        """Distance from the scene centre up to which one autofocus correction is sufficient; None without errors.
 
-        The search for it is slow. It is therefore made only when a row is put into words.
+        The search for this distance is slow. It runs only when the texts of a row are written.
         """
         return None if self.edges is None else Corrections(self.edges, self.analysis.allocation.qpe_total)
 
     def edge(self, case: Case) -> SceneEdge | None:
-        """Return the edge of the scene in one case, with the distance within which one correction is sufficient."""
+        """Return the edge of the scene in one case; None if no error is declared.
+
+        The result includes the distance up to which one autofocus correction is sufficient.
+        """
         return None if self.corrections is None else SceneEdge.of(self.corrections, case.mission, case.place)
 
     def row(self, judging: Judging, model: str) -> "SceneRow":
-        """Judge the phase differences at the edge of the scene with one model.
+        """Judge the difference between the phase errors at the edge and at the centre of the scene, with one model.
 
-        In the published model an error has the same effect everywhere in the scene, so that the differences are zero.
+        In the published model an error has the same effect everywhere in the scene. The difference is then zero.
         """
         row_subject, edges = subject("mission", "spatial_variance"), self.edges
         total = judging.array(self.analysis.allocation.qpe_total)
@@ -519,7 +537,7 @@ class JudgedScene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneRow(FamilyRow):
-    """The row that judges the edge of the scene, for an array of cases."""
+    """The row that judges the phase error at the edge of the scene relative to the centre, for an array of cases."""
 
     scene: JudgedScene
 

@@ -1,9 +1,9 @@
 """Check missions: compare declared errors with the allocated budget, with one row for each error and for each sum.
 
-`check_mission` checks one mission. `check_missions` checks several missions and treats missions of one shape as one
-array of cases. `check_files` checks files and uses all cores for many files. The findings of one mission consist of
-several hundred objects. A caller that needs only a report passes `keep`, a function that reduces the findings in the
-process that made them. This saves a quarter of the time for a thousand missions.
+`check_mission` checks one mission. `check_missions` checks several missions, and computes missions of the same shape
+together as an array of cases. `check_files` checks files, and uses all cores if there are many. The findings of one
+mission consist of several hundred objects. A caller that needs only a report passes a function `keep`. It reduces
+the findings in the process that made them, which saves a quarter of the time for a thousand missions.
 """
 
 import gc
@@ -70,8 +70,8 @@ def check_missions(
     """Check missions, and yield the index and the findings of each mission, in any order.
 
     Missions of the same shape are checked together as arrays. The findings have the same statuses and sentences as
-    those of `check_mission`, but numbers may differ within the tolerance of the numerical search. With
-    `keeps_analysis` the findings of each mission have its analysis, for further computations.
+    those of `check_mission`. Their numbers may differ within the tolerance of the numerical search. If
+    `keeps_analysis` is true, the findings of each mission include its analysis, for further computations.
     """
     if len(missions) == 1:
         yield 0, check_mission(missions[0], today, outside=outside)
@@ -156,7 +156,7 @@ def _flown_paths(mission: Mission) -> tuple[tuple[str, FlownPath], ...]:
 
 
 def _overridden(mission: Mission) -> Iterator[Note]:
-    """Yield a note for each value of a catalogue part that the file overrides."""
+    """Yield a note for each value of a catalogue part that the mission file overrides."""
     for name in PLATFORMS:
         platform = getattr(mission.platforms, name)
         for section in filter(None, (platform.motion_error, platform.oscillator)):
@@ -164,7 +164,7 @@ def _overridden(mission: Mission) -> Iterator[Note]:
 
 
 def _unused_keys(mission: Mission) -> Iterator[Note]:
-    """Yield a note for each key of the file that this check does not use."""
+    """Yield a note for each key of the mission file that a check does not use."""
     keys = {
         "collection.pulses": mission.collection.pulses is not None,
         "simulation": mission.simulation is not None,
@@ -183,7 +183,7 @@ FILES_AT_ONCE = 500  # largest number of files that are checked together
 
 
 class Draws(NamedTuple):
-    """Arguments of `monte_carlo`: the number of draws, the seed, and the part of the draws to compute (`share`).
+    """Arguments of `monte_carlo`: the number of draws, the seed, and `share`, the part of the draws to compute.
 
     `share` works only within a single process.
     """
@@ -194,12 +194,12 @@ class Draws(NamedTuple):
 
 
 def without_analysis(findings: CheckedMission) -> CheckedMission:
-    """Return the findings without the analysis, which would fill the memory for a thousand missions."""
+    """Return the findings without their analysis, which would fill the memory for a thousand missions."""
     return findings if isinstance(findings, UnusableMission) else findings._replace(analysis=None)
 
 
 def whole(findings: CheckedMission) -> CheckedMission:
-    """Return the findings together with the analysis, which is too large to be sent between processes."""
+    """Return the findings unchanged, with their analysis, which is too large to be sent between processes."""
     return findings
 
 
@@ -256,7 +256,7 @@ def check_files(
 
 
 def _chunks(files: Sequence[str]) -> list[Sequence[str]]:
-    """Divide files into chunks that are checked together. Many files give an even number of chunks.
+    """Divide files into chunks whose files are checked together; many files give an even number of chunks.
 
     The number of cores does not affect the division, because the last digits of a result depend on its chunk.
     """

@@ -1,4 +1,4 @@
-"""The confidence level of a verdict, which follows from the sigmas or bounds of the declared errors."""
+"""The confidence level of a verdict, derived from the stated distributions (sigmas or bounds) of the errors."""
 
 import math
 from collections.abc import Iterator
@@ -23,7 +23,10 @@ def confidence_of(case: Case) -> Note:
 
 
 def _stated(case: Case) -> Iterator[tuple[str, bool]]:
-    """Yield the distribution of each declared error that has one, and whether the error is known and nonzero."""
+    """Yield the distribution of each declared error, and whether the error's size is known and nonzero.
+
+    Errors without a distribution are omitted.
+    """
     for source in case.analysis.errors.stated:
         if source.is_covered:
             yield distribution_of(case.mission, source), _is_nonzero(case.number(source.declared))

@@ -24,14 +24,17 @@ Part = str  # quadratic, cubic, spread or displacement
 
 
 def part_of(effect: RandomEffect, effect_kind: Part) -> Any:
-    """Return one kind of effect per unit of the error: a phase [rad], an rms phase [rad] or a displacement [m]."""
+    """Return one kind of effect of an error, per unit of the error.
+
+    The effect is a phase [rad], an rms phase [rad] or a displacement [m]. `effect_kind` names it.
+    """
     return getattr(effect, effect_kind)
 
 
 def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> PerCase:
-    """Sum the squared effects of the phase noise below the first points of masks; 0 without such noise.
+    """Sum the squared effects that phase noise below the first points of masks causes; 0 without such noise.
 
-    `effect_kind` names the effect. All declared `errors` are summed.
+    All declared `errors` are summed. `effect_kind` names the effect, such as `quadratic`.
     """
     power: PerCase = 0.0
     for error in errors:
@@ -41,7 +44,7 @@ def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> PerCase
 
 
 def rests_on_masks(errors: Iterable[RandomError], effect_kind: Part, size: PerCase, limit: PerCase) -> PerCaseFlag:
-    """Decide whether a row depends on phase noise below the first points of masks, as a number or an array (cases,).
+    """Decide whether a row depends on phase noise below the first points of masks, as a Boolean or an array (cases,).
 
     It does if this noise makes up more than half of the power of the row, and if the `size` of the row exceeds a
     tenth of its `limit`.
@@ -52,7 +55,7 @@ def rests_on_masks(errors: Iterable[RandomError], effect_kind: Part, size: PerCa
 
 
 def continuation_note(case: Case, errors: Sequence[RandomError], effect_kind: Part, size: float) -> Note:
-    """Write the note on a row that depends on phase noise below the first points of masks.
+    """Write a note that a row depends on phase noise below the first points of masks.
 
     The note gives the fraction of the row's power that this noise makes up, and the frequency down to which the masks
     should reach. It is empty if no declared error has such noise or if `size` is 0.

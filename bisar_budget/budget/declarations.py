@@ -1,8 +1,9 @@
-"""Kinds of error that a mission can declare, and the kinds that it must declare by `requirements.declare`.
+"""Kinds of error that a mission can declare, and the kinds that `requirements.declare` obliges it to declare.
 
 A kind of error is declared if the file gives any value for it, including zero. An empty section does not declare a
-kind. If the file gives only one half of a cause, the kind is not declared. Examples are a lever arm without an
-attitude error that rotates it, and an oscillator with an acceleration sensitivity but without an acceleration.
+kind. Some errors need two entries of the file to have any effect. If the file gives only one of the two entries, the
+kind is not declared. Examples are a lever arm without an attitude error that rotates it, and an oscillator with an
+acceleration sensitivity but without an acceleration.
 """
 
 from collections.abc import Callable, Container, Iterator, Mapping
@@ -26,10 +27,10 @@ DECLARATIONS = subject("mission", DECLARE)  # the row of all required declaratio
 
 
 class Missing(NamedTuple):
-    """A required error that the file does not declare: the owner and kind of its rows, and its key in the file.
+    """A required error that the file does not declare.
 
-    If the file gives only one half of the error, `lacks` describes the missing keys. Half of an error has no effect
-    on its own.
+    `owner` and `kind` are those of its budget rows, and `key` is the key to add to the file. If the file gives only
+    one of two entries that have an effect only together, `lacks` describes the missing entry.
     """
 
     owner: str
@@ -40,7 +41,7 @@ class Missing(NamedTuple):
 
 # ---------------------------------------------------------------------- half of a cause
 def swings_nothing(platform: Platform) -> bool:
-    """Whether the file gives a platform a lever arm but no attitude error that would rotate the arm."""
+    """Whether a platform has a nonzero lever arm, but no attitude error that would rotate it."""
     lever, imu = platform.motion_error.lever_arm, platform.motion_error.imu
     if lever is None or lever.arm is None or not any(map(np.any, lever.arm)):
         return False
@@ -50,10 +51,10 @@ def swings_nothing(platform: Platform) -> bool:
 
 
 def _lacks_an_attitude(mission: Mission, name: str) -> str:
-    """Describe the attitude errors that are missing beside a lever arm; empty if none are missing.
+    """Describe the attitude errors that the file lacks although it gives a lever arm; empty if it lacks none.
 
-    The arm itself has an effect only if an attitude error rotates it. If the file gives the arm, an attitude error is
-    required too, and a stated uncertainty of the arm does not replace it.
+    A lever arm has an effect only if an attitude error rotates it. If the file gives the arm, an attitude error is
+    therefore required too. A stated uncertainty of the arm does not replace the attitude error.
     """
     if not swings_nothing(getattr(mission.platforms, name)):
         return ""
@@ -61,7 +62,7 @@ def _lacks_an_attitude(mission: Mission, name: str) -> str:
 
 
 def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
-    """Describe the missing keys of an oscillator; empty if no key is missing.
+    """Describe what an oscillator lacks: the acceleration sensitivity or the vibration; empty if it lacks nothing.
 
     Vibration and acceleration sensitivity have an effect only together.
     """
@@ -82,7 +83,7 @@ def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
 
 # ---------------------------------------------------------------------- the table of kinds
 def _whole(mission: Mission, name: str) -> str:
-    """Return an empty text, for kinds of error that cannot be stated by half."""
+    """Return an empty text, for kinds of error that consist of one entry and so cannot be half stated."""
     return ""
 
 
@@ -90,12 +91,12 @@ def _whole(mission: Mission, name: str) -> str:
 class _OfPlatform:
     """A kind of error that each platform can have: its key below the platform, and tests of what the file states.
 
-    `lacks` returns the missing key without which the platform's statement has no effect, or an empty text if the
-    statement is complete. A statement that `needs_both` halves declares nothing without the other half.
+    `lacks` returns a text with the missing key without which the stated error has no effect. The text is empty if
+    nothing is missing. If `needs_both` is set, an error for which `lacks` finds a missing key is not declared.
 
-    A kind that is not `is_owed` is listed only if the file states something about it. A platform that does not move
-    owes the kinds that `is_owed_still`. A kind that is not `is_listed` counts as other kinds: a covariance as
-    position and velocity. A direct path makes a kind that `is_clock` superfluous.
+    If `is_owed` is not set, the kind counts as missing only if the file states a part of it. A platform that does not
+    move must declare only the kinds with `is_owed_still`. A kind without `is_listed` counts as other kinds, for
+    example a covariance as position and velocity. Kinds with `is_clock` are not needed if there is a direct path.
     """
 
     key: str
@@ -194,13 +195,13 @@ _KINDS_OF_PLATFORMS: Mapping[str, _OfPlatform] = {
 
 
 def _of_platforms() -> Mapping[str, _OfPlatform]:
-    """Kinds of error of platforms, by name: those of this package, and those that packages registered."""
+    """Kinds of error that a platform can have, by name, including those that other packages registered."""
     return {**_KINDS_OF_PLATFORMS, **{name: _registered(name) for name in registered_names()}}
 
 
 @cache
 def _registered(name: str) -> _OfPlatform:
-    """A registered kind of error: no file owes it."""
+    """Return the tests for a kind of error that another package registered; no file is obliged to declare it."""
     return _OfPlatform(
         f"motion_error.registered.{name}",
         lambda platform: name in platform.motion_error.registered,
@@ -211,9 +212,10 @@ def _registered(name: str) -> _OfPlatform:
 
 @dataclass(frozen=True)
 class _OfMission:
-    """A kind of error that belongs to no single platform, and functions that test what the file states.
+    """A kind of error that belongs to no single platform, and functions that test what the file states about it.
 
-    Such errors are those of the clocks, of the atmosphere, of both platforms in common, and of other causes.
+    Such errors are those of the clocks and of the atmosphere, those that both platforms have in common, and errors
+    with other causes.
     """
 
     owner: str
@@ -237,9 +239,9 @@ def _key_of_clock(mission: Mission) -> list[str]:
 
 
 def _runs_two_clocks(mission: Mission) -> bool:
-    """Whether the errors of both oscillators matter.
+    """Whether the receiver has a clock of its own, so that the errors of both oscillators matter.
 
-    They do not with a direct path, because the receiver then uses the transmitter's signal as its clock.
+    With a direct path they do not matter, because the receiver then uses the transmitter's signal as its clock.
     """
     return not mission.has_direct_path
 
@@ -320,8 +322,8 @@ _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
 def declared_kinds(mission: Mission) -> DeclaredKinds:
     """List the kinds of error that a mission declares, those that it should declare, and those without a source.
 
-    A covariance counts as position and velocity. With a direct path as the clock, timing errors and oscillators are
-    not listed.
+    A covariance counts as position and velocity. If a direct path serves as the clock, timing errors and oscillators
+    are not listed. The result also lists the spectra that the file raises or lowers by a level.
     """
     declared, missing, without_source = list[str](), list[str](), list[str]()
     still = still_platforms(mission)
@@ -371,7 +373,7 @@ def still_platforms(mission: Mission) -> list[str]:
 
 # ---------------------------------------------------------------------- required declarations
 def missing_declarations(mission: Mission, still: Container[str] | None = None) -> list[Missing]:
-    """List the errors that `requirements.declare` requires and the file does not declare, without duplicates.
+    """List the errors that `requirements.declare` requires but the file does not declare, without duplicates.
 
     The following entries declare a kind of error:
 
@@ -381,8 +383,9 @@ def missing_declarations(mission: Mission, still: Container[str] | None = None) 
     - an inertial sensor: any of its values;
     - the atmosphere: the delays of each leg.
 
-    A platform that does not move needs only its position, and an oscillator if the requirement names the platform. An
-    error that both platforms share does not declare the errors of the single platforms.
+    A platform that does not move must declare only its position. It must also declare its oscillator if the
+    requirement names the platform. An error that both platforms have in common does not declare the errors of either
+    platform alone.
 
     Parameters
     ----------
@@ -420,6 +423,6 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
 
 
 def is_asked_for(row_subject: Subject, missing: Missing) -> bool:
-    """Whether a row judges a required error that the file does not declare, given the `missing` error."""
+    """Whether a row belongs to `missing`, a required error that the file does not declare."""
     is_clocks = missing.kind == _CLOCK_KIND  # all rows of the clock belong to it
     return row_subject.owner == missing.owner and (is_clocks or row_subject.kind == missing.kind)

@@ -1,8 +1,8 @@
 """The row for dispersion: free electrons cause a quadratic phase over the band, which blurs the image in range.
 
-The quadratic requirement limits dispersion alone, because a phase over frequency does not add to phases over slow
-time. Dispersion may use the full requirement, because no owner has a share for the atmosphere. Autofocus does not
-correct it.
+The requirement on the quadratic phase limits dispersion alone, because a phase over frequency does not add to phases
+over slow time. Dispersion may use the full requirement, because no share of it belongs to the atmosphere. Autofocus
+does not correct dispersion.
 """
 
 from collections.abc import Iterator
@@ -24,9 +24,9 @@ DISPERSION = subject("mission", "dispersion")
 
 
 def dispersion_rows(judging: Judging, analysis: Analysis) -> Iterator["DispersionRow"]:
-    """Yield the row that judges the quadratic phase at the edges of the band.
+    """Yield the row that judges the quadratic phase due to free electrons at the edges of the band.
 
-    There is no row if no electron content is declared.
+    There is no row if the file declares no electron content.
     """
     propagation = analysis.mission.propagation
     if propagation is None or all(propagation.content(name) is None for name in PLATFORMS):

@@ -1,10 +1,10 @@
 """Detection of doubtful oscillator noise. Rows that depend on such noise are not evaluated.
 
 There are two reasons for doubt. First, the file may name a catalogue part and replace its phase-noise mask without
-giving the frequency of the new mask. The mask is then taken at the frequency of the part. At another frequency the
-same decibels would mean a different noise. Second, a power law may fit an Allan deviation badly, so that it does not
-describe the oscillator. If doubtful noise uses more than a tenth of a limit, the row with this limit is not
-evaluated, unless it fails anyway.
+giving the carrier frequency of the new mask. The mask is then assumed to apply at the frequency of the part. At
+another frequency the same decibels would mean a different noise. Second, a power law may fit an Allan deviation so
+badly that it does not describe the oscillator. If doubtful noise uses more than a tenth of a limit, the row with this
+limit is not evaluated, unless it fails anyway.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -39,17 +39,20 @@ def rests_on_doubted_noise(
 
 
 def has_doubted_frequency(mission: Mission, platform: str) -> bool:
-    """Whether an oscillator has spurs whose carrier frequency is doubtful.
+    """Whether an oscillator has spurs for which the carrier frequency is doubtful.
 
-    It is doubtful if the file replaces the noise of a catalogue part by a mask without a frequency. The spurs are
-    then taken at the frequency of the part.
+    The frequency is doubtful if the file replaces the noise of a catalogue part by a mask without a frequency. The
+    spurs are then assumed to be stated at the frequency of the part.
     """
     oscillator = getattr(mission.platforms, platform).oscillator
     return oscillator is not None and bool(oscillator.spurs) and oscillator.mask_at_frequency_of_part is not None
 
 
 def doubted_noise_note(mission: Mission, platforms: Sequence[str] = PLATFORMS) -> Note:
-    """Write the note that names the keys which make oscillator noise doubtful, and the entries to write instead."""
+    """Write a note on why the noise of oscillators is doubtful; empty if it is not.
+
+    The note names the keys that cause the doubt, and the entries to write instead.
+    """
     notes = [note for name in platforms for _, note in noise_doubts(mission, name)]
     return notes[0].then(*notes[1:]) if notes else NOTHING
 

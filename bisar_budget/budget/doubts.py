@@ -1,13 +1,12 @@
-"""Doubts about the input of a check: paths that may be inaccurate, and models or collections at their limits.
+"""Doubts about the input of a check: inaccurate paths, and collections to which a model may not apply.
 
 A path from an orbit or a log may differ from the true path by a known distance. The causes are the age of the orbital
 elements, the interpolation of the ephemeris, and the residual of the smoothed log. A declared position error smaller
-than this distance cannot be right. A declared error also cannot be right if the source of the path states a larger
-error.
+than this distance cannot be right. Nor can a declared error be right if the source of the path states a larger error.
 
-A log has two further errors: the residual, which is the difference between its fixes and its smooth path, and the
-step to which the fixes are rounded. A processor that uses the smooth path has neither error. A processor that uses
-the fixes has both errors in its image. If the file does not state which path the processor uses
+A log has two further errors. The residual is the difference between the fixes of the log and its smooth path. The
+rounding step is the step to which the fixes are rounded. A processor that uses the smooth path has neither error. A
+processor that uses the fixes has both errors in its image. If the file does not state which path the processor uses
 (`trajectory.processed`), neither error can be judged.
 """
 
@@ -43,15 +42,15 @@ _EQUAL_VARIANCE_FRACTION = 1e-6  # relative tolerance for rounding, when axes ar
 
 @dataclass(frozen=True)
 class InputDoubt:
-    """A possible inaccuracy of a platform's path that is larger than the error that the file declares.
+    """A possible error of a platform's path that is larger than the error that the file declares.
 
-    `doubt` is the distance between the path and the possible true path, or the error that the source of the path
+    `doubt` is the distance by which the true path may differ from the path, or the error that the source of the path
     states. `declared` is the declared error without the coverage factor; it is 0 if the file declares no error. Both
     are given along the axis on which `doubt` exceeds `declared` most, or as root-sum-squares if the doubt has no
     direction. The unit is that of `state`, the kind of the error. `note` gives both values in words.
 
-    If `is_of_log` is set, the doubt comes from a log. `doubt` is then either the phase of the log's residual [rad],
-    with the largest acceptable phase as `declared`, or the step to which the fixes are rounded [m].
+    If `is_of_log` is set, the doubt comes from a log. `doubt` is then one of two values. It is the phase of the log's
+    residual [rad], with the largest acceptable phase as `declared`, or the step to which the fixes are rounded [m].
     """
 
     owner: str
@@ -64,17 +63,17 @@ class InputDoubt:
 
     @property
     def is_phase(self) -> bool:
-        """Whether the doubt is about the phase that a smooth path leaves, and not about an error of the path."""
+        """Whether the doubt is about the phase due to the residual of a log, and not about an error of the path."""
         return self.state is None
 
     @property
     def kind(self) -> str:
-        """Name of the kind of error; `residual` for the phase that a smooth path leaves."""
+        """Name of the kind of error; `residual` for the residual of a log."""
         return "residual" if self.state is None else self.state.name
 
     @property
     def unit(self) -> str:
-        """Unit of `doubt` and of `declared`."""
+        """Unit of `doubt` and of `declared`, such as `rad` for the residual of a log."""
         return "rad" if self.state is None else self.state.unit
 
 
@@ -106,7 +105,7 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
 
 
 def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, StateKind | None], Booleans]:
-    """Find the cases in which a path may be less accurate than the file declares.
+    """Find the cases in which the path of a platform may be less accurate than the file declares.
 
     The result maps the name of the platform and the kind of error to a mask, (cases,). The kind None stands for the
     residual of a log.
@@ -127,11 +126,11 @@ def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, StateKind
 
 # ---------------------------------------------------------------------- how far the truth may be from a path
 def strays(mission: Mission, name: str) -> PerCaseFlag:
-    """Whether the true path may differ from a platform's path by more than the declared position error.
+    """Whether a platform's true path may differ from its given path by more than the declared position error.
 
-    The result is a Boolean or an array (cases,). If no position error is declared, the possible difference matters in
-    two situations: age, interpolation or residual are unusual, or the difference would use more than a negligible
-    part of a requirement.
+    The result is a Boolean or an array (cases,). If no position error is declared, the result is true in two
+    situations. Either the age, the interpolation or the residual is unusual, or the possible difference would use
+    more than a negligible part of a requirement.
     """
     platform: Platform = getattr(mission.platforms, name)
     path, declared = platform.path, declared_position_error(platform.motion_error)
@@ -147,7 +146,7 @@ def strays(mission: Mission, name: str) -> PerCaseFlag:
 
 
 def declared_position_error(error: MotionError) -> Any:
-    """Root-sum-square of a platform's constant and random position errors; None without such an error. [m]
+    """Root-sum-square of a platform's constant and random position errors [m]; None without such an error.
 
     The result is an array (cases,) if the mission has arrays in place of numbers.
     """
@@ -157,10 +156,10 @@ def declared_position_error(error: MotionError) -> Any:
 
 
 def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, state: StateKind | None = POSITION_KIND) -> bool:
-    """Whether a row judges a given kind of error of a platform, in the frame in which the file states the error.
+    """Whether a row depends on one kind of path error of a platform, in the frame in which the file states it.
 
-    A `state` of None stands for the residual of a log, which spreads power. It therefore includes its own row, and
-    the rows that sum spread power for the platform and for the mission.
+    A `state` of None stands for the residual of a log. The residual spreads power. The rows that depend on it are its
+    own row, and the rows that sum spread power for the platform and for the mission.
     """
     if state is None:
         return row_subject in (residual_subject(owner), subject(owner, "islr"), subject("mission", "islr"))
@@ -173,10 +172,10 @@ def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, state: State
 def states_more(mission: Mission, name: str, state: StateKind, stated: StatedAccuracy) -> PerCaseFlag:
     """Whether the source of a path states a larger error than the file declares, as a Boolean or an array (cases,).
 
-    An error is larger if its variance is larger in any direction. For a source without directions, the
-    root-sum-squares are compared. A velocity error matters only if it would use more than a negligible part of a
-    requirement, because an ephemeris may have good positions and bad velocities, and the path follows the positions.
-    If the file declares no position error, the same condition applies to a position error that is only typical of the
+    An error is larger if its variance is larger in any direction. If the source gives no directions, the
+    root-sum-squares are compared. A larger velocity error matters only if it would use more than a negligible part of
+    a requirement: an ephemeris may have good positions and bad velocities, and the path follows the positions. If the
+    file declares no position error, the same condition applies to a position error that is only typical of the
     source.
     """
     platform: Platform = getattr(mission.platforms, name)
@@ -205,9 +204,8 @@ def states_more(mission: Mission, name: str, state: StateKind, stated: StatedAcc
 def _stated_covariance(stated: StatedAccuracy, state: StateKind, platform: Platform) -> Floats | None:
     """Covariance (..., 3, 3) of the stated errors along the scene's axes; None if the source does not state it.
 
-    `state` is the kind of the errors, position [m²] or velocity [m²/s²]. For a platform in free fall whose errors the
-    file states in the
-    orbital frame `ric`, the velocity is relative to the stars.
+    `state` is the kind of the errors, position [m²] or velocity [m²/s²]. If a platform is in free fall and the file
+    states its errors in the orbital frame `ric`, the velocity is relative to the stars.
     """
     covariance, row, fall = stated.covariance, 3 * state.order, platform.state.fall
     if covariance is None or len(covariance) <= row:
@@ -226,7 +224,7 @@ def _stated_covariance(stated: StatedAccuracy, state: StateKind, platform: Platf
 
 
 def _declared_covariance(platform: Platform, state: StateKind) -> Floats:
-    """Covariance (..., 3, 3) of the declared errors of one kind along the scene's axes. [m²] or [m²/s²]"""
+    """Covariance (..., 3, 3) of the declared errors of one kind along the scene's axes, in [m²] or [m²/s²]."""
     error = platform.motion_error
     sizes = error.stated(state.name) or (0.0, 0.0, 0.0)
     correlation = np.eye(3).tolist() if error.covariance is None else error.covariance.block(state.name)
@@ -248,7 +246,7 @@ def _stack(rows: Sequence[Sequence[PerCase]]) -> Floats:
 def _stated_doubt(platform: Platform, name: str, state: StateKind, stated: StatedAccuracy) -> InputDoubt:
     """Describe the doubt about a path whose source states a larger error than the file declares.
 
-    The values are given along the axis with the largest difference.
+    Both errors are given along the axis on which they differ most.
     """
     error = platform.motion_error
     key = f"platforms.{name}.motion_error.{state.name if error.covariance is None else 'covariance'}"
@@ -284,13 +282,13 @@ def _stated_doubt(platform: Platform, name: str, state: StateKind, stated: State
 
 # ---------------------------------------------------------------------- the residual of a log
 def leaves_unsaid(mission: Mission, name: str) -> PerCaseFlag:
-    """Whether a log has too large a residual, while the file does not state whether the processor uses the fixes."""
+    """Whether a log's residual is too large while the file does not state which path the processor uses."""
     log = _unsaid_log(mission, name)
     return False if log is None else np.asarray(residual_phase(mission, name)) > MOST_RESIDUAL_RAD
 
 
 def residual_phase(mission: Mission, name: str) -> PerCase:
-    """Rms phase over the aperture due to the residual of a log along the line of sight; 0 without a log. [rad]"""
+    """Rms phase [rad] over the aperture that a log's residual causes along the line of sight; 0 without a log."""
     path: FlownPath | None = getattr(mission.platforms, name).path
     if path is None or path.log_noise is None:
         return 0.0
@@ -337,8 +335,8 @@ def _unsaid_log(mission: Mission, name: str) -> LogNoise | None:
 def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
     """Describe the doubt that the rounding step of a log's fixes causes.
 
-    The values are given along the axis on which the step exceeds the permitted part of the declared position error
-    most.
+    The step and the declared position error are given along one axis. It is the axis on which the step exceeds the
+    permitted part of the declared position error most.
     """
     assert platform.path is not None
     assert platform.path.log_noise is not None
@@ -376,10 +374,10 @@ def _matters(mission: Mission, name: str, state: StateKind, covariance: Floats) 
 
 
 def _range_errors(mission: Mission, name: str, state: StateKind, half: Floats) -> Sequence[Floats]:
-    """Range errors due to a unit error of a platform along each axis, at slow times −T/2, 0 and T/2.
+    """Range errors that a unit error of a platform along each axis causes at the slow times −T/2, 0 and T/2.
 
-    T is the aperture time. Each of the three arrays has the shape (..., 3). For a position error it is in [m/m], and
-    for a velocity error in [m per m/s].
+    T is the aperture time. Each of the three arrays has the shape (..., 3). Its unit is [m/m] for a position error,
+    and [m per m/s] for a velocity error.
     """
     sights = [
         np.stack(np.broadcast_arrays(*_sight(mission, name, time)), axis=-1) for time in (-half, 0.0 * half, half)
@@ -402,7 +400,7 @@ def _range_errors(mission: Mission, name: str, state: StateKind, half: Floats) -
 
 
 def _sight(mission: Mission, name: str, time: Any) -> Any:
-    """Change of range per metre of a platform's motion along each axis (x, y, z), at a given slow time. [m/m]
+    """Change of range per metre [m/m] of a platform's motion along each axis (x, y, z), at a given slow time.
 
     With a direct path, the change of the direct path's range is subtracted.
     """
@@ -420,8 +418,8 @@ def _sight(mission: Mission, name: str, time: Any) -> Any:
 def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floats:
     """Displacement on the ground per unit error along each axis, (..., 2, 3), by (25) of Rigling & Moses.
 
-    `constant` and `linear` are the range error and its rate per unit error. The rows of the result are east and
-    north.
+    `constant` and `linear` are the range error and its rate, both per unit error. The first row of the result is the
+    displacement east, the second is the displacement north.
     """
     (a, b), (c, d) = geometry.range_gradient, geometry.doppler_gradient
     determinant = np.asarray(a * d - b * c)[..., None]
@@ -458,7 +456,7 @@ MAX_MODEL_DIFFERENCE_FRACTION = (
 
 
 def model_doubt(case: Case, rows: Sequence[Row]) -> Note:
-    """Name the declared error for which the published model is least valid; empty if it is valid for all.
+    """Name the declared error for which the published model is least accurate; empty if it is accurate for all.
 
     The note names the row whose utilizations by the two models differ most.
 
@@ -488,7 +486,7 @@ def _is_apart(row: Row) -> bool:
 
 
 def _difference(row: Row) -> float:
-    """Difference between the utilizations of a row under the published and the full model."""
+    """Absolute difference between the utilizations of a row by the published and by the full model."""
     declared, limits = row.declared or 0.0, (row.allowable_published, row.allowable_full)
     published, full = (0.0 if limit is None else declared / limit for limit in limits)
     return abs(published - full)
@@ -499,7 +497,10 @@ _TURNING_RAD = 0.1  # half the rotation of a line of sight at which the quartic 
 
 
 def missing_settings(mission: Mission) -> list[str]:
-    """List the keys of the errors that clocks in holdover need and that `synchronization` does not give."""
+    """List the keys, `time_error` or `frequency_error`, that clocks in holdover need and the file lacks.
+
+    They are keys of `synchronization`. The list is empty if the clocks are not in holdover.
+    """
     sync = mission.synchronization
     if sync is None or not sync.is_holdover:
         return []

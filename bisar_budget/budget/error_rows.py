@@ -51,7 +51,7 @@ class ErrorRows:
     analysis : Analysis
         Analysis of the cases.
     limits : mapping of str to (cases,)
-        Limit on the quadratic phase of each owner, gain of autofocus included. [rad]
+        Limit on the quadratic phase of each owner, including the autofocus gain. [rad]
     """
 
     def __init__(self, judging: Judging, analysis: Analysis, limits: Mapping[str, Floats]) -> None:
@@ -60,7 +60,10 @@ class ErrorRows:
         self.is_of_sums = analysis.is_of_sums
 
     def rows(self, gating: str) -> Iterator["ErrorRow"]:
-        """Yield the rows under one gating model. The result of the other model may turn a pass into a warning."""
+        """Yield the rows of these errors under one gating model.
+
+        A row that passes by the gating model becomes a warning if the other model fails it.
+        """
         for block_index in range(len(self.errors.blocks)):
             yield from self._of_block(block_index, gating)
 
@@ -111,7 +114,10 @@ class ErrorRows:
 def _is_over(
     does: Declared, gain: PerCase, limits: tuple[Floats, float | None, float | None], is_motion: PerCaseFlag
 ) -> PerCaseFlag:
-    """Decide whether any effect of the declared errors exceeds its limit, (errors, cases)."""
+    """Decide for each error whether any of its effects exceeds its limit, (errors, cases).
+
+    The effects are the quadratic phase, the cubic phase and the displacement.
+    """
     limit, cubic, location = limits
     is_over = does.judged(gain) / limit > LIMIT_RATIO
     if cubic is not None:
@@ -123,7 +129,7 @@ def _is_over(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ErrorRow(FamilyRow):
-    """The row of one error, for an array of cases; `limit` is the limit on its quadratic phase [rad]."""
+    """The budget row of one error, for an array of cases; `limit` is the limit on its quadratic phase [rad]."""
 
     source: ErrorSource
     limit: Floats
@@ -172,7 +178,7 @@ class ErrorRow(FamilyRow):
 
 # ---------------------------------------------------------------------- in words
 def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Declared, limit: float) -> Note:
-    """Write the reason why the row fails, with the requirement that the declared error exceeds."""
+    """Write the reason why a row fails, with the requirement that the declared error exceeds."""
     requirements, binding = case.mission.requirements, row.requirement(case)
     if binding == END_OF_IMAGE:
         return phrases.note("beyond-the-image", end=case.number(row.allowable), unit=source.unit)
@@ -190,7 +196,7 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
 
 
 def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
-    """Write the reason why the model that does not gate fails the declared error; empty if it does not."""
+    """Write the reason why the model that does not gate fails the declared error; empty if that model passes it."""
     needs, theirs = case.mission.requirements, case.does(other, source)
     uses = [(float(theirs.judged(case.allocation.autofocus_gain)), limit, QUADRATIC)]
     if source.is_motion and needs.cubic_phase_error is not None:
@@ -208,7 +214,7 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
 
 
 def _cause(source: ErrorSource) -> Note:
-    """Name the effect of an error that only the full model takes into account."""
+    """Name the effect of an error that the full model takes into account and the published model does not."""
     if source.kind.direction:  # terrain
         return phrases.note("wrong-height-defocuses")
     if source.unit == "m":

@@ -1,4 +1,4 @@
-"""Warnings about a mission file: functions that decide when to warn. The sentences are in `phrases`.
+"""Decides which warnings about a mission file are given. The sentences of the warnings are in `phrases`.
 
 Most warnings do not change the verdict. A warning that casts doubt on the checked mission sets the status to at least
 `warn`. Each function yields a sentence and the key to which it refers. `file_warnings` finds the line of the key in
@@ -33,7 +33,7 @@ _MIN_ORBIT_SPEED_MPS = 100.0  # over the ground, of satellites above 100 km that
 
 
 class _Warned(NamedTuple):
-    """A sentence and the key of the file to which it refers; None if it refers to the whole file."""
+    """A warning: its sentence, and the key of the file to which it refers; None if it refers to the whole file."""
 
     key: KeyPath | None
     message: Note
@@ -98,7 +98,7 @@ def _nothing_declared(rows: Sequence[Row]) -> Iterator[_Warned]:
 
 # ---------------------------------------------------------------------- how platforms fly
 def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings of possibly inaccurate paths that no row reports.
+    """Yield warnings of paths that may be inaccurate, if no row already reports the doubt.
 
     Doubts about the position and about the residual of a log are treated separately.
     """
@@ -118,7 +118,7 @@ def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
 
 
 def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings of logs whose noise changes the allowables, because the path is fitted to the log."""
+    """Yield warnings of logs whose noise changes the allowables noticeably, because the path is fitted to the log."""
     for name in PLATFORMS:
         noise = allowable_noise(mission, name)
         if noise is not None and noise.change > MAX_UNSAID_CHANGE_FRACTION:
@@ -127,11 +127,11 @@ def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
 
 
 def straight_orbits(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings of platforms that move like a satellite but have no `acceleration`, with the value to add.
+    """Yield warnings of platforms that move like a satellite but have no `acceleration`.
 
-    A platform moves like a satellite if it is as fast or as high as one. Over an aperture time T, a missing
-    acceleration a moves the true path away from the straight path by aT²/8, for example 25 m in 5 s. There is no
-    warning if the file states an acceleration, including zero.
+    The warning gives the acceleration to add. A platform moves like a satellite if it is as fast or as high as one.
+    Over an aperture time T, a missing acceleration a moves the true path away from the straight path by aT²/8, for
+    example 25 m in 5 s. There is no warning if the file states an acceleration, including zero.
     """
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
@@ -153,7 +153,11 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
 
 # ---------------------------------------------------------------------- how errors are stated
 def _of_instruments(case: Case) -> Iterator[_Warned]:
-    """Yield warnings of rare exchanges of pulses, of missing clock errors, and of errors that are stated twice."""
+    """Yield warnings about synchronisation, and warnings of errors that are stated twice.
+
+    The warnings about synchronisation concern pulses that are exchanged less than once per aperture, and clock errors
+    that the file does not give.
+    """
     mission, sync = case.mission, case.mission.synchronization
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
@@ -191,7 +195,7 @@ def _of_calm_oscillators(mission: Mission) -> Iterator[_Warned]:
 
 
 def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
-    """Yield warnings of doubtful oscillator noise that no row reports, because no requirement depends on it."""
+    """Yield warnings of doubtful oscillator noise that no row reports, since no requirement depends on it."""
     for name in PLATFORMS:
         for key, sentence in noise_doubts(mission, name):
             if not any(row.reason is not None and row.reason.includes(sentence) for row in rows):
@@ -199,7 +203,7 @@ def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned
 
 
 def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings of correlations between errors that are not used, because `combine: each` forms no sums."""
+    """Yield warnings of correlations between errors that have no effect, because `combine: each` forms no sums."""
     for name in PLATFORMS if mission.allocation.combine == "each" else ():
         covariance = getattr(mission.platforms, name).motion_error.covariance
         if covariance is not None and covariance.has_correlations():
@@ -211,7 +215,7 @@ def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
 
 # ---------------------------------------------------------------------- autofocus
 def _of_autofocus(mission: Mission, resolution: Resolution) -> Iterator[_Warned]:
-    """Yield warnings if `autofocus.n_pull` is larger than range walk or the size of the scene permits."""
+    """Yield warnings of an `autofocus.n_pull` that is larger than range walk or the size of the scene permits."""
     n_pull, algorithm, radius = mission.autofocus.n_pull, mission.autofocus.algorithm, mission.scene.radius
     if n_pull is None:
         return

@@ -1,9 +1,9 @@
-"""Changes of the allowables that the noise of a log causes, because the path is fitted to the log.
+"""Changes of the allowables due to the noise of a log to which a platform's path is fitted.
 
-The allowable of a position or velocity error depends on how the line of sight to the platform rotates. A fit to a
-noisy log has an error at each time of the aperture, and therefore each allowable has an error too. The error of the
-fit is a sum of independent modes along each axis. Each mode is added to the path with plus and minus one sigma, and
-the resulting changes are combined as a root-sum-square.
+The allowable of a position or velocity error depends on how the line of sight to the platform rotates. A path fitted
+to a noisy log has an error at each time of the aperture, and therefore each allowable has an error too. The error of
+the fit is a sum of independent modes along each axis. Each mode is added to the path with plus and minus one sigma,
+and the resulting changes of an allowable are combined as a root-sum-square.
 """
 
 from dataclasses import dataclass, replace
@@ -27,10 +27,11 @@ _DECISIVE_EFFECT_FRACTION = (
 
 @dataclass(frozen=True)
 class AllowableNoise:
-    """The allowable that changes most due to the noise of the fit to a platform's log.
+    """The allowable that changes most due to the noise of the log to which a platform's path is fitted.
 
     `acceleration` is one sigma of the error of the path's acceleration along the line of sight at mid-aperture
-    [m/s²]. `change` is one sigma of the relative change of the allowable. `row_id` is the row of the allowable.
+    [m/s²]. `change` is one sigma of the relative change of the allowable. `row_id` is the id of the row with the
+    allowable.
     """
 
     acceleration: float
@@ -39,9 +40,9 @@ class AllowableNoise:
 
 
 def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
-    """Find the allowable that changes most due to the noise of one platform's fit; None without a fit.
+    """Find the allowable that changes most due to the noise of one platform's log; None without a fitted path.
 
-    The allowables are those of the position and velocity errors of both platforms.
+    The allowables of the position and velocity errors of both platforms are examined.
     """
     platform: Platform = getattr(mission.platforms, name)
     path = platform.path
@@ -85,8 +86,8 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
 def _changes(units: Floats) -> Floats:
     """One sigma of the relative change of each allowable, (platforms, axes).
 
-    `units` (platforms, axes, sides) holds the effects per unit of each error: for the path itself, for the path plus
-    each mode, and for the path minus each mode.
+    `units` (platforms, axes, sides) holds the quadratic phase per unit of each error. Along `sides` come the path
+    itself, the path plus each mode of the fit's error, and the path minus each mode.
     """
     here = units[..., 0]
     with np.errstate(all="ignore"):

@@ -1,9 +1,9 @@
 """Causes of error of which the file states only one half. Rows that depend on such a cause are not evaluated.
 
-Without this rule, a failing mission could pass after the worse half of a cause is deleted from its file. The checks
-of the file do not require both halves for two kinds of cause. The first is a pair of clocks, which needs both
-oscillators. The second is the vibration that an oscillator feels: if the airframe has tones and noise,
-`oscillator.vibration` needs both, but may state only one of them.
+Without this rule, a failing mission could pass after the worse half of a cause is deleted from its file. For two
+kinds of cause, the checks of the file do not require both halves. The first is a pair of clocks, whose halves are the
+two oscillators. The second is the vibration that an oscillator feels, whose halves are tones and noise. If the
+airframe has both, `oscillator.vibration` needs both too, but the file may state only one of them.
 """
 
 from collections.abc import Iterator
@@ -21,16 +21,16 @@ _HOLD_CLOCKS = (*_HOLD_NOISE, "location_error")
 
 @dataclass(frozen=True)
 class HalfCause:
-    """A cause of error of which the file states only one half.
+    """A cause of error that needs two statements of the file, of which the file gives only one.
 
     Attributes
     ----------
     platforms : tuple of str
-        Platforms whose oscillators the file states.
+        Platforms with a stated oscillator that the cause affects.
     requirements : tuple of str
         Keys of the requirements that limit the effects of the cause.
     note : Note
-        Note with the key to add to the file.
+        Note that names the key to add to the file.
     """
 
     platforms: tuple[str, ...]
@@ -38,7 +38,11 @@ class HalfCause:
     note: Note
 
     def holds(self, subject: Subject) -> bool:
-        """Whether a row depends on the cause: the row of a stated oscillator, or a sum of the mission."""
+        """Whether a row depends on the cause.
+
+        This holds for the rows of a stated oscillator, and for the mission's rows of the requirements that limit the
+        cause.
+        """
         if subject.id in [f"mission.{key}" for key in self.requirements]:
             return True
         return subject.owner in self.platforms and subject.id.startswith(f"{subject.owner}.oscillator")
@@ -69,9 +73,10 @@ def half_causes(mission: Mission) -> Iterator[HalfCause]:
 
 
 def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
-    """Yield the clocks of which the file states no oscillator, or only one of two.
+    """Yield pairs of clocks for which the file states no oscillator, or only one of the two.
 
-    This concerns clocks in holdover, and clocks that exchange pulses if one oscillator is stated.
+    In holdover, both oscillators must be stated. If the clocks exchange pulses, a missing oscillator matters only if
+    the other one is stated.
     """
     sync = mission.synchronization
     stated = tuple(name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is not None)
@@ -91,11 +96,14 @@ def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
 
 
 def _required(mission: Mission, keys: tuple[str, ...]) -> tuple[str, ...]:
-    """Select the keys whose requirements the file states."""
+    """Select those of the keys for which the file states a requirement."""
     return tuple(key for key in keys if getattr(mission.requirements, key) is not None)
 
 
 def half_cause_of(mission: Mission, key: str) -> Note:
-    """Name the key to add if a requirement depends on a cause that is only half stated; empty otherwise."""
+    """Name the key to add if a requirement depends on a cause of which the file states only one half.
+
+    The note is empty if the requirement depends on no such cause.
+    """
     notes = [half.note for half in half_causes(mission) if key in half.requirements]
     return notes[0].then(*notes[1:]) if notes else NOTHING

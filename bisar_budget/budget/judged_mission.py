@@ -1,8 +1,8 @@
-"""All rows and requirements of a mission, judged for an array of cases. The check of one mission is a single case.
+"""Judges all rows and requirements of a mission, for an array of cases. The check of one mission is a single case.
 
-Each family of rows is judged by every gating model. With two models, the stricter verdict is used. Judgements that
-need more than one row follow: required declarations, inaccurate paths, effects that no requirement covers, and
-waivers.
+Each family of rows is judged by every gating model. With two models, the stricter verdict is used. Then follow the
+judgements that need more than one row. They concern required declarations, inaccurate paths, effects that no
+requirement covers, and waivers.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -55,11 +55,11 @@ _OWNERS = (*PLATFORMS, "clock", "mission")
 
 @dataclass(frozen=True, eq=False)
 class JudgedMission:
-    """The result of judging a mission for an array of cases.
+    """The verdicts on a mission, for an array of cases.
 
-    `rows` are the rows after waivers, in the order of the JSON output. `before` are the same rows before waivers.
-    Their field `why` gives the reason if the numbers of a row do not decide its status. `families` holds the rows of
-    each gating model before the models are merged.
+    `rows` are the rows after waivers, in the order of the JSON output. `before` are the same rows before waivers. The
+    field `why` of a row gives the reason for its status if the numbers of the row do not decide it. `families` holds
+    the rows of each gating model, before the rows of both models are merged.
     """
 
     analysis: Analysis
@@ -77,7 +77,7 @@ class JudgedMission:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no case declares an error, so that nothing was judged."""
+        """Whether no error is declared in any case, so that nothing was judged."""
         nothing = (
             row.metric in (DECLARE, SPECIFICATION)
             or np.all((row.status == CODE["not_declared"]) | (row.why == Why.NOT_DECLARED_AS_REQUIRED))
@@ -86,10 +86,10 @@ class JudgedMission:
         return all(nothing)
 
     def covering(self, row_id: str | None = None) -> Iterator[tuple[str, Booleans]]:
-        """Yield the id of each waiver, with a mask of the cases in which it covers something.
+        """Yield the id of each waiver, with a mask of the cases in which it covers a row or a requirement.
 
-        The waivers are in the order of the file. With `row_id`, only the cases are marked in which the waiver covers
-        this row.
+        The waivers are in the order of the file. With `row_id`, the mask marks only the cases in which the waiver
+        covers this row.
         """
         rows = [row_id is None or row.subject.id == row_id for row in self.rows]
         requirements = self.waived_requirements if row_id is None else ()
@@ -99,7 +99,10 @@ class JudgedMission:
 
     @cached_property
     def status(self) -> Codes:
-        """Status of the mission in each case: the worst gating status of its rows, or `floor` if that is worse."""
+        """Status of the mission in each case, (cases,).
+
+        It is the worst of those row statuses that count in the verdict of a mission, or `floor` if that is worse.
+        """
         codes = np.array([row.status for row in self.rows])
         worst = np.where(_GATES[codes], codes, CODE["pass"]).min(axis=0)
         return np.asarray(np.minimum(worst, self.floor), dtype=np.int8)
@@ -209,9 +212,9 @@ class _Judgement:
         yield from specification_rows(self.judging, self.analysis)
 
     def _rows(self, model: str, families: Sequence[FamilyRow]) -> dict[str, Judged]:
-        """Collect the rows of a model by id, without rows that exist in no case.
+        """Collect the rows of one model by their ids; rows that exist in no case are omitted.
 
-        Different families may give the same row in different cases. These are merged into one row.
+        Different families may contain the same row in different cases. The parts are merged into one row.
         """
         rows: dict[str, Judged] = {}
         by_model = np.full(self.cases, MODELS.index(model), np.int8)
@@ -234,7 +237,7 @@ class _Judgement:
 
     @cached_property
     def _limits(self) -> Mapping[str, Floats]:
-        """Limit on the quadratic phase of each owner, including the autofocus gain, (cases,). [rad]"""
+        """Limit on the quadratic phase [rad] of each owner, (cases,), including the autofocus gain."""
         allocation = self.analysis.allocation
         return {owner: self.judging.array(allocation.qpe_allowed(owner)) for owner in _OWNERS}
 
@@ -268,11 +271,14 @@ class _Judgement:
     # ---------------------------------------------------------------- judgements beyond single rows
     @cached_property
     def _in_doubt(self) -> dict[tuple[str, StateKind | None], Booleans]:
-        """Masks of the cases with a path that may be less accurate than declared, by platform and kind of error."""
+        """Masks of the cases in which a path may be less accurate than declared, by platform and kind of error."""
         return doubted_platforms(self.mission, self.cases)
 
     def _undeclared(self, judged_rows: Mapping[str, Judged]) -> Iterator[Judged]:
-        """Yield rows for errors that no case declares: rows that are always shown, and rows of inaccurate paths."""
+        """Yield rows for errors that no case declares.
+
+        These are rows that are always shown, and rows of errors whose path may be less accurate than declared.
+        """
         subjects = dict(self.shown or {})
         for (name, state), is_doubtful in self._in_doubt.items():
             if state is None or not is_doubtful.any():  # the residual of a log has its own rows
@@ -293,7 +299,7 @@ class _Judgement:
     def _has_noise(self) -> Booleans:
         """Find the cases that declare an error that spreads power, or a tone that ISLR limits, (cases,).
 
-        The phase of a motion error beyond the cubic term spreads power if it is not negligible.
+        A motion error spreads power if the part of its phase beyond the cubic term is not negligible.
         """
         array, gates = self.judging.array, self.analysis.gates
         level = negligible_rad(self.mission)
@@ -306,7 +312,7 @@ class _Judgement:
         return np.asarray(np.any([np.zeros(self.cases, bool), *has_any], axis=0))
 
     def _doubted_rows(self, rows: Sequence[Judged]) -> Booleans:
-        """Find the rows of oscillators with doubtful noise, (rows, cases)."""
+        """Mark the rows of oscillators with doubtful noise, (rows, cases)."""
         doubted = {error.id: error.is_in_doubt for error in self.analysis.random if np.any(error.is_in_doubt)}
         in_doubt = np.zeros((len(rows), self.cases), dtype=bool)
         for row_index, row in enumerate(rows) if doubted else ():
@@ -314,10 +320,10 @@ class _Judgement:
         return in_doubt
 
     def _floor(self) -> Codes:
-        """Return the best possible status of each case, (cases,).
+        """Return the best status that each case can have, (cases,).
 
-        It is `warn` if the input casts doubt on a path, an oscillator or a lever arm, `not_evaluated` if no error is
-        declared, and `pass` otherwise.
+        It is `not_evaluated` if no error is declared. It is `warn` if a path, an oscillator or a lever arm of the
+        file is doubtful. Otherwise it is `pass`.
         """
         floor, analysis = np.full(self.cases, CODE["pass"]), self.analysis
         for name, path in zip(PLATFORMS, analysis.geometry.both, strict=True):
@@ -339,7 +345,7 @@ class _Judgement:
 
 
 class RowStatuses:
-    """Statuses of rows, (rows, cases), and the reasons for status changes that depend on more than one row.
+    """Statuses of rows, (rows, cases), and reasons for changes of a status that do not follow from the row alone.
 
     Each method sets some rows to `not_evaluated`. A row that fails keeps the status `fail`.
     """
@@ -359,9 +365,10 @@ class RowStatuses:
         self.why = np.where(are_settled, np.int8(why), self.why)
 
     def require_declarations(self, geometry: BistaticGeometry) -> None:
-        """Set the rows of required errors that are not declared to `not_evaluated`.
+        """Set the rows of errors that the mission must declare, but does not declare, to `not_evaluated`.
 
-        The first row, which stands for all required declarations, becomes `not_evaluated` if any is missing.
+        The first row stands for all required declarations. It becomes `not_evaluated` if any of them is missing, and
+        `pass` otherwise.
         """
         if not self.mission.requirements.declare:
             return
@@ -376,17 +383,16 @@ class RowStatuses:
             self._settle(owed, cases & (self.status == CODE["not_declared"]), Why.NOT_DECLARED_AS_REQUIRED)
 
     def doubt_inputs(self, in_doubt: Mapping[tuple[str, StateKind | None], Booleans]) -> None:
-        """Set the rows of errors to `not_evaluated` if the path may be less accurate than the file declares."""
+        """Set rows of path errors to `not_evaluated` where the path may be less accurate than declared."""
         for (name, state), is_doubtful in in_doubt.items():
             if is_doubtful.any():
                 owed = [is_in_doubt(row_subject, name, self.mission, state) for row_subject in self.subjects]
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
     def doubt_air(self, doubted: Mapping[str, Booleans]) -> None:
-        """Set the given rows to `not_evaluated` in the given cases.
+        """Set rows that depend on atmospheric delays assumed as constant to `not_evaluated`.
 
-        These rows depend on atmospheric delays that are assumed to be constant. `doubted` maps row ids to masks,
-        (cases,).
+        `doubted` maps row ids to masks of the cases to set, (cases,).
         """
         for row_id, is_doubted in doubted.items():
             if is_doubted.any():
@@ -395,10 +401,10 @@ class RowStatuses:
                 self._settle(rows, is_doubted & self._is_open & is_new, Why.AIR_STAYS)
 
     def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
-        """Set rows to `not_evaluated` if they contribute to an effect that no requirement limits.
+        """Set rows to `not_evaluated` if they cause an effect that no requirement limits.
 
-        A row that passes because it has no limit judges nothing. If its effect is negligible, its status becomes
-        `info`.
+        A row whose contribution to such an effect is negligible, and which passes only because it has no limit, gets
+        the status `info`.
         """
         for row_index, row in enumerate(self.rows):
             row_id, status = row.subject.id, self.status[row_index]
@@ -416,7 +422,10 @@ class RowStatuses:
             self.why[row_index] = np.where(makes_up, np.int8(Why.EFFECT_NOT_TAKEN), self.why[row_index])
 
     def judge_place(self, is_misplaced: Booleans) -> None:
-        """Set the location row to `not_evaluated` if an error displaces the image by an amount that no row limits."""
+        """Set the row of the location requirement to `not_evaluated` where the displacement of the image is unknown.
+
+        It is unknown if an error displaces the image by an amount that no row limits.
+        """
         if self.mission.requirements.location_error is not None:
             rows = [row_subject.id == f"mission.{LOCATION}" for row_subject in self.subjects]
             self._settle(rows, is_misplaced & self._is_open, Why.NO_PLACE)
@@ -438,9 +447,10 @@ class RowStatuses:
         return np.asarray((self.status != CODE["fail"]) & (self.status != CODE["not_declared"]))
 
     def waivers(self, today: date) -> NDArray[np.intp]:
-        """Find the first valid waiver that covers each broken row; -1 if there is none, (rows, cases).
+        """Find the first valid waiver that covers each broken row, (rows, cases).
 
-        The result is the index of the waiver in the file. A row is broken if it fails or is not evaluated.
+        The result is the index of the waiver in the file, or -1 if no waiver covers the row. A row is broken if it
+        fails or is not evaluated.
         """
         indices = np.full(self.status.shape, -1)
         if not self.mission.waivers:
@@ -454,7 +464,7 @@ class RowStatuses:
         return np.where(np.isin(self.status, _BROKEN_CODES), indices, -1)
 
     def judges(self) -> Codes:
-        """Find the requirement that judges each row, as an index in `REQUIREMENT_KEYS`, (rows, cases).
+        """Find the requirement that judges each row, (rows, cases), as an index in `REQUIREMENT_KEYS`.
 
         The index is -1 for a row that no requirement judges, and for a required error that is not declared.
         """
@@ -466,7 +476,10 @@ class RowStatuses:
         return np.where(self.why == Why.NOT_DECLARED_AS_REQUIRED, -1, judges).astype(np.int8)
 
     def rows_with(self, status: Codes) -> tuple[Judged, ...]:
-        """Return the rows with the given statuses (rows, cases). A row that has become `info` has no utilization."""
+        """Return the rows with the statuses `status`, (rows, cases).
+
+        A row whose status has become `info` has no utilization.
+        """
         becomes_info = (status == CODE["info"]) & (np.array([row.status for row in self.rows]) != status)
         utilizations = np.where(becomes_info, np.nan, np.array([row.utilization for row in self.rows]))
         changes = zip(self.rows, status, self.why, utilizations, strict=True)

@@ -1,16 +1,16 @@
-"""Judges every requirement from its rows, the effects that no requirement covers, and the declared errors.
+"""Judges each requirement from its rows, from effects that no requirement covers, and from the declared errors.
 
 The exit code 0 of a check means that every requirement was judged and is met. Each effect of each declared error is
 judged once:
 
 - quadratic phase: by the quadratic requirement;
-- cubic phase: by the cubic requirement, or by ISLR if there is none;
+- cubic phase: by the cubic requirement, or by ISLR without a cubic requirement;
 - power that spreads: by ISLR;
-- a tone: by PSLR, or by ISLR if there is none;
+- a tone: by PSLR, or by ISLR without a required PSLR;
 - displacement: by the location requirement.
 
-An effect that no requirement covers is negligible if its total is below a tenth of the quadratic requirement and
-below 0.08 rad. Otherwise the rows that cause it are `not_evaluated`.
+An effect that no requirement covers is negligible if its total is below 0.08 rad and below a tenth of the quadratic
+requirement. Otherwise the rows that cause it are `not_evaluated`.
 
 All numbers are arrays over n cases, (n,). The check of one mission is a single case.
 """
@@ -49,9 +49,10 @@ IS_MET = np.array([*(status.complies for status in STATUS.values()), False])
 class UntakenEffect(NamedTuple):
     """An effect that no requirement covers, for an array of cases, and the rows that cause it.
 
-    `total` is the effect of all errors together [rad], and `parts` gives the magnitude of each error's effect [rad]
-    by row id. `is_negligible` marks the cases with a small total. `makers` marks, by row id, the rows that cause the
-    effect in the cases with a large total. Each of these rows has an effect of at least `least` [rad].
+    `total` is the effect of all errors together [rad]. `parts` maps row ids to the magnitude of each error's effect
+    [rad]. `is_negligible` marks the cases in which the total is small but not zero. `makers` maps row ids to masks of
+    the cases in which the total is large and the row is one of its causes. Each of these rows has an effect of at
+    least `least` [rad].
     """
 
     effect: str  # cubic, spread or tone
@@ -66,10 +67,10 @@ class RequirementState(NamedTuple):
     """A judged requirement for an array of cases: its status, the rows that judge it, and the row that decides it.
 
     `decider` is the index of the row that decides the status, or -1. `user` is the index of the row that gives the
-    `utilization` of the requirement, or -1. If the requirement is met, with or without a warning, this is the row
-    with the largest utilization. It may differ from the row that decides, because a warning that only the second
-    model causes may come with a smaller utilization. `is_unjudged` marks the cases in which the requirement cannot be
-    judged, whether it is waived or not.
+    `utilization` of the requirement, or -1. If the requirement is met, with or without a warning, `user` is the row
+    with the largest utilization. It may differ from `decider`, because the row with a warning by the second model
+    alone may have a smaller utilization. `is_unjudged` marks the cases in which the requirement cannot be judged,
+    whether it is waived or not.
     """
 
     key: str
@@ -82,7 +83,7 @@ class RequirementState(NamedTuple):
 
 
 def first_highest(uses: Floats) -> NDArray[np.intp]:
-    """Find the row with the highest utilization in each case, as an index, (cases,).
+    """Index of the row with the highest utilization in each case, (cases,).
 
     If several rows are equal except for rounding, the first of them is returned.
     """
@@ -90,18 +91,18 @@ def first_highest(uses: Floats) -> NDArray[np.intp]:
 
 
 def is_as_high(uses: PerCase, other_uses: PerCase) -> Booleans:
-    """Whether `uses` are at least as high as `other_uses`, except for rounding."""
+    """Whether the utilizations `uses` are at least as high as `other_uses`, except for rounding."""
     with np.errstate(invalid="ignore"):  # infinite utilizations are equal, but their difference is NaN
         return np.asarray((uses >= other_uses - EQUAL_USE_FRACTION * np.abs(other_uses)) | (uses == other_uses))
 
 
 def negligible_rad(mission: Mission) -> PerCase:
-    """Total phase below which an effect that no requirement covers is negligible. [rad]"""
+    """Total phase [rad] below which an effect that no requirement covers is negligible."""
     return np.minimum(NEGLIGIBLE_FRACTION * np.asarray(mission.requirements.quadratic_phase_error), SMALL_RAD)
 
 
 def required_keys(mission: Mission) -> tuple[str, ...]:
-    """List the keys of the requirements of a mission, including the quadratic phase, which has a default."""
+    """List the keys of the requirements that a mission states, with the quadratic phase, which has a default."""
     needs = mission.requirements
     return tuple(
         key for key in REQUIREMENT_KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None)
@@ -127,29 +128,29 @@ def requirement_states(
     Parameters
     ----------
     mission : Mission
-        Numbers may be arrays (n,).
+        Mission whose numbers may be arrays (n,).
     codes : (rows, n)
         Statuses of the judged rows; `waived` for waived rows.
     utilization : (rows, n)
-        Utilizations of the rows; NaN without a value.
+        Utilizations of the rows; NaN for a row without a utilization.
     judges : (rows, n)
         Index in `REQUIREMENT_KEYS` of the requirement that judges each row; -1: no requirement.
     quadratic_use : (rows, n)
-        Quadratic phase of each row divided by its limit, for any requirement that sets the allowable; NaN without a
+        Quadratic phase of each row divided by its limit, whichever requirement sets the allowable; NaN without such a
         phase.
     waived : mapping of str to bool
-        Keys of the requirements that a valid waiver names.
+        For each requirement key, whether a valid waiver names the requirement.
     before : (rows, n)
         Statuses of the rows before waivers.
     in_doubt : (rows, n)
-        Rows of oscillators with doubtful noise: the computed noise may differ from the noise of the oscillator.
+        Whether each row belongs to an oscillator whose true noise may differ from the computed noise.
     has_noise : (n,) bool
         Whether an error that spreads power, or a tone that ISLR limits, is declared. Otherwise ISLR is not judged.
     is_misplaced : (n,) bool
         Whether a declared error displaces the image by an amount that no row limits.
     unjudged : mapping of str to bool or (n,) bool
-        Keys of the requirements that are not evaluated, with the cases: they depend on delays taken as constant in a
-        long aperture, or on a cause of which the file states only one half.
+        For each requirement key, whether the requirement is not evaluated. It then depends on delays assumed as
+        constant in a long aperture, or on a cause of which the file states only one half.
     """
     uses, states = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     is_open = before == RANK["not_evaluated"]

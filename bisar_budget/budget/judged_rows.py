@@ -1,4 +1,4 @@
-"""One row of the budget for an array of cases, and the rules that judge it.
+"""One row of the budget, judged for an array of cases, and the rules that judge it.
 
 The check of one mission is a single case.
 """
@@ -60,12 +60,12 @@ IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # 
 
 
 def statuses(codes: Codes | np.int8) -> Any:
-    """Convert the code of a status to its name. An array of codes gives an array of names."""
+    """Convert a status code to the name of the status, or an array of codes to an array of names."""
     return _STATUS_NAMES[codes]
 
 
 class Why(IntEnum):
-    """Reason for the status of a row if the row's own numbers do not decide it."""
+    """Reason for the status of a row, if the numbers of the row do not decide the status."""
 
     OWN = 0  # no reason: the row's own numbers decide
     NOT_DECLARED_AS_REQUIRED = 1
@@ -78,10 +78,10 @@ class Why(IntEnum):
 
 
 class Judged(NamedTuple):
-    """One row of the budget for an array of cases: codes of statuses (indices in `STATUS`) and numbers, (cases,).
+    """One row of the budget for an array of cases: its status codes (indices in `STATUS`) and its numbers, (cases,).
 
-    A number is NaN where it does not exist. Numbers from `allowable_published` on are computed only for complete rows
-    (`Judging.is_complete`).
+    A number is NaN where it does not exist. The numbers from `allowable_published` on are computed only if
+    `Judging.is_complete` is set.
     """
 
     subject: Subject
@@ -106,7 +106,7 @@ class Judged(NamedTuple):
 
     @classmethod
     def of_none(cls, row_subject: Subject, cases: int) -> "Judged":
-        """Create a row that no case declares."""
+        """Create the row of an error that no case declares."""
         status = np.full(cases, RANK["not_declared"], np.int8)
         return cls._with(row_subject, status, *(np.full(cases, math.nan) for _ in range(3)))
 
@@ -134,22 +134,22 @@ class Judged(NamedTuple):
         return self._replace(**columns)
 
     def in_decibel(self) -> "Judged":
-        """Return the row with its sizes converted to decibels. The utilization remains a ratio of amplitudes."""
+        """Return the row with its sizes converted from amplitudes to decibels.
+
+        The utilization remains a ratio of amplitudes.
+        """
         return self._of_columns(decibels, IN_UNIT)
 
     def in_unit(self, factor: PerCase) -> "Judged":
-        """Return the row in another unit. Each size is multiplied by `factor`."""
+        """Return the row in another unit, with each of its sizes multiplied by `factor`."""
         return self._of_columns(lambda column: column * factor, IN_UNIT)
 
     def held_to(self, key: str) -> "Judged":
-        """Return the row with the requirement `key` as its metric.
-
-        This requirement then sets the allowable in every case.
-        """
+        """Return the row with the requirement `key` as its metric and as the requirement that sets its allowable."""
         return self._replace(metric=key, binding=np.full_like(self.binding, REQUIREMENTS.index(key)))
 
     def allowable_by(self, model: str) -> Floats:
-        """Return the allowable by the model `model`, which need not be the gating model."""
+        """Return the allowable by one of the models, `published` or `full`, whether this model gates or not."""
         return self.allowable_published if model == "published" else self.allowable_full
 
     def requirement(self, case: Case) -> str | None:
@@ -164,12 +164,15 @@ class Judged(NamedTuple):
 
     @property
     def qpe_exact_rad(self) -> Floats:
-        """Quadratic phase computed from exact ranges; NaN for a row whose error is not computed from them. [rad]"""
+        """Quadratic phase [rad] computed from exact ranges; NaN for a row that is not computed from exact ranges."""
         return self.qpe_full_rad if self.is_of_ranges else np.full(self.qpe_full_rad.shape, math.nan)
 
     @property
     def margin(self) -> Floats:
-        """Allowable divided by the declared size, minus one. For a row in decibels, both are amplitudes."""
+        """Allowable divided by the declared size, minus one.
+
+        For a row in decibels, both are converted to amplitudes first.
+        """
         with np.errstate(all="ignore"):
             margin = 1 / self.utilization - 1
         margin[~np.isfinite(margin)] = math.nan
@@ -186,9 +189,10 @@ def decibels(amplitude: PerCase) -> Floats:
 
 
 class Judging(NamedTuple):
-    """Rules that judge rows, for a number of `cases`. A utilization above `warn_above` turns a pass into a warning.
+    """Settings by which rows are judged: the number of `cases`, and the utilization that gives a warning.
 
-    If `is_complete` is set, all numbers of each row are computed, otherwise only the numbers that decide the status.
+    A utilization above `warn_above` turns a pass into a warning. If `is_complete` is set, all numbers of each row are
+    computed. Otherwise only the numbers that decide the status are computed.
     """
 
     cases: int
@@ -211,16 +215,16 @@ class Judging(NamedTuple):
         is_unknown: PerCaseFlag = False,
         never_fails: bool = False,
     ) -> Judged:
-        """Judge a row in each case, by the first rule that applies.
+        """Judge a row in each case; the first rule that applies gives the status.
 
         The rules are applied in this order:
 
         - the error is not declared: `not_declared`;
         - `is_info` is true: `info`;
         - `is_unknown` is true, because the declared value cannot be judged: `not_evaluated`;
-        - the utilization exceeds the limit: `fail`, or `warn` if the row `never_fails`;
+        - the utilization exceeds 1: `fail`, or `warn` if `never_fails` is set;
         - `doubt` is true: `warn`;
-        - the utilization without autofocus exceeds the limit: `pass_with_autofocus`;
+        - the utilization without autofocus exceeds 1: `pass_with_autofocus`;
         - the utilization exceeds `warn_above`: `warn`;
         - otherwise: `pass`.
 
@@ -261,9 +265,9 @@ class Judging(NamedTuple):
 # ---------------------------------------------------------------------- one case in words
 @dataclass(frozen=True, slots=True, eq=False)
 class FamilyRow(ABC):
-    """Base class of the rows of a family, judged by one model for an array of cases.
+    """Base class of budget rows, each judged by one model for an array of cases.
 
-    `judged` holds the numbers. `is_there` marks the cases in which the row exists.
+    `judged` holds the status and the numbers of the row. `is_there` marks the cases in which the row exists.
     """
 
     judged: Judged

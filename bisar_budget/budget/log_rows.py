@@ -1,9 +1,9 @@
 """The row for the residual of a log, if the file does not state which path the processor uses.
 
-The residual is the difference between the fixes of the log and the smooth path through them. A processor that uses
-the fixes has the residual as a random error, which has a row of its own (`effects.navigation_errors`). A processor
-that uses the smooth path has no residual. If the file does not state which path is used, the residual cannot be
-judged. This row is then not evaluated, whatever the requirements are.
+The residual is the difference between the fixes of the log and the smooth path through them. For a processor that
+uses the fixes, the residual is a random error with a row of its own (`effects.navigation_errors`). For a processor
+that uses the smooth path, there is no residual. If the file does not state which path is used, the residual cannot be
+judged. The row of this module is then not evaluated, whatever the requirements are.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ from bisar_budget.mission.model import Mission
 
 
 def log_rows(judging: Judging, mission: Mission) -> Iterator["UnsaidResidual"]:
-    """Yield a row for each platform with a log whose residual is too large.
+    """Yield the row for a residual that is too large, for each platform with a log.
 
     The row exists only in the cases in which the residual is too large.
     """
@@ -39,7 +39,10 @@ def log_rows(judging: Judging, mission: Mission) -> Iterator["UnsaidResidual"]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UnsaidResidual(FamilyRow):
-    """The row for the residual of a log, for an array of cases. The note on the inaccurate path gives its reason."""
+    """The row for the residual of a log, for an array of cases.
+
+    The reason of the row is the note on the doubt about the path.
+    """
 
     def in_words(self, case: Case, model: str) -> Row:
         """Build the report row of one case, with its texts. The row is the same for both models."""

@@ -1,9 +1,9 @@
 """Phase limits of tones between one and three cycles per aperture, in addition to the limit on their echoes.
 
 Such a tone makes echoes. At its worst starting phase it also causes a quadratic and a cubic phase error. No sum of
-errors includes these phases, because PSLR or ISLR already limits the motion. Therefore the row of the tone itself
-limits them. The limit on the quadratic phase is the platform's share, including the autofocus gain. The limit on the
-cubic phase is the full requirement.
+errors includes these phase errors, because PSLR or ISLR already limits the motion. Therefore the row of the tone
+itself limits them. The limit on the quadratic phase is the platform's share, including the autofocus gain. The limit
+on the cubic phase is the full requirement.
 """
 
 import math
@@ -23,10 +23,11 @@ from bisar_budget.phrases import NOTHING, Note
 
 
 class NearPhases(NamedTuple):
-    """Phases of a declared tone at its worst starting phase [rad], for an array of cases.
+    """Phase errors [rad] that a slow tone causes at its worst starting phase, and their utilizations, (cases,).
 
-    The numbers are NaN for a faster tone. `use` is the utilization of the stricter limit, `quadratic_use` is that of
-    the quadratic limit, and `without_autofocus` is the same without the autofocus gain.
+    The values are NaN for a tone too fast to cause such phase errors. `use` is the utilization of the stricter limit,
+    and `quadratic_use` is the utilization of the quadratic limit. `without_autofocus` is the utilization of the
+    quadratic limit without the autofocus gain; it is 0 for a faster tone.
     """
 
     use: Floats
@@ -45,10 +46,10 @@ class NearPhases(NamedTuple):
         is_near: Booleans,
         phases: tuple[PerCase, PerCase, PerCase, PerCase],
     ) -> "NearPhases":
-        """Compute the utilizations of a tone from its phases.
+        """Compute the utilizations of a tone from the phase errors that it causes.
 
         `owner` is the platform of the tone. `phases` are its quadratic, cubic, equal-loss and judged phase [rad].
-        `is_near` marks the cases in which the tone is slow enough to cause these phases.
+        `is_near` marks the cases in which the tone is slow enough to cause these phase errors.
         """
         quadratic, cubic, equal_loss, judged = (np.where(is_near, phase, math.nan) for phase in phases)
         use = quadratic_use = judged / allocation.qpe_allowed(owner)
@@ -60,11 +61,14 @@ class NearPhases(NamedTuple):
 
     @property
     def is_over(self) -> Booleans:
-        """Whether the phases exceed a requirement, (cases,)."""
+        """Mask of the cases in which the phase errors exceed a requirement, (cases,)."""
         return np.asarray(self.use > LIMIT_RATIO)
 
     def limit(self, declared: Floats) -> Floats:
-        """Size at which the tone reaches the stricter limit, in the unit of `declared`; infinite if never."""
+        """Size at which the phase errors of the tone reach the stricter limit, in the unit of `declared`.
+
+        It is infinite for a tone without such phase errors.
+        """
         with np.errstate(all="ignore"):
             return np.where(self.use > 0, declared / self.use, math.inf)
 
@@ -79,11 +83,11 @@ class NearPhases(NamedTuple):
         doubt: PerCaseFlag = False,
         is_unknown: PerCaseFlag = False,
     ) -> Judged:
-        """Judge a tone by its echoes and by its phases.
+        """Judge a tone by its echoes and by its phase errors.
 
-        `by_echoes` is the size at which the echoes reach their requirement; None without such a requirement. Where
-        `is_unknown` is true, the level of the echoes is unknown, but the tone still fails if its phases exceed a
-        requirement.
+        `by_echoes` is the size of the tone at which its echoes reach their requirement; None without such a
+        requirement. Where `is_unknown` is true, the level of the echoes is unknown. The tone then still fails if its
+        phase errors exceed a requirement.
         """
         limit = self.limit(declared)
         echoes = np.full(declared.shape, math.inf) if by_echoes is None else by_echoes
@@ -110,7 +114,7 @@ class NearPhases(NamedTuple):
 
 
 def phase_over(case: Case, judged: Judged) -> Note:
-    """Write the reason why a tone fails by its phase; empty if no phase requirement sets its allowable."""
+    """Write the reason why a tone fails by its phase errors; empty if no phase requirement sets its allowable."""
     mission, allocation, owner = case.mission, case.allocation, judged.subject.owner
     binding = phase_requirement(case, judged)
     if binding is None:

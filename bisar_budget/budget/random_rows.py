@@ -1,8 +1,8 @@
-"""Rows of random errors (sensors, clocks, atmosphere): allowable sizes by their phase, displacement and spread power.
+"""Rows of random errors (sensors, clocks, atmosphere), which limit their phase, displacement and spread power.
 
-The powers of independent processes add. The rule `allocation.combine` is for phases and does not apply to powers.
-Each platform's share of the ISLR limits the sum of the powers that wideband vibration, sensor noise and phase noise
-spread.
+Independent random errors add in power. The rule `allocation.combine` is for phases and does not apply to powers. Each
+platform's share of the ISLR requirement limits the sum of the powers that wideband vibration, sensor noise and phase
+noise spread.
 """
 
 import math
@@ -62,7 +62,10 @@ _GOOD_FIT_FRACTION = 0.005  # largest misfit of a power law to an Allan deviatio
 
 
 class Limits(NamedTuple):
-    """Limits on a single error: quadratic and cubic phase, rms phase that spreads power [rad], displacement [m]."""
+    """Limits on the effects of a single error: phases [rad] and displacement of the image [m].
+
+    `spread` limits the rms phase that spreads power. A limit for which there is no requirement is None.
+    """
 
     quadratic: Any
     cubic: Any
@@ -71,7 +74,7 @@ class Limits(NamedTuple):
 
 
 def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: PerCase = 1.0) -> Limits:
-    """Return the limits on a single error of an owner under one model.
+    """Return the limits that apply to a single error of `owner`, under one model.
 
     `gain` is the autofocus gain. It multiplies the limit on the quadratic phase.
     """
@@ -81,9 +84,9 @@ def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str,
 
 
 def held_effect(mission: Mission, effect: RandomEffect, coverage: PerCase, gain: PerCase = 1.0) -> RandomEffect:
-    """Convert an effect to the quantities that the requirements limit.
+    """Return the effect with its phases converted to the quantities that the requirements limit.
 
-    The quadratic phase of the result is the judged phase, for the autofocus gain `gain`. Without a cubic requirement,
+    The quadratic phase of the result is the judged phase for the autofocus gain `gain`. Without a cubic requirement,
     the power of the cubic phase at one sigma is added to the power that spreads. `coverage` is the coverage factor
     that `effect` includes.
     """
@@ -95,9 +98,9 @@ def held_effect(mission: Mission, effect: RandomEffect, coverage: PerCase, gain:
 
 
 def sizes_at(effect: RandomEffect, limits: Limits) -> list[PerCase]:
-    """Compute the size at which an error reaches each of `RANDOM_REQUIREMENTS`, in their order; infinite if never.
+    """Compute the sizes at which an error reaches each of its limits, in the order of `RANDOM_REQUIREMENTS`.
 
-    The sizes are in the unit of the error.
+    The sizes are in the unit of the error. They are infinite without a limit or without an effect.
     """
     with np.errstate(all="ignore"):
         return [
@@ -109,21 +112,21 @@ def sizes_at(effect: RandomEffect, limits: Limits) -> list[PerCase]:
 
 
 class RandomRows:
-    """Builds the rows of random errors, and the rows of the total power that these errors and vibration spread."""
+    """Builds the rows of random errors, and the rows of the total power that random errors and vibration spread."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         self.judging, self.analysis, self.mission = judging, analysis, analysis.mission
         self.allocation, self.errors = analysis.allocation, analysis.random
 
     def _table(self, values: Sequence[PerCase | PerCaseFlag]) -> Floats:
-        """Stack values, each a number or an array (cases,), into a table (values, cases)."""
+        """Stack values, each a number or an array (cases,), into an array (values, cases)."""
         table = np.empty((len(values), self.judging.cases))
         for row, value in zip(table, values, strict=True):
             row[:] = value
         return table
 
     def _effects(self, model: str) -> RandomEffect:
-        """Compute the effects per unit of each error with one model, (errors, cases)."""
+        """Compute the effects of each random error per unit of the error, with one model, (errors, cases)."""
         effects = [error.effect(model) for error in self.errors]
         quadratic, cubic, spread, east, north, hidden, rest = (
             self._table(column)
@@ -132,9 +135,9 @@ class RandomRows:
         return RandomEffect(quadratic, cubic, spread, east, north, hidden=hidden, rest=rest)
 
     def _sizes(self, model: str, effects: RandomEffect) -> Floats:
-        """Compute the size at which each error reaches each requirement, (requirements, errors, cases).
+        """Compute the size at which each error reaches the limit of each requirement, (requirements, errors, cases).
 
-        The sizes are in the unit of the error. They are infinite without a requirement or an effect.
+        The sizes are in the unit of the error. They are infinite without a requirement or without an effect.
         """
         gain, owners = self.allocation.autofocus_gain, [error.owner for error in self.errors]
         by_owner = {
@@ -214,7 +217,7 @@ class RandomRows:
             yield RandomRow(row.in_decibel() if error.unit == "dB" else row, error_index, *columns_of_error)
 
     def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Booleans:
-        """Whether each error's utilization depends on noise below the first point of its mask, (errors, cases)."""
+        """Mark the errors that depend on phase noise below the first point of a mask, (errors, cases)."""
         rests_on_mask = np.zeros(sizes.shape[1:], dtype=bool)
         for row, error in enumerate(self.errors):
             for effect_kind, limit in zip(("quadratic", "cubic", "spread", "displacement"), sizes, strict=True):
@@ -230,10 +233,10 @@ class RandomRows:
 
     # ---------------------------------------------------------------- powers together
     def islr_rows(self, model: str) -> Iterator["IslrRow"]:
-        """Yield the rows for the total power that errors spread (ISLR): one for each owner and one for the mission.
+        """Yield the rows for the total power that errors spread (ISLR), for each owner and for the mission.
 
-        If only wideband vibration and errors with a stated ISLR spread power in a case, the rows of the owners do not
-        exist in that case.
+        In a case in which only wideband vibration and errors with a stated ISLR spread power, the rows of the owners
+        do not exist.
         """
         mission, split = self.mission, self.allocation.islr
         owners = ("transmitter", "receiver", *(["clock"] if split.clock is not None else []), "mission")
@@ -290,9 +293,9 @@ class RandomRows:
             )
 
     def stated_rows(self, model: str) -> Iterator["StatedRow"]:
-        """Yield the rows of `other_errors` that the file states by their ISLR.
+        """Yield the rows of those `other_errors` for which the file states an ISLR.
 
-        Each row may use the full requirement.
+        Each of these errors may use the full requirement.
         """
         mission = self.mission
         allowed = spread_limit(mission, self.allocation, "mission", model)
@@ -316,7 +319,7 @@ class RandomRows:
             )
 
     def _level(self, rms: Floats, model: str) -> Floats:
-        """Convert rms phases [rad] to ISLR [dB] with one model; NaN without a phase."""
+        """Convert rms phases [rad] to ISLR [dB] with one model; NaN for a phase that is zero or missing."""
         return np.where(rms > 0, islr_db(rms**2, model, mainlobe_energy(self.mission)), math.nan)
 
 
@@ -324,8 +327,8 @@ class RandomRows:
 class RandomRow(FamilyRow):
     """The row of one random error, for an array of cases; `place` is the index of the error in the list of errors.
 
-    `is_over_other` marks the cases in which the model that does not gate fails the error. `bound_by_other` is the
-    index in `RANDOM_REQUIREMENTS` of the requirement that limits the error under that model.
+    `is_over_other` marks the cases in which the model that does not gate fails the error. `bound_by_other` names the
+    requirement that limits the error under that model, as an index in `RANDOM_REQUIREMENTS`.
     """
 
     place: int
@@ -375,8 +378,8 @@ class RandomRow(FamilyRow):
 class IslrRow(FamilyRow):
     """The row for the total power that the errors of one owner spread (ISLR), for an array of cases.
 
-    `variance` is the variance of the total phase [rad²]. `limit` is the rms phase that the gating model allows, and
-    `limit_of_other` is the rms phase that the other model allows [rad].
+    `variance` is the variance of the total phase [rad²]. `limit` is the rms phase [rad] that the gating model allows,
+    and `limit_of_other` is the rms phase [rad] that the other model allows.
     """
 
     members: Sequence[SpreadPhase]
@@ -422,7 +425,7 @@ class IslrRow(FamilyRow):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StatedRow(FamilyRow):
-    """The row of one of the `other_errors` that the file states by its ISLR [dB], for an array of cases."""
+    """The row of one of the `other_errors` for which the file states an ISLR [dB], for an array of cases."""
 
     def in_words(self, case: Case, _: str) -> Row:
         """Build the report row of one case, with its texts. The row is the same for both models."""
@@ -448,9 +451,9 @@ class StatedRow(FamilyRow):
 
 
 def _is_open(mission: Mission, error: RandomError) -> PerCaseFlag:
-    """Whether an error depends on a vibration spectrum that the file lacks, as a Boolean or an array (cases,).
+    """Whether an error depends on a vibration spectrum that the file lacks; the ISLR is then not judged.
 
-    The ISLR cannot be judged without the spectrum.
+    The result is a Boolean or an array (cases,).
     """
     is_shaken = error.subject.kind == "oscillator" and error.subject.axis == "acceleration"
     return is_shaken and lacks_a_spectrum(mission, error.owner)
@@ -458,7 +461,10 @@ def _is_open(mission: Mission, error: RandomError) -> PerCaseFlag:
 
 # ---------------------------------------------------------------------- in words
 def _displacement(error: RandomError, model: str) -> GroundVector | None:
-    """Return the sigmas of the displacement east and north [m], including the coverage factor; None if unknown."""
+    """Return the sigmas of the displacement east and north [m] that a declared error causes; None if unknown.
+
+    Both are multiplied by the coverage factor.
+    """
     effect = error.effect(model)
     if error.declared is None or math.isnan(effect.displacement):
         return None
@@ -469,7 +475,7 @@ _Wording = tuple[str, str | None, tuple[Note, ...]]  # equation, source and note
 
 
 def _wording(mission: Mission, error: RandomError) -> _Wording:
-    """Return the equation, the source and the notes of the row of a random error."""
+    """Return the texts of the row of a random error: its equation, its source and its notes."""
     return error.subject.facts.find_in(RANDOM_WORDINGS, error.subject.axis)(mission, error)
 
 
@@ -560,7 +566,7 @@ def _oscillator_wording(mission: Mission, error: RandomError) -> tuple[str, str 
 
 
 def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
-    """Yield a note on the oscillator noise that remains after synchronisation; none without synchronisation."""
+    """Yield a note on how much oscillator noise remains after synchronisation; no note without synchronisation."""
     if sync is None:
         return
     if sync.interval is not None:
@@ -572,7 +578,7 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
 
 
 def _air_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
-    """Return the equation, the source and the notes of the row of an atmospheric delay."""
+    """Return the texts of the row of an atmospheric delay: its equation, its source and its notes."""
     source = None if mission.propagation is None else mission.propagation.source_of(legs_of(error.owner)[0])
     if error.counted_in and error.declared is None:  # otherwise this note is the reason of the row
         return "delay of the air", source, (phrases.note("counted-in-another-row", row_id=error.counted_in),)
@@ -608,7 +614,7 @@ def _nothing_spreads(mission: Mission, error: RandomError) -> Note:
 def _quiet(mission: Mission, error: RandomError) -> Note:
     if mission.has_direct_path and error.owner == "transmitter":
         return phrases.note("oscillators-drop-out")
-    return phrases.note("no-acceleration" if error.subject.axis else "no-phase-noise")
+    return phrases.note("no-acceleration") if error.subject.axis else phrases.note("no-phase-noise")
 
 
 # By kind, or by kind and axis: the texts of a row, and the reason why an error has no effect.
@@ -657,10 +663,10 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
 
 
 def _continuation(case: Case, error: RandomError, model: str) -> Note:
-    """Write the note on the part of an oscillator's effect that comes from noise below the first point of its mask.
+    """Write a note that an oscillator's effect depends on noise below the first point of its mask.
 
-    The note is about the kind of effect with the largest fraction of such noise. It is empty if no kind of effect
-    depends on this noise.
+    Of the kinds of effect that depend on this noise, the note describes the one with the largest fraction of it. The
+    note is empty if no kind of effect depends on this noise.
     """
     effect, size, worst = error.effect(model), error.declared, NOTHING
     limits = limits_for(case.mission, case.allocation, error.owner, model, case.allocation.autofocus_gain)
@@ -676,7 +682,7 @@ def _continuation(case: Case, error: RandomError, model: str) -> Note:
 
 
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:
-    """Write the note that the model that does not gate fails an error, with the limit that the error exceeds."""
+    """Write a note that the model that does not gate fails an error, with the limit that the error exceeds."""
     other_model, size = OTHER_MODEL[gating], error.declared
     effect = held_effect(mission, error.effect(other_model), error.coverage(mission), autofocus_gain_of(mission))
     if binding == ISLR:
@@ -689,7 +695,7 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
 
 
 def _levels(mission: Mission, model: str) -> Callable[[float], float]:
-    """Return a function that converts an rms phase [rad] to the ISLR [dB] that it adds by a model.
+    """Return a function that converts an rms phase [rad] to the ISLR [dB] that it causes according to one model.
 
     A phase of 0 adds no power, which has no level in dB. The function then returns 0.
     """

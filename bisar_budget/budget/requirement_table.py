@@ -1,4 +1,7 @@
-"""The report rows and requirements of one case, with texts, limits, values reached, and deciding rows."""
+"""Builds the report rows and the report entries of requirements for one case, with their texts and numbers.
+
+An entry gives the limit of a requirement, the value that the mission reaches, and the row that decides its status.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -62,9 +65,9 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
 
 
 def _declarations(case: Case, judged_row: Judged) -> Row:
-    """Build the row that judges whether the file declares every required kind of error.
+    """Build the row that judges whether the file declares every kind of error that it is required to declare.
 
-    It includes kinds of error that have no row of their own.
+    The row includes kinds of error that have no row of their own.
     """
     mission = case.mission
     missing, shifted = missing_declarations(mission), shifted_figures(mission)
@@ -87,7 +90,10 @@ def _declarations(case: Case, judged_row: Judged) -> Row:
 
 
 def _declarations_missing(missing: Sequence[Missing]) -> Note:
-    """List the required errors that the file does not declare: missing errors first, then half-stated errors."""
+    """Write a note with the required errors that the file does not declare.
+
+    The errors of which the file states nothing come first, then those of which it states only one half.
+    """
     halves = [
         phrases.not_declared_as_required(declaration.key, declaration.lacks)
         for declaration in missing
@@ -100,7 +106,7 @@ def _declarations_missing(missing: Sequence[Missing]) -> Note:
 
 
 def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Note:
-    """Explain the status of a row that its own numbers do not decide."""
+    """Explain the status of a row if the numbers of the row do not decide it."""
     mission, why = case.mission, Why(judged_row.why[case.place])
     if why is Why.NOT_DECLARED_AS_REQUIRED:
         missing = (each for each in missing_declarations(mission) if is_asked_for(judged_row.subject, each))
@@ -129,7 +135,10 @@ def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Not
 
 
 def unknown_place(judged: JudgedMission, case: Case) -> Note:
-    """State the cause of a displacement that no row limits: clocks that are not set, or an inaccurate path."""
+    """Write a note on why the image is displaced by an amount that no row limits; empty if no cause is found.
+
+    The cause is clocks that are not set, or an inaccurate path.
+    """
     clocks = [row_id for row_id, is_there in judged.unplaced.items() if is_there[case.place]]
     if clocks:
         return phrases.note("clocks-are-not-set", row_ids=clocks)
@@ -141,7 +150,7 @@ _OWNERS_OF_ROWS = {PULL_IN: "autofocus", "spatial_variance": "scene", "dispersio
 
 
 def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
-    """Yield a note for each effect that no requirement limits and that is negligible."""
+    """Yield a note for each negligible effect that no requirement limits."""
     for effect in judged.untaken:
         if effect.is_negligible[case.place]:
             yield phrases.effect_is_negligible(
@@ -205,15 +214,15 @@ def _entry(
 def _waivers(
     status: str, of_requirement: Sequence[AppliedWaiver], judges: Sequence[Row]
 ) -> tuple[AppliedWaiver, ...]:
-    """List the waivers that cover a waived requirement: its own waivers and those of the rows that judge it."""
+    """List the waivers of a waived requirement: its own waivers, and the waivers of the rows that judge it."""
     return holding(status, in_order([*of_requirement, *(waiver for row in judges for waiver in row.waived_by)]))
 
 
 def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | None]) -> float | None:
     """Return the value that the mission reaches for a requirement, in its unit; None if there is no such value.
 
-    It is the value of the mission's row for this requirement. If no such row exists for the quadratic phase, it is
-    the largest quadratic phase of a single error [rad].
+    It is the value of the mission's row for this requirement. If the mission has no row for the quadratic phase, the
+    value is the largest quadratic phase of a single error [rad].
     """
     row_of_mission = next((row for row in rows if row is not None and row.id == f"mission.{key}"), None)
     if row_of_mission is not None and key != DECLARE:
@@ -228,7 +237,7 @@ def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | Non
 
 
 def _share(row: Row, key: str, case: Case, utilization: float | None) -> DecidingShare | None:
-    """Return the share of a requirement that limits a row; None if the row may use the full requirement."""
+    """Return the share of a requirement to which a row is limited; None if the row may use the full requirement."""
     owner = _OWNERS_OF_ROWS.get(row.subject.kind)
     if key == QUADRATIC and owner is not None:
         return DecidingShare(
@@ -246,9 +255,9 @@ def _share(row: Row, key: str, case: Case, utilization: float | None) -> Decidin
 
 
 def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
-    """Return the owner's share of a requirement and the value that the row reaches, both without the autofocus gain.
+    """Return the owner's share of a requirement and the value that the row reaches, in the requirement's unit.
 
-    The unit is that of the requirement, [rad] or [dB]. A value that does not exist is None.
+    Neither number includes the autofocus gain. The unit is [rad] or [dB]. A number that does not exist is None.
     """
     mission, allocation = case.mission, case.allocation
     if key == QUADRATIC:

@@ -1,11 +1,11 @@
 """Doubts about atmospheric delays that are assumed to be constant over a long aperture.
 
-In apertures of one minute or longer, the atmosphere differs between the two ends. A delay without `correlation_time`
-is treated as constant: it displaces the image, and its phase changes only with the elevation. This is only part of
-the true effect. Therefore the delays are also computed with a correlation time of ten minutes. A requirement is not
-evaluated if such changing delays would use more than a tenth of it, or would exceed it together with the declared
-errors. If changing delays would cause an effect that no requirement covers and that is not negligible, the rows of
-these delays are not evaluated.
+In apertures of one minute or longer, the atmosphere differs between the beginning and the end. A delay without
+`correlation_time` is treated as constant: it displaces the image, and its phase changes only with the elevation. This
+is only part of the true effect. Therefore the delays are also computed with a correlation time of ten minutes, as
+changing delays. A requirement is not evaluated if the changing delays would use more than a tenth of it, or would
+exceed it together with the declared errors. If the changing delays would cause an effect that no requirement covers
+and that is not negligible, the rows of these delays are not evaluated.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,10 +35,10 @@ AIR_CHANGES_IN_S = 600.0  # correlation time of the zenith delay that remains af
 
 
 class AirUse(NamedTuple):
-    """Effect that changing delays would have on a row: its size, and its utilization of the limit, (cases,).
+    """Effect that changing delays would have on one row, with its utilization of the row's limit, (cases,).
 
-    The size is a phase or rms phase [rad], or a displacement [m]. `is_doubted` marks the cases in which no verdict
-    may rely on constant delays.
+    `size` is the effect: a phase or rms phase [rad], or a displacement [m]. `use` is the utilization. `is_doubted`
+    marks the cases in which no verdict may rely on the assumption of constant delays.
     """
 
     row_id: str
@@ -51,10 +51,10 @@ class AirUse(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StayingAir:
-    """Effects that the delays assumed as constant in long apertures would have if they changed.
+    """Effects that delays assumed as constant in long apertures would have if they changed.
 
-    `uses` gives, by row id, the utilization that changing delays would cause. `untaken` are the effects that no
-    requirement covers, including those of the changing delays. Both are empty if no case has such a delay.
+    `uses` maps row ids to the effect of the changing delays on the row. `untaken` lists the effects that no
+    requirement covers, computed with the changing delays. Both are empty if no case has such a delay.
     """
 
     errors: Sequence[RandomError] = ()
@@ -64,21 +64,25 @@ class StayingAir:
 
     @property
     def _delays(self) -> frozenset[str]:
-        """Ids of the rows of the delays themselves.
+        """Ids of the rows of the single delays.
 
         With `combine: each`, the quadratic requirement limits these rows directly. Another requirement may set the
-        allowable of such a row, so that its status is not the status of the quadratic requirement.
+        allowable of such a row. The status of the row is then not that of the quadratic requirement.
         """
         return frozenset(error.id for error in self.errors)
 
     def doubted_rows(self) -> dict[str, Booleans]:
-        """Return the rows of sums that are not evaluated: masks of their cases (cases,), by row id."""
+        """Return, for each row of a sum, a mask of the cases in which it is not evaluated, (cases,).
+
+        The masks are keyed by row id.
+        """
         return {row_id: use.is_doubted for row_id, use in self.uses.items() if row_id not in self._delays}
 
     def doubted_requirements(self) -> dict[str, Booleans]:
-        """Return the requirements that are not evaluated: masks of their cases (cases,), by requirement key.
+        """Return, for each doubted requirement, a mask of the cases in which it is not evaluated, (cases,).
 
-        A doubt about a platform's share affects only the row of that share.
+        The masks are keyed by requirement. A doubt about a platform's share affects only the row of this share, not
+        the requirement.
         """
         doubted: dict[str, Booleans] = {}
         for use in self.uses.values():
@@ -87,7 +91,10 @@ class StayingAir:
         return doubted
 
     def untaken_rows(self) -> dict[str, Booleans]:
-        """Return the rows of delays that would cause an effect without a requirement: masks (cases,) by row id."""
+        """Return, for each delay, a mask of the cases in which it would cause an effect that no requirement covers.
+
+        The masks, (cases,), are keyed by the id of the delay's row. Negligible effects do not count.
+        """
         return {
             error.id: np.any([effect.makers.get(error.id, False) & self.is_long for effect in self.untaken], axis=0)
             for error in self.errors
@@ -95,7 +102,10 @@ class StayingAir:
         }
 
     def reason(self, case: Case, row_id: str) -> Note:
-        """Describe the effect of changing delays on a row in one case, and name the key to add to the file."""
+        """Describe the effect of changing delays on a row in one case, and name the key to add to the file.
+
+        The key is that which states how the delays change.
+        """
         use = self.uses.get(row_id)
         if use is not None:
             return self._says(case, use)
@@ -107,7 +117,7 @@ class StayingAir:
         return self._says(case, max(doubted, key=lambda use: case.number(use.use))) if doubted else phrases.NOTHING
 
     def note(self, case: Case) -> Iterator[Note]:
-        """Yield a note that delays are assumed to be constant, if this does not affect any verdict."""
+        """Yield a note that delays are assumed to be constant, if this assumption does not affect any verdict."""
         uses = [case.number(use.use) for use in self.uses.values()]
         is_open = any(case.number(use.is_doubted) for use in self.uses.values())
         is_open = is_open or any(case.number(is_made) for is_made in self.untaken_rows().values())
@@ -150,7 +160,7 @@ class StayingAir:
 
 
 def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
-    """Find the delays assumed as constant in long apertures, and their effects on the rows if they changed."""
+    """Compute how delays that are assumed as constant in long apertures would affect the rows if they changed."""
     mission, cases = analysis.mission, analysis.cases
     is_long = np.broadcast_to(np.asarray(mission.collection.aperture_time) >= LONG_APERTURE_S, (cases,))
     if mission.propagation is None or not is_long.any():
@@ -185,7 +195,7 @@ def _rests_on(mission: Mission, use: AirUse, declared_use: Floats) -> Booleans:
 
 
 def _uses(analysis: Analysis, errors: Sequence[RandomError], model: str) -> Iterator[AirUse]:
-    """Yield the effect of changing delays on each row that a requirement limits, under one model."""
+    """Yield the effect that changing delays would have on each row with a requirement, under one model."""
     mission, allocation = analysis.mission, analysis.allocation
     rule = mission.allocation.combine
     for key in RANDOM_REQUIREMENTS:
@@ -216,10 +226,12 @@ def _use(analysis: Analysis, row_id: str, key: str, size: PerCase, limit: PerCas
 
 
 def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCase:
-    """Compute the effect of a changing delay that a requirement limits: a phase [rad] or a displacement [m].
+    """Compute that effect of a changing delay which the requirement `key` limits.
+
+    The effect is a phase [rad] or a displacement [m].
 
     The quadratic phase is the judged phase with autofocus. The displacement is only the part that the change of the
-    delay adds: the root of the difference of the squares with and without the change.
+    delay adds. It is the root of the difference between the squared displacements with and without the change.
     """
     effect = error.effect(model)
     judged_effect = held_effect(
@@ -239,10 +251,10 @@ def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCa
 
 
 def _keys(mission: Mission) -> list[str]:
-    """List the keys to add to the file, which state how the delays change.
+    """List the keys to add to the file so that it states how the delays change.
 
-    There is one key if both legs lack a correlation time, or if both have the same atmosphere. Otherwise it is the
-    key of the leg that lacks one.
+    The list has one key if no leg has a correlation time, or if both legs have the same atmosphere. Otherwise it has
+    the key of the leg that lacks a correlation time.
     """
     propagation = mission.propagation
     if propagation is None:

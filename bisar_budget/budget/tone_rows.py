@@ -35,10 +35,11 @@ SENSITIVITY = "acceleration_sensitivity"
 
 # ---------------------------------------------------------------------- all tones together
 def pslr_row(judging: Judging, tones: Sequence[Tone], required: PerCase) -> "PslrRow":
-    """Judge the highest echo that all tones together can make, with the worst combination of their phases.
+    """Judge the highest echo that all tones together can make, with the worst combination of their starting phases.
 
-    Both models use first principles here, because the shares by the rule of the paper are 3 dB stricter. Tones that
-    are at most 2.5 cycles per aperture apart raise each other's echo, even if they come from different sources.
+    Both models use first principles for this row, because shares by the rule of the paper would be 3 dB stricter.
+    Tones that are at most 2.5 cycles per aperture apart raise each other's echo, even if they come from different
+    sources.
     """
     highest, allowed = highest_echo(tones, (judging.cases,)), judging.array(10 ** (np.asarray(required) / 20))
     row_subject = subject("mission", "pslr")
@@ -54,7 +55,7 @@ def pslr_row(judging: Judging, tones: Sequence[Tone], required: PerCase) -> "Psl
 class PslrRow(FamilyRow):
     """The row for the highest echo of all tones together, for an array of cases.
 
-    It exists only for missions with a required PSLR.
+    The row exists only for missions with a required PSLR.
     """
 
     tones: Sequence[Tone]
@@ -83,9 +84,9 @@ class PslrRow(FamilyRow):
 
 # ---------------------------------------------------------------------- spurs
 def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["SpurRow"]:
-    """Yield the rows of the oscillators' spurs under one model. Like vibrations, spurs make paired echoes.
+    """Yield the rows of the oscillators' spurs under one model.
 
-    Sizes are levels of the echo relative to the response [dB].
+    Like vibrations, spurs make paired echoes. The sizes are levels of the echo relative to the response [dB].
     """
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
@@ -116,19 +117,19 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
 
 
 def _is_used(size: PerCase, limit: PerCase) -> Booleans:
-    """Whether a size is so large that a doubt about it affects the verdict, but does not exceed the limit.
+    """Whether a size lies between a tenth of its limit and the limit, (cases,).
 
-    This is the case between a tenth of the limit and the limit.
+    A doubt about such a size affects the verdict. A smaller size passes anyway, and a larger one fails.
     """
     return np.asarray((size > MIN_USE_FRACTION * limit) & ~(size > limit * LIMIT_RATIO))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpurRow(FamilyRow):
-    """The row of one spur of an oscillator, for an array of cases. Its size is the level of the spur's echo [dB].
+    """The row of one spur of an oscillator, for an array of cases.
 
-    The level is relative to the response. `spur_index` is the index of the spur. `is_over_other` marks the cases in
-    which the model that does not gate fails the row.
+    The size of the row is the level of the spur's echo relative to the response [dB]. `spur_index` is the index of
+    the spur. `is_over_other` marks the cases in which the model that does not gate fails the row.
     """
 
     spur_index: int
@@ -183,9 +184,10 @@ class SpurRow(FamilyRow):
 
 
 def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> tuple[Note, ...]:
-    """Note that the part of a tone below one cycle per aperture is judged in the row `row_id`.
+    """Write a note that the part of a tone below one cycle per aperture is judged in the row `row_id`.
 
-    Exchanges of pulses fold a tone to low frequencies. The result is empty if no part of the tone is folded that low.
+    Exchanges of pulses fold a tone to low frequencies. The result is empty if no part of the tone is folded to less
+    than one cycle per aperture.
     """
     slow = [
         (float(share), float(frequency))
@@ -211,10 +213,10 @@ def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> 
 
 # ---------------------------------------------------------------------- oscillators that vibrate
 def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["AcceleratedRow"]:
-    """Yield the rows of the vibrations that act on oscillators, under one model.
+    """Yield the rows of the vibration tones that act on oscillators, under one model.
 
     The allowable is an acceleration sensitivity [s²/m]. A tone below one cycle per aperture causes quadratic and
-    cubic phase instead of echoes. It is part of the row of the oscillator's random vibration.
+    cubic phase instead of echoes. Such a tone is part of the row of the oscillator's random vibration.
     """
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
@@ -302,7 +304,9 @@ class AcceleratedRow(FamilyRow):
 
 
 def _phases_beside(folded: LeftTone, free: PerCase, aperture_time: PerCase) -> tuple[PerCase, PerCase]:
-    """Quadratic and cubic phase [rad] of a tone's parts below three cycles per aperture, in their worst phases.
+    """Quadratic and cubic phase [rad] of the parts of a tone below three cycles per aperture.
+
+    Each part has its worst starting phase.
 
     `free` is the peak phase of the tone without synchronisation [rad].
     """
@@ -316,18 +320,18 @@ def _phases_beside(folded: LeftTone, free: PerCase, aperture_time: PerCase) -> t
 
 
 def _near_phases(judging: Judging, analysis: Analysis, name: str, phases: tuple[PerCase, PerCase]) -> NearPhases:
-    """Compare the quadratic and cubic phase [rad] of a tone with the limits of its platform."""
+    """Compare the quadratic and cubic phase [rad] of a tone with the limits of the platform `name`."""
     qpe, cubic = map(judging.array, phases)
     return NearPhases.of(analysis.mission, analysis.allocation, name, qpe + cubic > 0, (qpe, cubic, qpe, qpe))
 
 
 def evidence(oscillator: Oscillator) -> str | None:
-    """Return the source of an oscillator's acceleration sensitivity: its catalogue part, or else its `source`."""
+    """Return where an oscillator's acceleration sensitivity comes from: its catalogue part, or else its `source`."""
     return dict(oscillator.of_parts).get(SENSITIVITY, oscillator.source)
 
 
 def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
-    """Note that an oscillator is assumed to feel the vibration of its platform.
+    """Write a note that an oscillator is assumed to feel the vibration of its platform.
 
     The result is empty if the file states a vibration for the oscillator itself.
     """
@@ -338,7 +342,11 @@ def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
 
 
 def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
-    """Return the notes on an oscillator's acceleration row: which effects it includes and which it cannot include."""
+    """Return the notes on the row of an oscillator's acceleration sensitivity.
+
+    They tell which vibration the oscillator is assumed to feel, which tones have rows of their own, and what remains
+    after synchronisation.
+    """
     felt_vibration = felt(mission, name)
     oscillator: Oscillator = getattr(mission.platforms, name).oscillator
     notes = list[Note]()

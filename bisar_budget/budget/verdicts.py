@@ -1,4 +1,4 @@
-"""Transfers the verdicts of images to the rows of a check, and selects the images to show."""
+"""Adds the verdicts of simulated images to the rows of a check, and selects the verdicts to show."""
 
 from collections.abc import Mapping, Sequence
 from datetime import date
@@ -21,8 +21,8 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: d
 
     If an image refutes the limit of a declared row, the row fails, and so does its requirement. A row that passes
     only with autofocus also fails if the image refutes the autofocus. If the file does not declare the error of a
-    row, the row reports that its limit is refuted. There is a warning if a limit is refuted for which the check has
-    no row, and if no image gave a verdict.
+    row, the row only reports that its limit is refuted. A warning is given if an image refutes a limit for which the
+    check has no row, and if no image gave a verdict.
 
     Parameters
     ----------
@@ -103,11 +103,12 @@ def _with_verdict(row: Row, verdict: Verdict) -> Row:
 
 
 def _is_gate(row: Row) -> bool:
-    """Whether a row fails if its limit is refuted: the row uses the limit and does not already fail.
+    """Whether a row must fail if an image refutes its limit.
 
-    A row that only converts an error from another frame to the scene's axes does not fail. The row of the pull-in
-    range of autofocus does not fail either, because it is not a requirement: if the range is stated too large, the
-    gain is used only up to the limit that range walk sets.
+    It must fail if it uses the limit and does not already fail. There are two exceptions. A row that only converts an
+    error from another frame to the scene's axes does not fail. The row of the pull-in range of autofocus does not
+    fail either, because it is not a requirement: if the range is stated too large, the gain is used only up to the
+    limit that range walk sets.
     """
     return (
         bool(row.utilization)
@@ -120,7 +121,10 @@ def _is_gate(row: Row) -> bool:
 def _with_refuted(
     requirement: JudgedRequirement, refuted: Sequence[Row], waivers: tuple[AppliedWaiver, ...]
 ) -> JudgedRequirement:
-    """Return the requirement with the status of the worst refuted row that judges it or that it limits."""
+    """Return the requirement with the status of its worst row that an image refutes.
+
+    It considers the rows that judge the requirement, and the rows that the requirement limits.
+    """
     judges = [
         row
         for row in refuted
@@ -155,9 +159,10 @@ def _shown(verdict: Verdict) -> str:
 
 
 def rows_worth_showing(findings: MissionFindings) -> tuple[Verdict, ...]:
-    """Select the most important verdicts with a measured quadratic phase: worst status first, then refuted limits.
+    """Select the most important verdicts with a measured quadratic phase.
 
-    A row without a declared error is selected only if its limit is refuted, or if there is no other row.
+    The rows with the worst status come first, and among them those with refuted limits. A row without a declared
+    error is selected only if its limit is refuted, or if there is no other row.
     """
     rows = {row.id: row for row in findings.rows}
     measured = [v for v in findings.verdicts or () if v.measured_qpe_rad is not None and v.id in rows]

@@ -76,8 +76,9 @@ class Vibrations:
     def rows(self, model: str) -> Iterator["VibrationRow"]:
         """Yield all rows of vibration under one model, in the order of the JSON output.
 
-        `model` is `published` or `full`. A platform without a declared line has one row for lines. A line with less
-        than one cycle per aperture in only some of the cases has two rows, one for slow and one for fast motion.
+        `model` is `published` or `full`. A platform without declared lines has one row for lines, with the status
+        `not_declared`. A line that has less than one cycle per aperture in only some of the cases has two rows, one
+        for these cases and one for the others.
         """
         everywhere = np.ones(self.judging.cases, dtype=bool)
         for name in PLATFORMS:
@@ -145,8 +146,8 @@ class Vibrations:
     def _line(self, model: str, name: str, index: int, is_there: Booleans) -> "VibrationRow":
         """Build the row of a line with one or more cycles per aperture.
 
-        The line is judged by the level of its echoes, or by their power if ISLR limits them. Below three cycles per
-        aperture, its quadratic and cubic phase are limited as well.
+        The level of its echoes is judged if PSLR limits the line. Their power is judged if ISLR limits it. Below
+        three cycles per aperture, the quadratic and cubic phase of the line are limited as well.
         """
         cycles, both = self.cycles[name][index], self._both[name][index]
         is_near, phases = cycles < ECHO_CYCLES, None
@@ -179,8 +180,8 @@ class Vibrations:
     def _slow(self, name: str, index: int, is_there: Booleans) -> "VibrationRow":
         """Build the row of a line with less than one cycle per aperture.
 
-        It is judged by its quadratic and cubic phase. For a vibration along three axes, the declared size is the
-        amplitude along the line of sight that has the same utilization.
+        The line is judged by its quadratic and cubic phase. For a vibration along three axes, the declared size is an
+        amplitude along the line of sight. It is chosen so that it has the same utilization as the vibration.
         """
         row_subject, cycles = subject(name, "vibration", "sinusoidal", entry=index), self.cycles[name][index]
         tone = self.slow_tones[row_subject.id]
@@ -221,7 +222,7 @@ class Vibrations:
     def _near_each_other(self, model: str, name: str) -> Iterator["VibrationRow"]:
         """Yield the rows of groups of lines whose frequencies are so close that their echoes add.
 
-        The size of each row is the amplitude of a single line with an equally high echo [m].
+        The size of each row is an amplitude [m]: a single line with this amplitude would make an equally high echo.
         """
         for index, (members, amplitude) in enumerate(self._near[name]):
             row_subject = subject(name, "vibration", "sinusoidal.sum", entry=index)
@@ -230,15 +231,19 @@ class Vibrations:
 
     @cached_property
     def _near(self) -> dict[str, list[tuple[Booleans, Floats]]]:
-        """Groups of neighbouring lines by platform, and the amplitude [m] of one line with an equally high echo."""
+        """Groups of neighbouring lines, by platform, with the amplitude [m] of an equivalent line for each group.
+
+        The equivalent line is a single line whose echo is as high as that of the group.
+        """
         return {name: list(_together(self.amplitudes[name], self.cycles[name])) for name in PLATFORMS}
 
     @cached_property
     def _both(self) -> dict[str, Floats]:
-        """Peak phase of a single line whose echo equals that of neighbouring lines of both platforms together. [rad]
+        """Peak phase [rad] of a single line with the same echo as a group of neighbouring lines of both platforms.
 
-        The echoes add in their worst phases. The value is given for each line of each platform, (lines, cases). It is
-        NaN without a neighbouring line, without an amplitude, or without a required PSLR.
+        The echoes of the group add with their worst starting phases. The value is given for each line of each
+        platform, (lines, cases). It is NaN without a neighbouring line of the other platform, without an amplitude,
+        or without a required PSLR.
         """
         ours = self.count[PLATFORMS[0]]
         amplitudes, cycles = (
@@ -253,9 +258,9 @@ class Vibrations:
 
 
 def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Booleans, Floats]]:
-    """Yield each group of neighbouring lines, and the amplitude of a single line with an equally high echo. [m]
+    """Yield each group of neighbouring lines, with the amplitude [m] of a single line that has an equally high echo.
 
-    A group is a mask, (lines, cases). The amplitude, (cases,), is 0 in the cases without a line of the group.
+    A group is a mask, (lines, cases). The amplitude, (cases,), is 0 in the cases in which the group has no line.
     """
     groups = near_groups(cycles)
     for index in range(groups.max(initial=-1) + 1):
@@ -269,12 +274,16 @@ def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Booleans, Fl
 class VibrationRow(FamilyRow):
     """The row of a line, of a group of neighbouring lines, or of a platform's noise, for an array of cases.
 
-    `members` marks the lines of a group. `qpe` and `cubic` are the quadratic and cubic phase of a motion below three
-    cycles per aperture at its worst starting phase [rad]. If `is_slow` is set, the motion is judged by these phases
-    alone; a faster motion is judged by its echoes too. `is_over_other` marks the cases in which the model that does
-    not gate fails the row. `both` is the peak phase of a single line whose echo is as high as the sum of the echoes
-    of neighbouring lines of the two platforms [rad]. `level` is the level of that echo [dB], and `is_over_both` marks
-    the cases in which it is too high. Sizes of the row are `per_metre` times the sizes in metres.
+    `members` marks the lines of a group. `qpe` and `cubic` are the quadratic and cubic phase [rad] of a motion below
+    three cycles per aperture, at its worst starting phase. If `is_slow` is set, only these phases judge the motion.
+    Otherwise its echoes judge it too. `is_over_other` marks the cases in which the model that does not gate fails the
+    row.
+
+    If lines of both platforms are neighbours, their echoes add. `both` is the peak phase [rad] of a single line with
+    an echo as high as this sum. `level` is the level of that echo [dB], and `is_over_both` marks the cases in which
+    it is too high.
+
+    Sizes of the row are `per_metre` times the sizes in metres.
     """
 
     limits: VibrationLimits | None = None
@@ -363,9 +372,10 @@ def _row(
     more: Sequence[Note] = (),
     doubt: Note = NOTHING,
 ) -> Row:
-    """Build the report row of a line, a group of lines or noise that is judged by echoes or spread power.
+    """Build the report row of a line, a group of lines or noise, if echoes or spread power judge it.
 
-    `notes` come before the notes on its limit, `more` after them.
+    `key` is the key of the declared value below `vibration`. In the report, `notes` come before the notes on the
+    limit of the row, and `more` after them.
     """
     row_subject, metric = vibration_row.judged.subject, vibration_row.judged.metric
     equation = f"Section V, {key[0]}" if model == "published" else "first principles"

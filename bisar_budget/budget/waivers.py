@@ -1,4 +1,4 @@
-"""Waivers of rows and requirements, and influences on the verdict from outside the mission file.
+"""Applies waivers to rows and requirements, and collects what affects the verdict from outside the mission file.
 
 The findings list valid, expired and unused waivers. They also list the options, settings, environment variables and
 catalogue parts of the project that affect the verdict.
@@ -27,11 +27,11 @@ _PLANNED = "the orbit is the plan: neither its age nor its interpolation counts"
 
 
 class Waived(NamedTuple):
-    """Rows after waivers are applied, and the waivers that name requirements.
+    """Rows after waivers are applied, and the valid waivers of requirements.
 
-    A row that fails or is not evaluated becomes `waived` if a valid waiver names it. A row with only expired waivers
-    keeps its status and shows the waiver that expired last. `requirements` holds the first valid waiver of each
-    requirement, by the requirement's id.
+    A row that fails or is not evaluated becomes `waived` if a valid waiver names it. A row for which all waivers have
+    expired keeps its status and shows the waiver that expired last. `requirements` maps the id of each requirement to
+    its first valid waiver.
     """
 
     mission: Mission
@@ -40,9 +40,10 @@ class Waived(NamedTuple):
     covered: Sequence[tuple[int, int]]  # per waiver: number of named rows, and number of broken rows among them
 
     def unused(self, judged: Sequence[JudgedRequirement]) -> Iterator[tuple[KeyPath, Note]]:
-        """Yield a warning for each waiver that has no effect or that covers everything.
+        """Yield a warning for each waiver that has no effect, and for each that covers every row.
 
-        Such a waiver names no row, every row, or no broken row. A row is broken if it fails or is not evaluated.
+        A waiver has no effect if it names no row, or only rows that are not broken. A row is broken if it fails or is
+        not evaluated. A waiver that names a broken requirement has an effect.
         """
         broken = {requirement.id for requirement in judged if requirement.status in (*BROKEN, "waived")}
         ids = [requirement.id for requirement in judged]
@@ -106,7 +107,7 @@ def _waived(row: Row, holding: AppliedWaiver | None, last: AppliedWaiver | None)
 
 
 def holding_place(mission: Mission, today: date, ids: Sequence[str]) -> int:
-    """Index in the file of the first valid waiver that names any of the ids; -1 if there is none."""
+    """Index, in the mission file, of the first valid waiver that names any of the ids; -1 if there is none."""
     valid = (
         waiver_index
         for waiver_index, waiver in enumerate(mission.waivers)
@@ -116,9 +117,10 @@ def holding_place(mission: Mission, today: date, ids: Sequence[str]) -> int:
 
 
 def named_by(pattern: str, ids: Sequence[str]) -> list[int]:
-    """Indices of the ids that match the pattern of a waiver.
+    """List the indices of the ids that match the pattern of a waiver.
 
-    The pattern may contain the wildcards `*`, `?` and `[…]`. An id that contains a bracket also matches itself.
+    The pattern may contain the wildcards `*`, `?` and `[…]`. An id with a bracket also matches a pattern that is
+    equal to it.
     """
     if not any(char in pattern for char in "*?["):
         return [id_index for id_index, row_id in enumerate(ids) if row_id == pattern]
@@ -152,8 +154,8 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
 def _planned_orbits(mission: Mission) -> Iterator[Override]:
     """Yield an entry for each orbit that the file states as planned.
 
-    The platform is then assumed to follow the plan. Neither the age nor the interpolation of the orbit affects the
-    verdict.
+    The platform is then assumed to follow the planned orbit. Neither the age of the orbit nor its interpolation
+    affects the verdict.
     """
     for name in PLATFORMS:
         orbit = getattr(mission.platforms, name).orbit
@@ -162,7 +164,7 @@ def _planned_orbits(mission: Mission) -> Iterator[Override]:
 
 
 def _own_parts(mission: Mission) -> Iterator[Override]:
-    """Yield an entry for each part of the project that replaces a catalogue part of the same name."""
+    """Yield an entry for each part file of the project that replaces a catalogue part of the same name."""
     catalogue = str(resource("specs", "sensors")) if mission.parts else ""
     for name, file, _ in mission.parts:
         if name.endswith((".yaml", ".yml")) or os.path.dirname(file) == catalogue:
@@ -174,7 +176,7 @@ def _own_parts(mission: Mission) -> Iterator[Override]:
 
 
 def _shown(file: str, mission_file: str) -> str:
-    """Path of a file relative to the folder of the mission file. It does not depend on the current folder."""
+    """Path of a file relative to the folder of the mission file, so that it does not depend on the current folder."""
     try:
         path = os.path.relpath(file, os.path.dirname(mission_file) or os.curdir)
     except (OSError, ValueError):  # the current folder no longer exists, or the file is on another drive

@@ -1,9 +1,9 @@
-"""Finished parts of a sweep, stored as a Parquet data set with one file for each block of cases.
+"""Stores the finished parts of a sweep as a Parquet data set with one file for each block of cases.
 
-A data set belongs to one question, which is the set of all inputs that determine its values. Each file states the
-question in its metadata. A file is written under a temporary name and then renamed, so that every stored part is
-complete. Values are stored as the engine computes them, in SI units. At the end, the command builds its table from
-the parts.
+A data set belongs to one question, which is the set of all inputs that determine its values. The metadata of each
+file state the question. A file is written under a temporary name and then renamed, so that every stored part is
+complete. Values are stored as the engine computes them, in SI units. At the end of the sweep, the command builds its
+table from the parts.
 """
 
 import json
@@ -30,11 +30,11 @@ _PART_NAME = re.compile(r"part-\d{12}\.parquet", re.ASCII)
 
 
 def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
-    """Check that the libraries that an option needs are installed.
+    """Check that the libraries which an option needs are installed, and that there is memory for them.
 
-    `room` is the memory that the libraries need [B]. `extra` is the extra of the package that installs the libraries,
-    and `modules` are the modules to import. Raises `MemoryError` if the memory is not available, and `ClusterError`
-    if a module is missing.
+    `option` is the name of the option, for messages. `room` is the memory that the libraries need [B]. `extra` is the
+    extra of the package `bisar-budget` that installs the libraries. `modules` are the modules to import. Raises
+    `MemoryError` if there is not enough memory, and `ClusterError` if a module is missing.
     """
     hold_room(room, option)
     try:
@@ -46,7 +46,7 @@ def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
 
 
 def question_of(asked: Asked) -> Question:
-    """Collect all inputs that determine the values of parts, keyed by the words that describe them in messages.
+    """Collect all inputs that determine the values of parts, keyed by the words that describe the inputs in messages.
 
     Parts with equal questions can be combined.
     """
@@ -67,7 +67,7 @@ def question_of(asked: Asked) -> Question:
 
 
 def _hash_of(cases: Cases) -> str:
-    """SHA-256 hash of the values of all keys that the cases vary."""
+    """SHA-256 hash of the values that the cases give to the varied keys."""
     digest = sha256(repr((cases.is_grid, cases.shape)).encode())
     for values in cases.columns:
         is_words = values.dtype == object
@@ -77,11 +77,11 @@ def _hash_of(cases: Cases) -> str:
 
 @contextmanager
 def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: bool) -> "Iterator[PartsFolder]":
-    """Open and lock a folder of parts for this command.
+    """Open a folder of parts, and lock it so that no other command uses it.
 
-    If `is_resumed`, the command continues from the parts in the folder. Otherwise the folder must have no parts.
-    Raises `ClusterError` if there are parts although `is_resumed` is false, if the parts belong to another question,
-    if the folder cannot be written, or if another command uses it.
+    If `is_resumed` is true, the command continues from the parts in the folder. Otherwise the folder must have no
+    parts. Raises `ClusterError` if there are parts although `is_resumed` is false, if the parts belong to another
+    question, if the folder cannot be written, or if another command uses it.
     """
     with ExitStack() as ends:
         try:
@@ -101,7 +101,7 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
 
 
 class PartsFolder:
-    """The parts of one question in a folder; `done` holds the index of the first case of each finished part."""
+    """The parts of one question in a folder; `done` is the set of the indices of their first cases."""
 
     def __init__(self, path: str, question: Question) -> None:
         self.path, self.question, self.done = path, question, set[int]()
@@ -169,7 +169,7 @@ class PartsFolder:
         self.done.add(part.start)
 
     def parts(self, starts: Iterable[int]) -> Iterator[Part]:
-        """Read parts in the order of `starts`.
+        """Read the parts that begin at the cases `starts`, and yield them in this order.
 
         Raises `ClusterError` if a part cannot be read. A part with damaged content is removed first.
         """

@@ -1,8 +1,8 @@
-"""Runs a function on the workers of a Dask scheduler, with common data and with each of many blocks.
+"""Runs a function on the workers of a Dask scheduler, once for each of many blocks of work.
 
-A block is a number of cases of a sweep, a number of draws of a Monte Carlo, or a row to verify. Common data, such as
-the mission with its files, are sent to a worker only once. If a worker is lost, Dask gives its blocks to other
-workers. A worker needs only the same version of bisar-budget.
+A block is a number of cases of a sweep, a number of draws of a Monte Carlo, or a row to verify. Data that all blocks
+need, such as the mission with its files, are sent to a worker only once. If a worker is lost, Dask gives its blocks
+to other workers. A worker needs only the same version of bisar-budget as the command.
 """
 
 import asyncio
@@ -82,10 +82,10 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
 
 
 def _local_cluster(count: int, ends: ExitStack) -> "LocalCluster":
-    """Start a scheduler and `count` workers on this machine; `ends` closes them.
+    """Start a scheduler and `count` workers on this machine, and register their end in `ends`.
 
-    They are started in a separate thread, because Ctrl-C does not interrupt that thread. If the start itself were
-    interrupted, the cluster could not be closed.
+    They are started in a separate thread, which Ctrl-C does not interrupt. If the start itself were interrupted, the
+    cluster could not be closed.
     """
     from distributed import LocalCluster
 
@@ -106,7 +106,7 @@ def _local_cluster(count: int, ends: ExitStack) -> "LocalCluster":
 
 
 def _block_interrupts() -> None:
-    """Block Ctrl-C in this thread and in the workers that it starts, until these can ignore it themselves."""
+    """Block Ctrl-C in this thread and in the workers that it starts, until the workers ignore it themselves."""
     if hasattr(signal, "pthread_sigmask"):  # not on Windows
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
@@ -125,9 +125,9 @@ def _close(opened: "Client | LocalCluster", seconds: float) -> None:
 
 
 def _greet(address: str) -> None:
-    """Check that a Dask scheduler answers at an address. Raises `OSError` if another program answers.
+    """Check that a Dask scheduler answers at an address; raises `OSError` if another program answers.
 
-    A Dask client would take longer to report the problem, with fewer details.
+    A Dask client would take longer to report this problem, and its report would have fewer details.
     """
     from distributed.core import rpc
     from distributed.security import Security
@@ -150,7 +150,7 @@ def _greet(address: str) -> None:
 
 @dataclass
 class Workers:
-    """The workers of a scheduler; `threads` is the number of their threads at the last count."""
+    """The workers of a scheduler; `threads` is the number of threads that they had at the last count."""
 
     client: "Client"
     address: str
@@ -186,11 +186,12 @@ class Workers:
         blocks: Iterable[Block],
         about: Callable[[Block], str],
     ) -> Iterator[tuple[Block, Result]]:
-        """Call `function(common, block)` on workers, and yield each block with its result, in any order.
+        """Call `function(common, block)` on workers for each block, and yield the blocks with their results.
 
-        `about` returns the name of a block for messages. Only a few blocks are submitted ahead. Raises `ClusterError`
-        if the scheduler or all workers are lost, if every worker that received a block ended, or if a worker cannot
-        compute a block. Raises `RuntimeError` if the function raised an error.
+        The order of the results is arbitrary. `about` returns the name of a block for messages. Only a few blocks per
+        thread are submitted ahead. Raises `ClusterError` if the scheduler or all workers are lost, if every worker
+        that received a block ended, or if a worker cannot compute a block. Raises `RuntimeError` if the function
+        raised an error.
         """
         finished: SimpleQueue[Future[Result]] = SimpleQueue()
         # The common data are the result of a task, so that Dask can create them again if their worker is lost.
@@ -230,10 +231,10 @@ class Workers:
 
 
 def _called(version: str, function: Callable[[Common, Block], Result], common: Common, block: Block) -> Result:
-    """Compute a block on a worker, after a check of the worker's version of bisar-budget.
+    """Call `function(common, block)` on a worker, if the worker has the expected version of bisar-budget.
 
-    Raises `ClusterError` if the version differs, which happens if the worker joined after the first check, or if the
-    worker cannot use the mission.
+    Raises `ClusterError` if the version differs or if the worker cannot use the mission. The version can differ if
+    the worker joined after the first check.
     """
     from distributed import get_worker
 
@@ -253,7 +254,7 @@ def _version_problem(worker: str, worker_version: object, version: str) -> str:
 
 
 def _fault_of_block(error: BaseException, about: str) -> Exception:
-    """Convert the error of a failed block to the exception to raise; `about` names the block in its message."""
+    """Convert the error of a failed block to the exception to raise; `about` names the block in the message."""
     from distributed.scheduler import KilledWorker
 
     if isinstance(error, ClusterError):  # the worker has another version or cannot use the mission

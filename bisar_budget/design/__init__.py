@@ -1,4 +1,4 @@
-"""Answers to design questions: values with which a mission complies, effects of its numbers, and specifications."""
+"""Answers to design questions: which values comply, how numbers of a mission affect it, and what to specify."""
 
 # What other rooms may use.
 __all__ = [

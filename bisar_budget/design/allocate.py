@@ -2,12 +2,12 @@
 
 The utilization of a row of the budget is its error divided by its limit. Each row that can fail has an allowed
 utilization. An error adds a power of its size to the row: the square if errors combine by root-sum-square or powers
-add, the size itself if errors add linearly. The unspecified errors use a part of each allowed utilization. The
-search divides the remaining room among the specified errors so that the sum of weight·log(size) is largest; the
-module `geometric_program` solves this problem. Phases follow from exact ranges, so they are valid for errors of any
-size, but not proportional to the size. Each step therefore makes full checks with each error 20 % larger and 20 %
-smaller than in the step before, and measures the contribution of the error to each row. The search ends when the
-sizes no longer change. Values are in SI and radians.
+add, the size itself if errors add linearly. The errors without a specification use a part of each allowed
+utilization. The search divides the remaining part among the specified errors so that the sum of weight·log(size) is
+largest; the module `geometric_program` solves this problem. Phases follow from exact ranges, so they are valid for
+errors of any size, but not proportional to the size. Each round of the search therefore makes full checks with each
+error 20 % larger and 20 % smaller than in the round before, and measures the contribution of the error to each row.
+The search ends when the sizes no longer change. Values are in SI and radians.
 """
 
 import math
@@ -45,17 +45,19 @@ class AllocationSettings:
     max_rounds : int
         Largest number of rounds. Four are enough if effects are proportional to errors.
     full_step_rounds : int
-        Number of rounds with full steps. Later rounds make half steps, because full steps can oscillate.
+        Number of rounds that change the sizes by the full computed change. Later rounds change them by half of it,
+        because full changes can oscillate.
     end_steps : int
         Number of sizes that are tried between two known sizes, to find the largest size at which an image forms.
     max_shrinks : int
-        Largest number of times that all sizes are reduced by a tenth; together 18 powers of ten.
+        Largest number of times that all sizes are reduced by a tenth. All these reductions together are 18 powers of
+        ten.
     free_ratio : float
         Ratio of the largest to the smallest size that is tried for an error that no row seems to limit.
     free_steps : int
         Number of sizes that are tried in the range of `free_ratio`.
     free_fraction : float
-        Largest fraction of an allowed utilization that such an error may use.
+        Largest fraction of an allowed utilization that an error which no row seems to limit may use.
     close_fraction : float
         Margin that is kept below an allowed utilization when sizes are reduced, as a fraction of this utilization.
     """
@@ -109,9 +111,9 @@ def allocate(
 
 
 def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None, today: date) -> str:
-    """Make the message of the error that `combine: each` causes.
+    """Make the message for a mission with `combine: each`, for which no joint sizes exist.
 
-    With this rule every error is judged alone, so the message lists the allowable size of each error.
+    With this rule every error is judged alone. The message therefore lists the allowable size of each error.
     """
     errors = specified_errors(mission, tree_of(mission), keys)
     rows = check_mission(mission if model is None else Variation(mission, model).read(), today).rows
@@ -130,7 +132,7 @@ def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None,
 
 
 def _broken(specified_mission: SpecifiedMission) -> tuple[Broken, ...]:
-    """Find the rows that the unspecified errors already fill, so that no room is left for specified errors."""
+    """Find the rows in which the errors without a specification leave no room for specified errors."""
     no_errors = np.array([error.nothing for error in specified_mission.specified])
     # Rows that cannot be judged even without the specified errors do not limit them.
     rows = specified_mission.judged(no_errors[:, None]).rows
@@ -150,7 +152,7 @@ def _broken(specified_mission: SpecifiedMission) -> tuple[Broken, ...]:
 
 
 class _SizeSearch:
-    """The search for the sizes of a mission's specified errors."""
+    """Search for the largest sizes of a mission's specified errors."""
 
     def __init__(self, mission: SpecifiedMission) -> None:
         self.mission = mission
@@ -158,8 +160,8 @@ class _SizeSearch:
     def found(self, progress: Progress) -> tuple[Floats, tuple[RowUse, ...]]:
         """Find the largest sizes, and the rows that limit them.
 
-        Returns the sizes (sizes,), which are NaN for an error that no row limits, and the rows with the most
-        restrictive row first. Each step uses utilizations near the sizes of the step before.
+        Returns the sizes (sizes,), with NaN for an error that no row limits. Also returns the limiting rows, the most
+        restrictive row first. Each round uses utilizations near the sizes of the round before.
         """
         sizes = self._first_sizes()
         inside, is_extended = np.minimum(self.mission.tiny, sizes), False
@@ -193,8 +195,9 @@ class _SizeSearch:
     def _free_sizes(self, sizes: Floats, is_free: Booleans) -> Floats:
         """Enlarge the sizes of errors that no row seems to limit, and return all sizes (sizes,).
 
-        Each size ends one step before the error uses a noticeable fraction of a limit (`free_fraction`). `is_free`
-        marks the errors to enlarge, (sizes,). Other sizes are returned unchanged.
+        The new size of an error is the last tried size before the error uses more than the fraction `free_fraction`
+        of any allowed utilization. `is_free` marks the errors to enlarge, (sizes,). Other sizes are returned
+        unchanged.
         """
         extended = sizes.copy()
         for index in np.flatnonzero(is_free).tolist():
@@ -216,10 +219,11 @@ class _SizeSearch:
         return extended
 
     def _find_ends(self, inside: Floats, sizes: Floats) -> None:
-        """Update `ends`, the size of each error at and above which no image forms.
+        """Update `ends`, the sizes of the errors at and above which no image forms.
 
-        One error at a time has its size in `sizes`, and the other errors have the sizes `inside`. Only the ends of
-        errors that prevent an image at this size are updated.
+        `sizes` (sizes,) are the sizes to try and `inside` (sizes,) are sizes at which an image forms. For each error,
+        the mission is checked with the size of this error from `sizes` and the other sizes from `inside`. Only the
+        ends of errors that prevent an image in this check are updated.
         """
         count = sizes.size
         cases = np.repeat(inside[:, None], count, axis=1)
@@ -261,9 +265,9 @@ class _SizeSearch:
     def _kept(self, sizes: Floats, before: Rows) -> tuple[Floats, tuple[RowUse, ...]]:
         """Reduce the sizes until no row exceeds its allowed utilization.
 
-        Returns the sizes (sizes,), which are NaN for an error that no row limits, and the limiting rows with the
-        shares of each error. `before` has the constraints on the location error from earlier steps, in which the
-        largest displacement had another direction.
+        Returns the sizes (sizes,), with NaN for an error that no row limits, and the limiting rows with the shares of
+        each error. `before` has the constraints on the location error from earlier rounds of the search. In these
+        rounds the largest displacement had another direction.
         """
         near = self.mission.near(sizes)
         for _ in range(ALLOCATION_SETTINGS.max_shrinks):
@@ -341,7 +345,10 @@ class _SizeSearch:
 
 
 def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
-    """Find the share of one error in each requirement: its largest share in any row of the requirement."""
+    """Find the largest share of one error in any row of each requirement, by the key of the requirement.
+
+    `key` is the key of the error.
+    """
     shares: dict[str, float] = {}
     for row in rows:
         if row.requirement is not None and key in row.shares:
@@ -383,7 +390,10 @@ def _sheet(
 def _specification(
     mission: Mission, error: Specified, value: float, rows: Sequence[RowUse], parts: Sequence[Entry]
 ) -> Specification:
-    """Make the specification of an error from its computed number; the number is NaN if no row limits the error."""
+    """Make the specification of an error from its computed value.
+
+    `value` is NaN if no row limits the error.
+    """
     declared = error.number.value
     unlimited = Specification(
         key=error.key,

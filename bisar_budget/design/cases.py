@@ -48,10 +48,10 @@ _KEY_HEADER_PATTERN = re.compile(r"^([^\[\]\s]+(?:\[\d+\][^\[\]\s]*)*)\s*(?:\[([
 
 @dataclass(frozen=True, eq=False)
 class Cases:
-    """Cases of a sweep: the varied keys, and for each key a column of values in SI, or of words.
+    """Cases of a sweep: the varied keys, and for each key a column of values.
 
-    The cases of a grid are all combinations of the values, and the last key varies fastest. Otherwise each case takes
-    one row of the columns.
+    Values are numbers in SI, or words. The cases of a grid are all combinations of the values of the columns, and the
+    last key varies fastest. Without a grid all columns have the same length, and each case takes one row of them.
     """
 
     varied: tuple[Varied, ...]
@@ -60,12 +60,12 @@ class Cases:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of values of each key for a grid, otherwise the number of cases."""
+        """Shape of the array of cases: for a grid the number of values of each key, otherwise the number of cases."""
         return tuple(column.size for column in (self.columns if self.is_grid else self.columns[:1]))
 
     @property
     def count(self) -> int:
-        """Number of cases; it may be larger than the size of any array."""
+        """Number of cases, which may be too large for an array."""
         return math.prod(self.shape)
 
     def values(self, start: int, stop: int) -> Mapping[str, Values]:
@@ -117,7 +117,7 @@ def grid_of(tree: JsonObject, values: Mapping[str, ArrayLike]) -> Cases:
 
 
 def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:
-    """Make an array of words, and raise `QuestionError` for an invalid word.
+    """Convert the words of an option to an array; raises `QuestionError` for an invalid word.
 
     Names of parts and files are only checked when the mission is read with them.
     """
@@ -130,7 +130,8 @@ def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:
 def _wrong_word(choices: Choices, word: str) -> str:
     """Describe why a key does not accept a word.
 
-    The text is empty if the key accepts the word, or if only a check of the mission can tell.
+    The text is empty if the key accepts the word. It is also empty if only reading the mission with the word can
+    tell.
     """
     if word.startswith("[") or isinstance(choices.reader, TextList):
         return ""
@@ -143,7 +144,10 @@ def _wrong_word(choices: Choices, word: str) -> str:
 
 # ---------------------------------------------------------------- cases of options
 class _Asked(NamedTuple):
-    """A parsed option `--vary`: the varied key with its words, its values in SI, or the ends and count of a range."""
+    """Parsed text of an option `--vary`: the varied key with its values.
+
+    The values are words, numbers in SI, or the ends and the count of a range.
+    """
 
     option: str
     varied: Varied
@@ -156,16 +160,17 @@ class _Asked(NamedTuple):
 def grid(tree: JsonObject, texts: Sequence[str], name: str = "--vary") -> Cases:
     """Make the cases with every combination of the values of options `--vary`.
 
-    An option is `KEY=FROM:TO UNIT:COUNT`, followed by `:log` for equal ratios, or `KEY=VALUE,VALUE,...`. Keys without
-    a number take `KEY=WORD,WORD,...`. A range includes both ends. Values are rounded in the unit of the option, so
-    that 0:180deg:181 contains exactly 60 deg.
+    An option is `KEY=FROM:TO UNIT:COUNT`, followed by `:log` for equal ratios, or `KEY=VALUE,VALUE,...`. For keys
+    whose values are words the option is `KEY=WORD,WORD,...`. A range includes both ends. Values are rounded in the
+    unit of the option, so that 0:180deg:181 contains exactly 60 deg.
 
     Parameters
     ----------
     tree : dict
         Content of the mission file as text.
     texts : sequence of str
-        Texts of the options `--vary`. An end or a value without a unit has the unit of the last one in its text.
+        Texts of the options `--vary`. An end or a value without a unit has the unit of the last end or value in the
+        same text.
     name : str
         Name of the option for messages.
 
@@ -179,7 +184,10 @@ def grid(tree: JsonObject, texts: Sequence[str], name: str = "--vary") -> Cases:
 
 
 def _axis(asked: _Asked) -> Values:
-    """Compute the values of one option of a grid; raises `QuestionError` if a range has no valid count."""
+    """Compute the values of one option of a grid.
+
+    Raises `QuestionError` if the option is a range without a valid count.
+    """
     if asked.listed is not None:
         return asked.listed
     if not asked.size:
@@ -278,7 +286,10 @@ def _asked(tree: JsonObject, text: str, name: str) -> _Asked:
 
 
 def _range(option: str, number: Number, fields: list[str]) -> _Asked:
-    """Parse the range of an option; `fields` are the parts of its text that colons separate."""
+    """Parse the range of an option `--vary`.
+
+    `fields` are the parts of the text of the range, which colons separate.
+    """
     if is_log := len(fields) > 2 and fields[-1] == "log":
         fields.pop()
     if len(fields) > 3 or "" in fields:
@@ -295,9 +306,9 @@ def _range(option: str, number: Number, fields: list[str]) -> _Asked:
 
 
 def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tuple[float, ...]]:
-    """Parse the texts of values; returns the number with the unit of the last text, and the values in SI.
+    """Parse the values of an option; a value without a unit has the unit of the last text.
 
-    A value without a unit has the unit of the last text.
+    Returns the number with the unit of the last text, and the values in SI.
     """
     units = [normal_unit(_NUMBER_PREFIX.sub("", text).strip()) for text in texts]
     values = []
@@ -311,17 +322,20 @@ def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tu
 
 
 def _usable_unit(unit: str, dimension: Dimension) -> str:
-    """Choose the unit in which values are spaced or rounded.
+    """Choose the unit in which values of an option are spaced or rounded.
 
-    This is `unit`, or the SI unit if `unit` is empty or has an offset. The result is empty if the dimension has no
-    such unit.
+    The result is `unit`, or the SI unit if `unit` is empty or is a unit with an offset of its zero. The result is
+    empty if the dimension has no suitable unit.
     """
     unit = unit if unit and unit not in dimension.offsets else dimension.si
     return unit if unit in dimension.scales else ""
 
 
 def _count(text: str, subject: str, least: int, hint: str = "") -> int:
-    """Read a whole number of at least `least`; the message of the error begins with `subject`."""
+    """Read a whole number of at least `least` from a text.
+
+    For an invalid number it raises an error whose message begins with `subject` and ends with `hint`.
+    """
     if not (text.isascii() and text.isdigit() and len(text) <= 18 and int(text) >= least):
         raise QuestionError(f"{subject} is {shown(text)!r}; accepted: a whole number, at least {least}{hint}")
     return int(text)
@@ -340,7 +354,10 @@ def _spread(asked: _Asked, fractions: Floats) -> Floats:
 
 # ---------------------------------------------------------------- values of cases
 def sampled_cases(cases: Cases, count: int) -> Cases:
-    """Choose `count` cases, or slightly more, as short runs of neighbouring cases that are spread over all cases."""
+    """Choose `count` cases, or slightly more, as a sample of all cases.
+
+    The sample consists of short runs of neighbouring cases that are spread over all cases.
+    """
     length = max(1, count // _STRETCH_COUNT)
     starts = [
         int((number * _GOLDEN_FRACTION + 0.5) % 1 * (cases.count - length)) for number in range(-(-count // length))
@@ -351,14 +368,17 @@ def sampled_cases(cases: Cases, count: int) -> Cases:
 
 
 def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
-    """Yield each varied key that takes words, with the list of its words without repetition."""
+    """Yield each varied key whose values are words, with the list of its different words."""
     for varied, words in zip(cases.varied, cases.columns, strict=True):
         if isinstance(varied, Choices):
             yield varied, list(dict.fromkeys(words.tolist()))
 
 
 def in_unit(number: Number, values: Floats) -> Floats:
-    """Convert values from SI to the unit of a number; a value is rounded if it converts back to the same SI value."""
+    """Convert values from SI to the unit of a number.
+
+    A converted value is rounded if the rounded value converts back to the same SI value.
+    """
     factor, divisor = number.scale
     values_in_unit: Floats = values / factor * divisor
     rounded = _rounded(values_in_unit)
@@ -493,7 +513,7 @@ def _headed(tree: JsonObject, header: str, line_number: int, file: str) -> tuple
 
 
 def _column(tree: JsonObject, cell: str) -> Varied:
-    """Read one cell of the header: a number with the unit of the cell, or a key that takes words."""
+    """Read one cell of the header of a table: a key of numbers and its unit, or a key whose values are words."""
     match = _KEY_HEADER_PATTERN.match(cell)
     if match is None:
         hint = "Cells are separated by commas" if ";" in cell or "\t" in cell else ""

@@ -1,4 +1,4 @@
-"""Comparison of sensors and oscillators of the catalogue: the verdict of a mission with each of them."""
+"""Comparison of the sensors and oscillators of the catalogue by the verdict that a mission has with each of them."""
 
 import json
 import math
@@ -40,7 +40,7 @@ class PartState(NamedTuple):
     standing : Standing
         Verdict of the mission.
     own_row, own_utilization : str, float, optional
-        Row with the highest utilization among the rows that depend only on these figures, and its utilization.
+        Row with the highest utilization among the rows that depend only on `figures`, and its utilization.
     reason : str
         Why the mission does not comply, if no row is the cause; otherwise empty.
     silent_on : tuple of str
@@ -96,7 +96,7 @@ class Comparison(NamedTuple):
 
     @property
     def status(self) -> str:
-        """Whether `all`, `some` or `none` of the parts comply; `waived` if no part complies and some are waived."""
+        """How many parts comply: `all`, `some` or `none`; `waived` if no part complies and some parts are waived."""
         count = len(self.complying)
         if count:
             return "all" if count == len(self.parts) else "some"
@@ -104,7 +104,7 @@ class Comparison(NamedTuple):
 
 
 def is_sensor_key(key: str) -> bool:
-    """Whether a key names parts of the catalogue, which `solve` compares."""
+    """Whether the values of a key are names of catalogue parts, so that `solve` compares parts for this key."""
     return parts_of(key) in {
         ("platforms", name, section, "sensor") for name in PLATFORMS for section in _PART_KINDS_BY_SECTION
     }
@@ -179,7 +179,10 @@ def compare_parts(
 
 
 def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
-    """Yield the states with `silent_on`: the figures that other parts of the kind state and this part does not."""
+    """Yield the states with `silent_on` filled in.
+
+    It has the figures that other parts of the same kind state and this part does not.
+    """
     for state in states:
         if state.standing.status == "error":
             yield state
@@ -207,10 +210,11 @@ def _order(state: PartState) -> tuple[int, float, float, str]:
 
 
 class _Candidate(NamedTuple):
-    """A part that is tried, with the judged mission, or with the reason why the mission is invalid with this part.
+    """A part of the catalogue to try, with the judged mission.
 
-    `figures` are the figures that the mission takes from the part. `stated` are figures that the mission file states
-    instead of the part.
+    If the mission is invalid with this part, the reason takes the place of the judged mission. `figures` are the
+    figures that the mission takes from the part. `stated` are figures that the mission file states and that replace
+    those of the part.
     """
 
     id: str
@@ -250,9 +254,9 @@ class _PartSearch:
         self.candidates = [each for each in (*project_files, *catalogued.values()) if each.part.kind in self.kinds]
 
     def value(self, name: str, kind: str) -> str:
-        """Make the text of the key's value with the part `name` in place of the given part of the same kind.
+        """Make the text of the key's value with the part `name` in place of the file's part of the kind `kind`.
 
-        Given parts of other kinds stay in the text.
+        Parts of other kinds that the file names stay in the text.
         """
         kept = [named for named, device in self.given.items() if device.kind != kind]
         return json.dumps([*kept, name] if kept else name, ensure_ascii=False)
@@ -312,5 +316,5 @@ class _PartSearch:
 
 
 def mission_with(variation: Variation, key: str, state: PartState) -> Mission:
-    """Read the mission with one of the compared parts."""
+    """Read the mission with the part of `state`, one of the compared parts, as the value of the key."""
     return variation.read([SetValue(key, _PartSearch(variation, key).value(state.id, state.kind))])

@@ -21,13 +21,13 @@ class BarrierSettings:
     Attributes
     ----------
     gap_fraction : float
-        Largest distance of Σ w·x to its maximum, as a fraction of Σ w.
+        Largest allowed distance between Σ w·x and its maximum, as a fraction of Σ w.
     firmness_factor : float
         Factor by which the weight of the objective against the barrier grows in each round.
     max_newton_steps : int
         Largest number of Newton steps in each round; ten are usually enough.
     decrement_ratio : float
-        Half the square of Newton's decrement below which a round ends.
+        A round ends when half the square of Newton's decrement is below this value.
     """
 
     gap_fraction: float = 1e-8
@@ -55,11 +55,11 @@ class Rows(NamedTuple):
         return fractions
 
     def with_rows(self, further: "Rows") -> "Rows":
-        """Append other rows to these rows."""
+        """Make new constraints: the rows of these constraints, followed by the rows of `further`."""
         return Rows(*(np.concatenate(both) for both in zip(self, further, strict=True)))
 
     def of_sizes(self, chosen: Booleans) -> "Rows":
-        """Keep only the columns of the chosen sizes; `chosen` is (sizes,)."""
+        """Make new constraints with the columns of the chosen sizes only; `chosen` is (sizes,)."""
         return self._replace(share=self.share[:, chosen])
 
 

@@ -1,4 +1,7 @@
-"""Images at the solution of a design question; they show whether the limit of the binding row is correct."""
+"""Images of the mission at the solution of a design question.
+
+They show whether the limit of the binding row is correct.
+"""
 
 from glob import escape
 from typing import NamedTuple
@@ -14,7 +17,7 @@ from bisar_budget.workers import Progress, unseen
 
 
 class ToImage(NamedTuple):
-    """A case for images: the mission at the solution, the binding row, and the solution as text."""
+    """Data for forming images at a solution: the mission there, the binding row, and the solution as text."""
 
     mission: Mission
     row: str
@@ -27,10 +30,11 @@ class ToImage(NamedTuple):
 
 
 def to_image(mission: Mission, solution: Solution | Comparison, model: str | None) -> ToImage | None:
-    """Make the case for images at a solution; None if no value complies, if all values comply, or if no row binds.
+    """Choose the mission and the row for images at a solution.
 
-    The case is the mission at the largest value at which compliance ends or begins. For a comparison it is the
-    mission with the complying part that has the smallest margin.
+    Returns None if no value complies, if all values comply, or if no row binds. The mission is the one at the largest
+    value at which compliance ends or begins. For a comparison it is the mission with the complying part that has the
+    smallest margin.
     """
     variation = Variation(mission, model)
     if isinstance(solution, Comparison):

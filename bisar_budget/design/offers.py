@@ -1,4 +1,4 @@
-"""Comparison of a supplier's offer with a sheet of specifications: every figure, and the mission as a whole."""
+"""Comparison of a supplier's offer with a sheet of specifications: each offered figure, and the whole mission."""
 
 from datetime import date
 from typing import NamedTuple
@@ -25,7 +25,7 @@ class OfferedFigure(NamedTuple):
     value : float, optional
         The figure in SI; None if the file of the offer states no figure.
     text : str
-        The figure as the file writes it.
+        The figure as the file of the offer writes it.
     ordered : str
         The ordered size, as text.
     is_inside : bool, optional
@@ -43,7 +43,7 @@ class OfferedFigure(NamedTuple):
 
 
 class Offer(NamedTuple):
-    """Result of comparing an offer with a sheet: its mission file, its figures, and the verdict of its mission.
+    """Result of comparing an offer with a sheet: the file of the offer, its figures, and the verdict of its mission.
 
     `notes` name the other sections in which the mission of the offer differs from the mission of the sheet.
     """
@@ -67,8 +67,8 @@ def offer(sheet: SpecificationSheet, mission: Mission, today: date) -> Offer:
     """Compare the mission of an offer with a sheet of specifications.
 
     A figure meets its specification if it is no larger than the ordered size. If a figure has three axes, the largest
-    value counts; the same holds for figures of parts that the offer names. A level shifts a spectrum, so levels of
-    different spectra cannot be compared. Specifications and waivers in the file of the offer are ignored.
+    value counts. Figures of parts that the offer names are compared in the same way. A level shifts a spectrum, so
+    levels of different spectra cannot be compared. Specifications and waivers in the file of the offer are ignored.
     """
     sheet_mission = None if sheet.findings is None else sheet.findings.mission
     figures = tuple(_figure(each, sheet, mission, sheet_mission) for each in sheet.specifications)
@@ -108,9 +108,9 @@ def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
 
 
 def _rules(mission: Mission) -> AllocationRules:
-    """Bring the allocation rules of a mission into the form of a sheet.
+    """Convert the allocation rules of a mission to the form in which a sheet has them.
 
-    The rules are returned without `specify`, and balanced shares are replaced by equal shares.
+    The returned rules have no `specify`, and equal shares in place of balanced shares.
     """
     split = mission.allocation.split
     if isinstance(split, MetricSplits) and split.quadratic_phase_error == "balanced":

@@ -1,8 +1,8 @@
 """Passes of a satellite over the scene of a mission, and the verdict of the mission in each pass.
 
-A pass lasts as long as the satellite is above a least elevation; if both platforms have orbits, both must be above
-it. The mid-time of a pass is the time at which the satellite sees the scene with a given squint, by default at
-broadside. The middle of the aperture is put at the mid-time, and the mission is checked like a file with this
+A pass lasts as long as the satellite is above a least elevation; if both platforms have orbits, both satellites must
+be above it. The mid-time of a pass is the time at which the satellite sees the scene with a given squint, by default
+at broadside. The middle of the aperture is put at the mid-time, and the mission is checked like a file with this
 `collection.center_time`.
 """
 
@@ -51,8 +51,8 @@ class SatellitePass(NamedTuple):
     start, stop, culmination : Instant
         Beginning and end of the time above the least elevation, and the time of the largest elevation.
     rises, sets : bool
-        False if the satellite is already above the least elevation at the beginning, or still at the end, of the
-        span.
+        Whether the satellite rises above and sinks below the least elevation within the span. `rises` is False if it
+        is already above at the beginning of the span, `sets` if it is still above at the end.
     max_elevation : float
         Elevation at the culmination. [rad]
     track : (n, 2)
@@ -68,14 +68,14 @@ class SatellitePass(NamedTuple):
     doubt : float, optional
         Largest possible distance of the satellite from its computed path. [m]
     status, reason : str
-        Status of the check, and the reason for it. `error` if there is no mission at the mid-time, `not_evaluated`
-        if there is no mid-time.
+        Status of the check at the mid-time, and the reason for it. The status is `error` if the mission is invalid at
+        the mid-time, and `not_evaluated` if there is no mid-time.
     bistatic_angle, gradient_angle : float, optional
         Bistatic angle, and angle between range and Doppler gradient, at the mid-time. [rad]
     range_resolution, cross_range_resolution : float, optional
         Resolutions at the mid-time. [m]
     row, requirement, utilization : str, str, float, optional
-        Row, key and utilization of the requirement that decides.
+        Row, key and utilization of the requirement that decides the status.
     waived_by : tuple of str
         Ids of the waivers of a waived pass.
     """
@@ -283,9 +283,10 @@ def _watched(
 
 
 def _hold_to_an_orbit(mission: Mission, variation: Variation, start: Instant) -> None:
-    """Read the mission with the middle of the aperture at an instant, and raise the error if this fails.
+    """Read the mission with the middle of the aperture at an instant, to raise the error of an unusable orbit.
 
-    The message does not mention the changed instant, because the user has not set it.
+    Nothing is raised if the mission is valid. The message does not mention the changed instant, because the user has
+    not set it.
     """
     try:
         variation.read(center_time(start))
@@ -298,7 +299,7 @@ def _hold_to_an_orbit(mission: Mission, variation: Variation, start: Instant) ->
 
 
 def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneAxes, squint: float) -> SatellitePass:
-    """Compute the times, the track and the mid-time of a pass, before the mission is checked.
+    """Find the times, the track and the mid-time of a pass; its mission is checked later.
 
     `stretch` is the time interval of the pass. `squint` is the squint angle at the mid-time. [rad]
     """
@@ -368,12 +369,12 @@ def _checked(
 
 
 def center_time(instant: Instant) -> list[SetValue]:
-    """Make the change of a mission file that puts the middle of the aperture at an instant."""
+    """Make the changes to a mission file that put the middle of the aperture at an instant."""
     return [SetValue(CENTER_TIME, instant.as_text())]
 
 
 def _judged(unjudged: SatellitePass, findings: MissionFindings, mission: Mission, platform: str) -> SatellitePass:
-    """Add the findings of the check at the mid-time to a pass, and return the completed pass."""
+    """Add the findings of the check at the mid-time to a pass that has none yet, and return the completed pass."""
     path = getattr(mission.platforms, platform).path
     row, requirement, utilization, reason = _deciding(findings)
     return unjudged._replace(
@@ -396,8 +397,8 @@ def _deciding(findings: MissionFindings) -> tuple[str | None, str | None, float 
     """Find the row, key and utilization of the requirement that decides, and the reason for the mission's status.
 
     Among the requirements that have the same status as the mission, the one with the highest utilization decides. If
-    no requirement has this status, a row or a warning about the whole mission decides. The utilization is None if
-    nothing is judged.
+    no requirement has this status, it comes from a row or from a warning about the whole mission. The utilization is
+    None if nothing is judged.
     """
     worst = min(findings.requirements, key=lambda each: (RANK[each.status], -(each.utilization or 0.0)))
     if worst.status == findings.status:

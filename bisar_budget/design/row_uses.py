@@ -43,8 +43,8 @@ _HAVE_THEIR_OWN_ROW = (Why.EFFECT_NOT_TAKEN, Why.AIR_STAYS)  # reasons of rows w
 class RowUses(NamedTuple):
     """Utilizations of all rows that can fail, with the ids and requirements of the rows.
 
-    `uses` are the utilizations, (rows, cases). `powers` are the exponents of the rows, (rows,): 1 if the errors of a
-    row add linearly, 2 if their squares add.
+    `uses` are the utilizations (rows, cases), one column for each set of sizes. `powers` are the exponents of the
+    rows, (rows,): 1 if the errors of a row add linearly, 2 if their squares add.
     """
 
     ids: Sequence[str]
@@ -83,21 +83,24 @@ class Near(NamedTuple):
     is_free: Booleans
 
     def rows(self, of: str = "") -> Rows:
-        """Constraints for the geometric program: all rows that limit a size, or only the row with the id `of`."""
+        """Make the constraints on the sizes for the geometric program.
+
+        These are all rows that limit a size, or only the row with the id `of`.
+        """
         limits = self.is_limit & np.array([not of or row == of for row in self.found.ids])
         power = self.found.powers[limits]
         return Rows(self.part[limits] / self.sizes ** power[:, None], power, self.room[limits])
 
 
 class SpecifiedMission:
-    """A mission and its specified errors; waivers and specifications of the file are removed.
+    """A mission and its specified errors, without the waivers and specifications of its file.
 
     Attributes
     ----------
     ends : (sizes,)
-        Sizes at and above which there is no image; infinite until the search finds them.
+        Sizes at and above which there is no image. An element is infinite until the search finds this size.
     most : (sizes,)
-        Largest sizes that a mission file may state; infinite until the search exceeds them.
+        Largest sizes that a mission file may state. An element is infinite until the search exceeds this size.
     unjudged : set of str
         Ids of rows that cannot be judged even without the specified errors.
     """
@@ -137,9 +140,9 @@ class SpecifiedMission:
         self.largest = np.array([error.largest for error in self.specified])
 
     def _equal(self, mission: Mission) -> Iterator[SetValue]:
-        """Yield the changes that replace balanced shares by equal shares.
+        """Yield the changes of the mission file that replace balanced shares by equal shares.
 
-        Balanced shares depend on the declared errors, which are still unknown.
+        Balanced shares depend on the sizes of the declared errors, which are still unknown.
         """
         split = mission.allocation.split
         key = "allocation.split"
@@ -160,7 +163,7 @@ class SpecifiedMission:
         )
 
     def _read(self, changes: Sequence[SetValue]) -> Mission:
-        """Read the mission with changes, and remove its waivers and specifications."""
+        """Read the mission with changed values, and remove its waivers and specifications."""
         return self.variation.read([*self.equal, *changes])._replace(waivers=(), specifications={})
 
     def judged(self, sizes: Floats, *, is_of_sums: bool = True) -> JudgedMission:
@@ -177,7 +180,7 @@ class SpecifiedMission:
 
     @cached_property
     def _nodes(self) -> int:
-        """Number of times in the aperture at which exact ranges are computed for the polynomial fit."""
+        """Number of times in the aperture at which exact ranges are computed, to fit a polynomial to them."""
         return int(exact_ranges(self.stated, self.stated.geometry).fit.shape[1])
 
     def uses(self, sizes: Floats) -> RowUses:
@@ -223,8 +226,8 @@ class SpecifiedMission:
     def allowed(self, ids: Sequence[str]) -> Floats:
         """Compute the allowed utilizations of rows, (rows,): 1 minus the reserve, less a small margin.
 
-        Rows without a requirement have no reserve. Rows for the largest size with an image have a margin of at least
-        0.5 %.
+        Rows without a requirement have no reserve. A row that stands for the largest size with an image has a margin
+        of at least 0.5 %.
         """
         usual = (1 - self.reserve) * _SURE_FRACTION
         most = {NEGLIGIBLE: _SURE_FRACTION, END_OF_IMAGE: min(usual, _END_FRACTION), LARGEST_ACCEPTED: _SURE_FRACTION}

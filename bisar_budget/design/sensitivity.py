@@ -1,8 +1,8 @@
 """Sensitivity of the worst utilization to each number of a mission, from differences between full checks.
 
 Each number that the file states, or takes from a part, is changed alone, and all cases are checked together. If the
-shares of the budget are balanced by the declared errors, each error is also doubled, to show how much the other
-errors lose. Values are in SI and radians.
+shares of the budget are balanced by the declared errors, each error is also doubled, to show how much the allowables
+of the other errors shrink. Values are in SI and radians.
 """
 
 import json
@@ -79,18 +79,21 @@ class Slope(NamedTuple):
     value, unit : float, str
         The value in its unit. For a covariance the value is 1, the factor by which its sigmas are multiplied.
     per, per_text : float, str
-        Increase of the number that causes `change`: in SI with the sign of the value, and in words.
+        Increase of the number that causes `change`. `per` is in SI and has the sign of the value; `per_text` is in
+        words.
     step : float
-        Step of the difference, in SI. A central difference spans two steps.
+        Step by which the number is changed, in SI. A central difference spans two steps.
     difference : str
-        `central`; or `forward` or `backward` over two steps, if the mission is invalid on the other side.
+        Kind of difference: `central`, or `forward` or `backward` over two steps if the mission is invalid on one
+        side.
     change, row_change : float
-        Change of the worst utilization, and of the requested row's utilization; None without a requested row.
+        Change of the worst utilization, and change of the requested row's utilization. `row_change` is None without a
+        requested row.
     row_below, row_above : str
         Rows with the worst utilization at the lower and at the upper end of the difference, by magnitude.
     is_mixed : bool
-        Whether the row with the worst utilization is another one at an end. The change then mixes the slopes of two
-        rows.
+        Whether the row with the worst utilization differs between the ends of the difference and the value of the
+        file. The change then mixes the slopes of two rows.
     part : str
         Part of the catalogue from which the number is taken; empty if the file states it.
     measure : float
@@ -126,7 +129,7 @@ class Slope(NamedTuple):
 
     @property
     def even_effect(self) -> float:
-        """Effect of an increase by 1 % in the sense of `measure`, to compare numbers of different kinds."""
+        """Effect of an increase for which `measure` would be 1 %, to compare numbers of different kinds."""
         return self.effect * COMPARED_CHANGE_FRACTION / self.measure
 
     @property
@@ -140,7 +143,7 @@ class Relaxed(NamedTuple):
 
     `shares_before` and `shares_after` are the shares of transmitter and receiver. `transmitter` and `receiver` each
     have the worst row after the doubling, and the worst utilization before and after it. Only judged rows of other
-    errors are included; None if there are no such rows.
+    errors are included. A platform without such rows has None.
     """
 
     key: str
@@ -160,8 +163,8 @@ class Sensitivity(NamedTuple):
 
     `worst_row` has the worst utilization of all judged rows that can fail; `requirement` sets its allowable. `row` is
     the requested row, or None. If it is set, the numbers are sorted by their effects on it. `unchanging` are keys of
-    numbers without any effect. `relaxed` is empty if shares are not balanced. `overrides` are influences from outside
-    the file.
+    numbers without any effect. `relaxed` is empty if shares are not balanced. `overrides` are influences on the
+    result from outside the mission file.
     """
 
     file: str
@@ -234,7 +237,7 @@ class Stated(NamedTuple):
     others: tuple[Number, ...] = ()
 
     def at(self, value: float) -> Mapping[Number, float]:
-        """Compute the new values of all numbers that change if this number is set to `value`."""
+        """Compute the new values of this number and of the numbers that change with it, when it is set to `value`."""
         remainder = 1 - self.value
         further = {share: (share.value or 0.0) * (1 - value) / remainder for share in self.others}
         return {self.number: value, **further}
@@ -317,8 +320,8 @@ class _Uses(NamedTuple):
     """Utilizations of a mission in one case.
 
     `worst_row` is the row with the worst utilization `worst`, and `requirement` sets its limit. `row` is the
-    utilization of the requested row, or None. `of_worst` is the utilization of the row that is the worst with the
-    numbers of the file.
+    utilization of the requested row, or None. `of_worst` is the utilization, in this case, of the row that is the
+    worst with the numbers of the file.
     """
 
     worst_row: str
@@ -329,12 +332,15 @@ class _Uses(NamedTuple):
 
     @property
     def is_passed(self) -> bool:
-        """Whether another row is worse, by more than rounding, than the worst row with the numbers of the file."""
+        """Whether another row is now worse than the row that is the worst with the numbers of the file.
+
+        Differences by rounding do not count.
+        """
         return self.worst - self.of_worst > _UTILIZATION_ROUNDING_FRACTION * self.worst
 
 
 class _Neighbours:
-    """Checks of a mission with one number changed by one or two steps up or down, from which slopes follow."""
+    """Checks of a mission in which one number is changed by one or two steps, to compute slopes from them."""
 
     def __init__(
         self, variation: Variation, numbers: Sequence[Stated], worst: str | None, row: str | None, today: date
@@ -460,7 +466,7 @@ Leaf = tuple[str, Reader[object], Content, Mapping[str, object] | None]
 def _leaves(reader: Reader[object], value: object, path: tuple[str, ...], above: JsonObject | None) -> Iterator[Leaf]:
     """Yield every leaf of the tree of a mission file: its key, its reader, its value, and the shares of its section.
 
-    The shares are None if the leaf is no share.
+    The shares are None if the leaf is not a share itself.
     """
     reader = form_of(reader, value)
     children: Sequence[tuple[str, object]] = ()
@@ -509,7 +515,10 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, ob
 
 
 def _no_number(key: str, reader: Reader[object]) -> str:
-    """Explain why the value of a key is not varied; the text is empty for names and remarks, which have no effect."""
+    """Explain why the value of a key is not varied.
+
+    The text is empty for names and remarks, which have no effect on the verdict.
+    """
     kinds = (
         ("is a whole number", isinstance(reader, Whole | Version)),
         ("is a choice", isinstance(reader, Choice)),
@@ -563,7 +572,7 @@ def _declared_errors(mission: Mission) -> Iterator[str]:
 
 
 def _shares(judged: JudgedMission) -> tuple[float, float]:
-    """Shares of transmitter and receiver in the quadratic phase error."""
+    """Shares of transmitter and receiver in the requirement on the quadratic phase error."""
     split = judged.analysis.allocation.qpe
     return split.transmitter, split.receiver
 

@@ -2,8 +2,8 @@
 
 The search samples the range. Between two samples with different compliance it brackets the border. If the worst
 utilization has a maximum or minimum between samples, the search finds it first, because compliance may change and
-change back near it. Each step checks many values at once in the case table. Values are in SI and radians; factors are
-plain numbers.
+change back near it. Each step of the search checks many values at once with the module `table`. Values are in SI and
+radians; factors are plain numbers.
 """
 
 import math
@@ -51,8 +51,8 @@ class SolveSettings:
     Attributes
     ----------
     range_samples, circle_samples : int
-        Number of samples of a range, and of a circle. A circle has a sample every 2 degrees, because geometry changes
-        fast near parallel gradients.
+        Number of samples of a range, and of a full circle of directions. A circle has a sample every 2 degrees,
+        because geometry changes fast near parallel gradients.
     border_fraction : float
         Largest distance between the values on the two sides of a border before rounding, as a fraction of the value.
     max_turns_count : int
@@ -60,8 +60,8 @@ class SolveSettings:
     turn_steps : int
         Number of steps of a golden-section search; the last interval is 7e-5 of the distance between samples.
     ahead_steps, read_ahead_steps : int
-        Number of further steps whose values are checked in advance. The second number applies if each case has to be
-        read, which takes longer.
+        Number of further steps whose values are checked in advance. `read_ahead_steps` applies if the mission has to
+        be read again for each value, which takes longer.
     """
 
     range_samples: int = 65
@@ -193,7 +193,7 @@ class Solution(NamedTuple):
 
     @property
     def best(self) -> Crossing | None:
-        """The crossing with the largest value; None without crossings."""
+        """The crossing with the largest value; None if there are no crossings."""
         return max(self.crossings, key=lambda crossing: crossing.inside.value, default=None)
 
     @property
@@ -203,9 +203,10 @@ class Solution(NamedTuple):
 
     @property
     def status(self) -> str:
-        """`crossing` if compliance changes in the range, otherwise `all`, `none`, or `waived`.
+        """Whether values in the range comply: `crossing`, `all`, `none` or `waived`.
 
-        `waived` is returned if no value complies and some values are waived.
+        `crossing` means that compliance changes in the range. `waived` is returned if no value complies and some
+        values are waived.
         """
         if self.crossings:
             return "crossing"
@@ -273,10 +274,10 @@ def solve(
 
 
 def _nearest(states: Sequence[State]) -> State:
-    """Find the first state with the smallest margin if all states comply, otherwise with the smallest excess.
+    """Find the state with the smallest margin if all states comply, otherwise the one with the smallest excess.
 
-    If some states are waived, only these are considered. A state that is not evaluated exceeds no limit, so its
-    excess is taken as the smallest.
+    Of several such states the first one is returned. If some states are waived, only these are considered. A state
+    that is not evaluated exceeds no limit, so its excess is taken as the smallest.
     """
     if all(state.complies for state in states):
         uses = [state.utilization or 0.0 for state in states]
@@ -299,7 +300,7 @@ def _is_alike(first: float | None, second: float | None) -> bool:
 
 
 class _Search:
-    """The search for crossings of one number of a mission."""
+    """Search for the crossings of one number of a mission: the borders of compliance in its range."""
 
     def __init__(
         self,
@@ -401,7 +402,10 @@ class _Search:
         return tuple(_crossing(low, high, next(rounded), next(rounded)) for low, high in narrow)
 
     def _searched(self, searches: Sequence[Search[SearchT]]) -> list[SearchT]:
-        """Run several searches to their ends, and return their results; needed values are checked all at once."""
+        """Run several searches together to their ends, and return their results.
+
+        The values that any of the searches needs next are checked all at once.
+        """
         states_by_value: dict[float, State] = {}
         while True:
             results = [search(states_by_value) for search in searches]
@@ -461,7 +465,7 @@ def _golden(low: float, high: float) -> tuple[float, float]:
 
 
 def _turns(states: Sequence[State]) -> list[tuple[float, float, State]]:
-    """Find the intervals with a maximum or minimum of the utilization and without a change of compliance.
+    """Find intervals between samples in which the utilization has a maximum or minimum and compliance is constant.
 
     Each item has the low and high value of the interval, and the state at the sample between them.
     """
@@ -501,10 +505,11 @@ def _turn(
 
 
 def _crossing(low: State, high: State, below: State, above: State) -> Crossing:
-    """Make the crossing between two states.
+    """Make the crossing at a border of compliance.
 
-    `below` and `above` are the states at the rounded values. They replace `low` and `high` if they have the same
-    compliance; otherwise compliance changes again within the rounding.
+    `low` and `high` are the states on its two sides. `below` and `above` are the states at the rounded values of
+    these sides. They replace `low` and `high` if they have the same compliance; otherwise compliance changes again
+    within the rounding.
     """
     is_upper = low.complies
     is_verified = below.complies == low.complies and above.complies == high.complies
@@ -515,5 +520,5 @@ def _crossing(low: State, high: State, below: State, above: State) -> Crossing:
 
 
 def _sign(state: State) -> float:
-    """Sign of the change of utilization that can change compliance: 1 if the state complies, otherwise -1."""
+    """Sign of the change of the utilization that would change compliance: 1 if the state complies, otherwise -1."""
     return 1.0 if state.complies else -1.0

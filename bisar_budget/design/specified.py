@@ -1,4 +1,4 @@
-"""Specified errors: their keys, the units of ordered sizes, and the parts that meet a specification."""
+"""Errors to specify: their keys, the units of their ordered sizes, and the parts that meet a specification."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -182,7 +182,7 @@ def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
 
 
 def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Number:
-    """Find the number that a key names, with its value in the file, or else in the part that the file names.
+    """Find the number that a key names, with the value that the file or a part named in the file gives it.
 
     If the value has three components, one for each axis, the component of largest magnitude is taken.
     """
@@ -252,8 +252,8 @@ def _is_satellite(platform: Platform) -> bool:
 def _quiet_oscillators(mission: Mission, name: str, level: float, candidates: Sequence[Entry]) -> Iterator[str]:
     """Yield the ids of the oscillators that meet an ordered level of phase noise [dB].
 
-    The phase noise of such an oscillator is nowhere above the spectrum of the platform's oscillator, shifted by
-    `level`.
+    `name` is the name of the platform. The phase noise of a listed oscillator is nowhere above the spectrum of the
+    platform's oscillator, shifted by `level`.
     """
     carrier, pieces = _spectrum(mission, name)
     aperture = mission.collection.aperture_time
@@ -288,9 +288,10 @@ def ordered_noise(mission: Mission, specified: Specified, level: float) -> str:
 
 
 def _spectrum(mission: Mission, name: str) -> tuple[float, Sequence[PowerLawPiece]]:
-    """Find the frequency of a platform's oscillator [Hz], and its phase noise spectrum at this frequency.
+    """Find the phase noise spectrum of a platform's oscillator, and the frequency to which it refers [Hz].
 
-    Without a frequency of the oscillator it is the centre frequency of the radar. The level of the spectrum is 0 dB.
+    The frequency is that of the oscillator, or the centre frequency of the radar if the oscillator states none. The
+    spectrum is the one at a level of 0 dB.
     """
     oscillator = getattr(mission.platforms, name).oscillator
     carrier = oscillator.frequency or mission.radar.center_frequency

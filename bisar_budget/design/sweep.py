@@ -65,7 +65,7 @@ _UNIT_BY_SUFFIX = {"rad": "rad", "db": "dB"}  # by the last word of a field's na
 class Asked:
     """A sweep that is requested: a mission, and the cases in which it is checked.
 
-    Arguments are those of `bisar_budget.sweep`. Repeated columns are used once.
+    Arguments are those of `bisar_budget.sweep`. A column that is named several times is used once.
 
     Raises
     ------
@@ -127,9 +127,10 @@ class Asked:
                 raise QuestionError(f"{choices.key}: no value of it makes a mission: {problem}")
 
     def _hold_to_a_mission(self, number: Number) -> None:
-        """Raise `QuestionError` if no tried value of a key gives a valid mission.
+        """Raise `QuestionError` if the mission is invalid with every tried value of a key.
 
-        The first, the middle and the last value are tried. The error is raised if all three fail for the same reason.
+        The first, the middle and the last value are tried. The error is raised only if all three fail for the same
+        reason.
         """
         problems = set()
         for index in {0, self.cases.count // 2, self.cases.count - 1}:
@@ -159,7 +160,10 @@ class Asked:
             yield Column(name, unit, _FIELDS[field].format(row), is_text=is_status(name))
 
     def swept(self, parts: Iterator[Part]) -> Swept:
-        """Make the description of the sweep; `parts` is the iterator over its checked parts."""
+        """Describe the sweep: its mission, varied keys and columns, together with its results.
+
+        `parts` is the iterator over the checked parts of the results.
+        """
         varied = [
             Column(
                 each.key, each.dimension.si if isinstance(each, Number) else "", "Varies.", isinstance(each, Choices)
@@ -176,12 +180,15 @@ class Asked:
         )
 
     def checked(self, jobs: int = 1) -> Swept:
-        """Make the sweep, whose parts are checked by `jobs` processes when they are needed."""
+        """Make the sweep, whose results are computed when they are needed.
+
+        `jobs` is the number of processes that check the cases.
+        """
         return self.swept(self.shared_out(self.chunks.starts, jobs))
 
     @cached_property
     def chunks(self) -> "Chunks":
-        """Division of the cases into chunks.
+        """The cases divided into chunks, which are checked one at a time.
 
         Chunks are smaller if many cases of a sample cannot be checked as arrays, but have to be read one by one.
         """
@@ -195,7 +202,10 @@ class Asked:
 
     @cached_property
     def travelling(self) -> Question:
-        """Question for other processes; it contains the content of all files that the mission names."""
+        """The question in a form that can be sent to other processes.
+
+        It contains the content of all files that the mission names.
+        """
         words = [SetValue(choices.key, word) for choices, chosen in words_of(self.cases) for word in chosen]
         return self.question._replace(named=named_by(self.mission, words))
 
@@ -221,7 +231,10 @@ class Asked:
 
 @dataclass(frozen=True)
 class Chunks:
-    """Division of `end` cases into chunks of `size` cases; `is_slow` if many cases have to be read one by one."""
+    """The cases 0 to `end` - 1, divided into chunks of `size` cases.
+
+    `is_slow` tells whether many cases have to be read one by one.
+    """
 
     end: int
     size: int
@@ -239,7 +252,7 @@ class Chunks:
 
 @lru_cache(maxsize=1)
 def _table(question: Question) -> Table:
-    """Make the table of a question; the table of the last question is cached."""
+    """Make the table that checks the cases of a question; the table of the last question is cached."""
     parse = mission_of if question.named is None else question.named.parse
     tree = read_tree(question.data, question.file)
     return Table(question, parse(tree, question.data, question.file, question.model, changes=question.changes))

@@ -1,9 +1,9 @@
-"""The case table: checks of one mission in many cases, for sweeps, solutions, sensitivities and comparisons.
+"""Checks of one mission in many cases, for sweeps, `solve`, sensitivities and comparisons of parts.
 
-If no other content of the mission follows from a number, an array with the values of all cases replaces the number.
-Otherwise each case is read like a mission file with the numbers of the case, and missions of the same structure are
-then joined into one mission with arrays. In both ways all cases are judged together. Only this module decides which
-row is the worst.
+If no other content of the mission depends on a varied number, an array with the values of all cases replaces the
+number. Otherwise each case is read like a mission file with the numbers of the case, and missions of the same
+structure are then joined into one mission with arrays. In both ways all cases are judged together. Only this module
+decides which row is the worst.
 """
 
 import math
@@ -99,10 +99,10 @@ _IS_JUDGED = np.array([status.is_judged for status in STATUS.values()])
 
 # ---------------------------------------------------------------- the worst row
 def breaking(target: str) -> frozenset[str]:
-    """Names of the statuses with which a mission does not comply, for a target.
+    """Names of the statuses with which a mission does not comply, for the target `fail` or `warn`.
 
-    For the target `fail` these are the statuses with which `check` fails, for `warn` the statuses with which
-    `check --strict` fails. `waived` is always included.
+    For the target `fail` these are the statuses with which `check` fails, for `warn` the statuses with which `check
+    --strict` fails. `waived` is always included.
     """
     fails = (name for name, status in STATUS.items() if (status.fails if target == "fail" else status.fails_strict))
     return frozenset([*fails, "waived"])
@@ -164,7 +164,10 @@ def _verdict(
 
 
 def _waived_by(judged: JudgedMission, row_id: str | None, is_waived: Booleans) -> Values:
-    """Join the ids of the waivers of each case as the file writes them, (cases,); empty if a case is not waived."""
+    """Make one text for each case with the ids of the waivers that apply to it, (cases,).
+
+    The ids are those that the file writes. The text is empty if the case is not waived.
+    """
     ids = np.full(is_waived.shape, "", dtype=object)
     for waiver_id, covers in judged.covering(row_id) if is_waived.any() else ():
         extended = np.where(ids == "", "", BETWEEN_WAIVERS).astype(object) + waiver_id
@@ -189,7 +192,10 @@ def listed(waived_by: str) -> tuple[str, ...]:
 
 
 def standing(judged: JudgedMission, row_id: str | None, breaks: Container[str]) -> Standing:
-    """Verdict of a single mission, or of its row `row_id`; statuses in `breaks` do not comply."""
+    """Make the verdict of a single mission, or of its row `row_id` if it is set.
+
+    The mission does not comply if its status is in `breaks`.
+    """
     rows = {row.subject.id: row for row in judged.rows}
     (status,), (row,), (use,), (requirement,), (waived_by,) = (
         np.ravel(column) for column in _verdict(judged, rows, row_id, breaks).values()
@@ -278,7 +284,7 @@ class Question(NamedTuple):
 
 
 class Table:
-    """Table of the cases of one mission, which checks them; any process can build it from a question.
+    """Checks of the cases of one mission; any process can build the same table from a question.
 
     `numbers` are the numbers of the question's keys, by default the numbers of the file. A number with the reader
     `FACTOR` is a factor by which the errors below its key are multiplied.
@@ -352,7 +358,7 @@ class Table:
         return cases - int(self._arrays(columns, cases)[0].size)
 
     def _columns(self, values: Mapping[str, Values], cases: int) -> dict[str, Values]:
-        """Make the columns for a number of cases: columns of the given values, and empty columns for the results."""
+        """Make the columns of `cases` cases: columns of the given values, and empty columns for the results."""
         columns: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
         columns |= {number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers}
         is_text = {column.name: column.is_text for column in (*GEOMETRY, *VERDICT, WAIVED_BY, REASON)}
@@ -417,7 +423,7 @@ class Table:
         read_indices: list[int] = []
 
         def read() -> Iterator[Mission]:
-            """Read the missions of the remaining cases one by one; their indices are added to `read_indices`."""
+            """Read the missions of the cases that need it, one by one; their indices are added to `read_indices`."""
             for index in np.delete(np.arange(cases), indices).tolist():
                 mission = self._read(columns, index)
                 if mission is not None:
@@ -489,5 +495,5 @@ class Table:
 
 
 def is_status(name: str) -> bool:
-    """Whether a column with the name `ROW.FIELD` has statuses instead of numbers."""
+    """Whether the column with this name, such as `ROW.status`, has statuses instead of numbers."""
     return name.endswith(".status")

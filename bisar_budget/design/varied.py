@@ -58,10 +58,11 @@ SAFETY_FACTOR = 1 + 1e-6  # around a limit of image formation within which a cas
 
 
 def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
-    """Whether an array can replace a number; `is_stated` tells whether the file states the number.
+    """Whether an array, with one value for each case, can replace the number with a key.
 
-    An array cannot replace a number from which other content of the mission follows. Such numbers belong to an orbit
-    or a log, to the position of the scene on the Earth, to the orientation of the Earth, or to a covariance matrix.
+    `is_stated` tells whether the file states the number. An array cannot replace a number from which other content of
+    the mission follows. Such numbers belong to an orbit or a log, to the position of the scene on the Earth, to the
+    orientation of the Earth, or to a covariance matrix.
     """
     section, *steps = parts_of(key)
     if section == "platforms":
@@ -81,7 +82,10 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
 
 
 def _is_held_of_error(error: MotionError, steps: Sequence[str], is_stated: bool) -> bool:
-    """Whether an array can replace a number of a motion error."""
+    """Whether an array can replace a number of a motion error.
+
+    `steps` are the parts of its key below the motion error; `is_stated` tells whether the file states the number.
+    """
     if steps[0] in MOTION:
         return steps[0] == "acceleration" or error.covariance is None  # a covariance replaces position and velocity
     if steps[0] == "covariance" and error.covariance is not None:
@@ -96,7 +100,10 @@ def _is_held_of_error(error: MotionError, steps: Sequence[str], is_stated: bool)
 
 
 def _is_held_of_path(platform: Platform, name: str, is_stated: bool) -> bool:
-    """Whether an array can replace a number of a path."""
+    """Whether an array can replace a number of the path of a platform.
+
+    `name` is the name of the number; `is_stated` tells whether the file states it.
+    """
     if name == "speed":
         return is_stated and platform.motion_azimuth is not None  # a fixed platform has no direction
     return is_stated or (name == "climb" and platform.slant_range is not None)
@@ -113,8 +120,8 @@ _FREE = {
 def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDArray[np.bool_]:
     """Whether each case certainly forms an image, (cases,); numbers of `mission` may be arrays (cases,).
 
-    The result is False for cases near a limit. Such a case has to be read like a file, which decides exactly and
-    gives the reason.
+    The result is also False for cases near the limit at which an image forms. Such a case has to be read like a file,
+    which decides exactly and gives the reason.
     """
     is_safe = _has_possible_figures(mission, cases)
     half = np.asarray(mission.collection.aperture_time) / 2
@@ -216,7 +223,11 @@ def scaled(mission: Mission, key: str, factor: PerCase) -> Mission:
 def _below(
     value: SectionValue, reader: Reader[object], steps: Sequence[str], factor: PerCase, key: str
 ) -> tuple[SectionValue, int]:
-    """Scale the errors at a path below a value; return the changed value and the number of errors that are not 0."""
+    """Scale all errors below a key by a factor.
+
+    `value` is a section, list or number of the mission, and `steps` are the parts of the key that lead from it to the
+    errors. Returns the changed value, and the number of scaled errors that are not 0.
+    """
     if not steps:
         name = parts_of(key)[-1]
         if name in _MEASURES:
@@ -238,7 +249,10 @@ def _below(
 
 
 def _scaled(value: SectionValue, reader: Reader[object], factor: PerCase, is_clock: bool) -> tuple[SectionValue, int]:
-    """Scale all errors below a value; return the changed value and the number of errors that are not 0."""
+    """Scale all errors in a section, list or number of the mission by a factor.
+
+    Returns the changed value, and the number of errors that are not 0.
+    """
     reader = _form(reader, value)
     if value is None:
         return value, 0
@@ -272,7 +286,10 @@ def _scaled(value: SectionValue, reader: Reader[object], factor: PerCase, is_clo
 
 
 def _form(reader: Reader[object], value: object) -> Reader[object]:
-    """Find the reader that fits a value: one of the alternatives of a `OneOf`, otherwise `reader` itself."""
+    """Find the reader that fits a value.
+
+    For a `OneOf` it is one of the alternatives; otherwise it is `reader` itself.
+    """
     if isinstance(reader, OneOf):
         kind = Triple if isinstance(value, tuple) and not hasattr(value, "_fields") else Quantity
         matching = [form for form in reader.forms if isinstance(form, Section) and type(value) is form.kind]

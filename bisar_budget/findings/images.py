@@ -80,10 +80,10 @@ class Verdict(NamedTuple):
 
     @property
     def of_equal_loss(self) -> str:
-        """Suffix ` of equal loss` for the name of the judged phase.
+        """Text ` of equal loss` to append to the name of the judged phase, or an empty text.
 
-        The suffix is empty if at least 99 % of the judged phase is quadratic phase in the image, or if the row limits
-        the cubic phase.
+        It is empty if at least 99 % of the judged phase is quadratic phase in the image, or if the row limits the
+        cubic phase.
         """
         phase, quadratic = self.measured_equal_loss_qpe_rad, self.measured_qpe_rad
         is_more = self.measured_cubic_rad is None and phase is not None and (quadratic or 0.0) < 0.99 * phase
@@ -118,7 +118,7 @@ class VerifiedMission(NamedTuple):
 
     @property
     def doubt(self) -> Note:
-        """Note which states that no limit has a verdict; empty if any limit has one."""
+        """Note that no limit has a verdict; it is empty if at least one limit has a verdict."""
         if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
             return NOTHING
         return phrases.note("nothing-verified", rows=len(self.rows))
@@ -127,9 +127,9 @@ class VerifiedMission(NamedTuple):
 class PointImage(NamedTuple):
     """Image of a point target with an error, with its cut along y′ and the same cut of the error-free image.
 
-    `chip` has `columns` × `rows` bytes. Rows run from the largest y′ to the smallest, columns from the smallest x′
-    to the largest. The value 0 is `CHIP_FLOOR_DB` or less, and 255 is the peak without error. `pixel_m` are the pixel
-    spacings along x′ and y′. A pixel along y′ represents `thinned` samples; a resolution cell has as many samples
+    `chip` has `columns` × `rows` bytes. Rows run from the largest y′ to the smallest, columns from the smallest x′ to
+    the largest. The value 0 is `CHIP_FLOOR_DB` or less, and 255 is the peak without error. `pixel_m` are the pixel
+    spacings along x′ and y′ [m]. A pixel along y′ represents `thinned` samples; a resolution cell has as many samples
     along y′ as along x′. The cuts are powers relative to the error-free peak [dB]. Their samples are `step_m` apart,
     and y′ = 0 is at index `len // 2`.
     """

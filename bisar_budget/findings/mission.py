@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 class FileWarning(NamedTuple):
     """A warning about the mission file.
 
-    Most warnings do not change the verdict. `is_doubt` marks a warning that the checked mission may be wrong;
-    the status is then at least `warn`. `is_of_options` marks the warning about options that changed the
+    Most warnings do not change the verdict. `is_doubt` marks a warning that the checked mission may be wrong; the
+    status is then at least `warn`. `is_of_options` marks the warning that options of the command line changed the
     mission.
     """
 
@@ -145,7 +145,7 @@ class UnusableMission(NamedTuple):
 
     @property
     def statuses(self) -> frozenset[str]:
-        """The single status of an unusable file."""
+        """Set with the single status of a mission file that cannot be used."""
         return frozenset([self.status])
 
 

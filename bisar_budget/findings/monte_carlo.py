@@ -1,4 +1,4 @@
-"""Findings of a Monte Carlo, as frozen data."""
+"""Findings of a Monte Carlo simulation of a mission, as frozen data."""
 
 from typing import NamedTuple
 
@@ -10,11 +10,11 @@ class Requirement(NamedTuple):
 
     `sum` and `rss` are the sizes of the combined errors, by the rules of `allocation.combine` with these names. They
     follow from the full model and include the coverage factor; None if a declared error leaves no image. `sigma_rss`
-    is the standard uncertainty by root-sum-square. `sigma` is the standard uncertainty of the draws with an image,
-    None without such a draw. For displacements both are rms lengths. `probability` is the fraction of draws that meet
-    the requirement; `probability_low` and `probability_high` are the ends of its Wilson interval.
-    `probability_normal` is the probability for a normal distribution with the variances of the errors.
-    `dominant` is the error with the largest share of the variance.
+    is the standard uncertainty by root-sum-square. `sigma` is the standard uncertainty of the draws with an image, or
+    None without such a draw. For displacements `sigma_rss` and `sigma` are rms lengths. `probability` is the fraction
+    of draws that meet the requirement; `probability_low` and `probability_high` are the ends of its Wilson interval.
+    `probability_normal` is the probability for a normal distribution with the variances of the errors. `dominant` is
+    the error with the largest share of the variance.
     """
 
     id: str
@@ -34,7 +34,7 @@ class Requirement(NamedTuple):
 
 
 class MonteCarlo(NamedTuple):
-    """Result of a Monte Carlo of one mission.
+    """Result of the Monte Carlo simulation of one mission.
 
     `probability` is the probability that all requirements are met at once; None without a requirement. `is_exact`
     tells whether every draw was computed by exact ranges, because the errors are too large for the linear model.

@@ -1,4 +1,7 @@
-"""The table of requirements: for each one its limit, the value that the mission reaches, and the deciding row."""
+"""The table of requirements of a mission.
+
+It has the limit of each requirement, the value that the mission reaches, and the row that decides the status.
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -19,7 +22,7 @@ REQUIREMENT_NAMES = {
 
 @dataclass(frozen=True, kw_only=True)
 class DecidingShare:
-    """A share of a requirement that decides in place of the full requirement.
+    """A share of a requirement whose limit decides the status, in place of the limit of the full requirement.
 
     `allowed` and `reached` are in the unit of the requirement, without the gain of autofocus. `owner` is the platform
     or the clock to which the share belongs. Three other values stand for limits that are no shares: `autofocus` for
@@ -38,13 +41,13 @@ class JudgedRequirement(NamedTuple):
 
     Numbers are in SI, radians and decibel; None if a value does not exist. `value` and `allowed` are the requirement
     as the file states it, or its default. `reached` is the total of the mission; with `combine: each` it is the value
-    of the largest row. `utilization` is the ratio of `reached` to `allowed`, or the utilization of `share` if a share
-    decides. `autofocus_gain` is the factor by which quadratic phases may exceed the requirement and the shares of the
-    platforms with autofocus; None for requirements on other quantities. `row` is the row that decides the status,
-    `use_row` is the row with the utilization, and `rows` are all rows that judge the requirement. `reason` tells why
-    the requirement cannot be judged, or why it is not met. `waivers` are the waivers that cover the requirement or
-    its rows; empty unless the requirement is waived. `is_unjudged` tells whether it cannot be judged, even if it is
-    waived.
+    of the largest row. `utilization` is the ratio of `reached` to `allowed`, or the utilization of the share in
+    `share` if this share decides the status. `autofocus_gain` is the factor by which quadratic phases may exceed the
+    requirement and the shares of the platforms with autofocus; None for requirements on other quantities. `row` is
+    the row that decides the status, `use_row` is the row with the utilization, and `rows` are all rows that judge the
+    requirement. `reason` tells why the requirement cannot be judged, or why it is not met. `waivers` are the waivers
+    that cover the requirement or its rows; empty unless the requirement is waived. `is_unjudged` tells whether it
+    cannot be judged, even if it is waived.
     """
 
     key: str
@@ -88,7 +91,7 @@ class JudgedRequirement(NamedTuple):
 
 @dataclass(frozen=True)
 class ShiftedFigure:
-    """A level by which the mission file shifts the figures of one kind of error, relative to their source."""
+    """A level [dB] by which the mission file shifts the figures of one kind of error from those of their source."""
 
     kind: str
     key: str
@@ -102,7 +105,10 @@ class ShiftedFigure:
 
     @property
     def off(self) -> str:
-        """Phrase that names the source of the unshifted figures, such as `off the data sheet`."""
+        """Phrase that says from which source the level shifts the figures.
+
+        An example is `off the data sheet`.
+        """
         if self.source is not None:
             return f"off {printable(self.source)}"
         return "off the file's own spectrum" if self.key.endswith("spectrum_level") else "off the data sheet"
@@ -111,8 +117,8 @@ class ShiftedFigure:
 class DeclaredKinds(NamedTuple):
     """Kinds of error that a mission can declare, with the names of `requirements.declare` and their owners.
 
-    `declared` and `missing` together are all kinds. `without_source` are the declared kinds that state no source.
-    `shifted` are the figures that a level shifts, relative to their source.
+    `declared` and `missing` together are all kinds. `without_source` are the declared kinds for which the file states
+    no source. `shifted` are the figures that a level shifts, relative to their source.
     """
 
     declared: tuple[str, ...] = ()

@@ -42,7 +42,10 @@ def in_order(waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaiver, ...]:
 
 
 def holding(status: str, waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaiver, ...]:
-    """Select the waivers of a row or requirement that have not expired; empty if its status is not `waived`."""
+    """Select the waivers of a row or requirement that have not expired.
+
+    The result is empty if `status`, the status of the row or requirement, is not `waived`.
+    """
     return tuple(waiver for waiver in waivers if not waiver.is_expired) if status == "waived" else ()
 
 
@@ -50,11 +53,11 @@ class Row(NamedTuple):
     """One row of the budget.
 
     Numbers are in SI and radians; None if a value does not exist. `is_independent` marks rows of errors as the file
-    states them; only these rows are included in sums. The other rows show an error, which is stated in another frame,
-    along the scene's axes. `qpe_exact_rad` is equal to `qpe_full_rad`, which comes from exact ranges.
-    `published_margin_db` is the margin of the published rule for a vibration relative to first principles.
-    `binding_requirement` is the requirement that sets `allowable`. `cubic_rad` is the magnitude of the declared
-    error's cubic phase at the aperture edge. `islr_db` is the ISLR that a declared random error adds.
+    states them; only these rows are included in sums. Each of the other rows shows an error along an axis of the
+    scene, although the file states this error in another frame. `qpe_exact_rad` is equal to `qpe_full_rad`, which
+    comes from exact ranges. `published_margin_db` is the margin of the published rule for a vibration relative to
+    first principles. `binding_requirement` is the requirement that sets `allowable`. `cubic_rad` is the magnitude of
+    the declared error's cubic phase at the aperture edge. `islr_db` is the ISLR that a declared random error adds.
     `equal_loss_qpe_rad` is the quadratic phase with the same loss of the peak as `qpe_full_rad` and the hidden phase
     together; the hidden phase is the part that the bandwidth and the turn of the line of sight do not resolve.
     `rest_rad` is the rms value of the phase terms above the cubic one. `model` is the model that gives these numbers.
@@ -116,7 +119,7 @@ class Row(NamedTuple):
 
     @property
     def is_of_declare(self) -> bool:
-        """Whether the status depends only on `requirements.declare`, and not on the size of an error."""
+        """Whether the status comes only from `requirements.declare`, and not from the size of an error."""
         return self.metric == DECLARE or (
             isinstance(self.reason, Note) and self.reason.code == "not-declared-as-required"
         )
@@ -136,7 +139,7 @@ class Row(NamedTuple):
 
 
 def where_ids_are(file: str) -> str:
-    """Phrase that names the command which lists the ids of a mission's rows."""
+    """Phrase that names the command with which a user can list the ids of the rows of a mission file."""
     from shlex import quote
 
     return f"`bisar-budget check {quote(printable(file))} --all` lists them"

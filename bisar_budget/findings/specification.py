@@ -1,4 +1,4 @@
-"""The sheet of specifications: values to order that together meet every requirement, and shares of the limits."""
+"""The sheet of specifications: ordered sizes of errors that together meet every requirement, and their shares."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
@@ -37,7 +37,8 @@ class Specification(NamedTuple):
     def holds(self, value: float | None) -> bool:
         """Whether a size meets the specification.
 
-        The result is True if no value is ordered. Otherwise it is False for a size of None.
+        The result is True if no value is ordered, whatever the size is. If a value is ordered, the result is False
+        for a size of None.
         """
         if self.ordered is None:
             return True
@@ -50,10 +51,11 @@ class Specification(NamedTuple):
 class RowUse(NamedTuple):
     """Utilization of one row with the computed sizes, and the shares of the errors in it.
 
-    `requirement` is the requirement that judges the row; None if the effect has no requirement and must stay
-    negligible. `used` is the utilization of the row, and `allowed` is its limit. `fixed` is the share of the limit
-    that all errors without a specification use, and `shares` are the shares of the specified errors. `multiplier`
-    tells how strongly the row limits the sizes: the weight of each error is the sum of multiplier·share of all rows.
+    `requirement` is the requirement that judges the row; None if no requirement covers the effect, which must then
+    stay negligible. `used` is the utilization of the row, and `allowed` is its limit. `fixed` is the share of the
+    limit that all errors without a specification use, and `shares` are the shares of the specified errors.
+    `multiplier` tells how strongly the row limits the sizes: the weight of each error is the sum of multiplier·share
+    of all rows.
     """
 
     id: str
@@ -71,8 +73,8 @@ MIN_ROOM_FRACTION = 1e-6  # of a limit, that errors without a specification must
 class Broken(NamedTuple):
     """A row in which the errors without a specification leave no room for specified errors.
 
-    `used` is the utilization by these errors; None if they leave no image. `requirement` is the requirement of the
-    row.
+    `used` is the utilization that these errors alone cause; None if no image forms with them. `requirement` is the
+    requirement of the row.
     """
 
     id: str
@@ -85,9 +87,9 @@ class SpecificationSheet(NamedTuple):
     """Specifications for the errors of one mission that together meet every requirement.
 
     `findings` are the findings of a check with the ordered values, `status` is its status, and `requirements` are the
-    requirements as judged by it. `rows` are the rows that limit a specification. `broken` are the rows without room;
-    if there is such a row, the specifications have no values. `reserve` is the fraction of every limit that is kept
-    free. `notes` name the differences from the mission file.
+    requirements as judged by it. `rows` are the rows that limit a specification. `broken` are the rows without room
+    for specified errors. If there is such a row, the specifications have no values. `reserve` is the fraction of
+    every limit that is kept free. `notes` name the differences between the checked mission and the mission file.
     """
 
     file: str

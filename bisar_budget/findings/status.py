@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Status(NamedTuple):
-    """One status, with the fields that all formats need, so that no format has its own list of statuses.
+    """One status, with the properties that all output formats need, so that no format has its own list of statuses.
 
     `gates` tells whether the status of a row can become the status of its mission. `fails` and `fails_strict` tell
     whether the status makes a run, or a strict run, fail. `is_judged` tells whether a row counts as judged, even if

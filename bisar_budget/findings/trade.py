@@ -1,4 +1,4 @@
-"""Data for the plot of a sweep: arrays with one axis for each varied key."""
+"""Results of a sweep in the form in which they are plotted: arrays with one axis for each varied key."""
 
 from collections.abc import Mapping
 from datetime import date
@@ -17,8 +17,8 @@ class Axis(NamedTuple):
     """One varied key of a plot.
 
     `values` (n,) are in `unit` and in rising order; `scale` is the SI value of one `unit`. For a key with words,
-    `values` are the indices of `words`, from 0. `own` is the value of the mission itself; None if it has no value, or
-    if its word is not in `words`.
+    `values` are the indices of `words`, from 0. `own` is the value of the key in the mission itself; None if the
+    mission has no value, or if its word is not in `words`.
     """
 
     key: str
@@ -36,7 +36,10 @@ class Axis(NamedTuple):
 
     @property
     def edges(self) -> Floats:
-        """Edges of the cells around the values, (n + 1,): midpoints between neighbours, of logarithms if `is_log`."""
+        """Edges of the cells around the values in a plot, (n + 1,).
+
+        They are the midpoints between neighbouring values, or between their logarithms if `is_log`.
+        """
         values = np.log(self.values) if self.is_log else self.values
         middle = (values[1:] + values[:-1]) / 2
         edges = np.concatenate(([2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]))

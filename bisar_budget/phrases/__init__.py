@@ -1,6 +1,7 @@
-"""All sentences for rows, missions and verdicts: a table of templates, and functions for sentences with variants.
+"""All sentences about rows, missions and verdicts: a table of templates, and functions for sentences with variants.
 
-`note(code, **quantities)` fills the template of a code. Quantities are in SI and radians, or ids and names.
+`note(code, **quantities)` fills the template that has this code. Quantities are numbers in SI units and radians, ids
+or names.
 """
 
 from bisar_budget.phrases.air_sentences import (

@@ -1,4 +1,4 @@
-"""Sentences about images formed at the limits: verdicts, and reasons why an image or a verdict is missing."""
+"""Sentences about images of errors at their limits: verdicts, and why an image or a verdict is missing."""
 
 import math
 from collections.abc import Sequence
@@ -67,9 +67,10 @@ def in_its_worst_phase(axes: int) -> str:
 
 @composed
 def rule_misplaces(who: str, rule: str, by_rule: Sequence[float], is_at: Sequence[float]) -> str:
-    """Sentence for errors whose displacement a rule of combination mispredicts.
+    """Sentence for errors whose joint displacement a rule of combination predicts wrongly.
 
-    `by_rule` is the displacement by the rule, and `is_at` the one by exact ranges and image, each east and north [m].
+    `by_rule` is the displacement that the rule predicts, and `is_at` the displacement by exact ranges and in the
+    image. Both have an east and a north component. [m]
     """
     return (
         f"{who}: {_placed(by_rule)} by {rule}, {_placed(is_at)} by exact ranges and image: "
@@ -81,7 +82,7 @@ def rule_misplaces(who: str, rule: str, by_rule: Sequence[float], is_at: Sequenc
 def phase_does_not_grow(phases: Sequence[tuple[float, str]]) -> str:
     """Sentence for a limit at which the phase in the image does not grow with the size of the error.
 
-    `phases` are measured phases [rad], each with a text on the size of the error.
+    `phases` are the phases measured in images [rad], each with a text that states the size of the error.
     """
     shown = ", ".join(f"{phase:.4g} rad{where}" for phase, where in phases)
     return f"the phase of the image does not grow with the error: {shown}"
@@ -89,9 +90,11 @@ def phase_does_not_grow(phases: Sequence[tuple[float, str]]) -> str:
 
 @composed
 def echoes_measured(who: str, cycles: float, smear_cells: float | None, is_assumed: bool) -> str:
-    """Sentence for measured paired echoes of a vibration: its owner, and the distance and the smear of the echoes.
+    """Sentence for paired echoes of a vibration that were measured in an image.
 
-    `cycles` is the distance from the peak in cross-range cells, and `smear_cells` the smear in range cells.
+    `who` names what vibrates. `cycles` is the distance of the echoes from the peak in cross-range cells, and
+    `smear_cells` their smear in range cells, None to leave it out. If `is_assumed` is true, the file declares no
+    vibration, and the frequency is assumed.
     """
     smeared = "" if smear_cells is None else f", smeared over {smear_cells:.2g} range cells"
     assumed = ", a frequency assumed: the file declares no vibration" if is_assumed else ""

@@ -1,4 +1,4 @@
-"""Sentences about the inputs of a mission: paths, logs, parts, unused keys."""
+"""Sentences about the inputs of a mission: platform paths, flight logs, catalogue parts, unused keys."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,8 +23,8 @@ _SCENE_AXES = {"x": "east", "y": "north", "z": "up"}
 class StatedError:
     """An error that the source of a path states, together with the error that the file declares.
 
-    Both have a size for each of `axes`, in `unit`. Without `axes` each is one root-sum-square. `words` name the
-    source, and `key` is the key under which the file declares, or would declare, the error.
+    `stated` and `declared` have a size for each of `axes`, in `unit`. Without `axes` each has one size, a
+    root-sum-square. `words` name the source of the path. `key` is the key of the mission file for the declared error.
     """
 
     words: str
@@ -45,7 +45,7 @@ class StatedError:
 
 
 def _sizes(sizes: Sequence[float], unit: str) -> str:
-    """Text with each of several sizes and the unit; equal sizes are written once."""
+    """Text with several sizes of an error in `unit`. If all are equal, the size is written once."""
     words = [size_words(size, unit) for size in sizes]
     return words[0] if len(set(words)) == 1 else ", ".join(words)
 
@@ -58,7 +58,8 @@ def _axes(names: Sequence[str]) -> str:
 def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -> str:
     """Sentence for a declared position error that is smaller than the possible error of the platform's path.
 
-    `doubt` is the possible error [m], and `declared` the declared one [m], None if there is none.
+    `doubt` is the possible error of the path [m]. `declared` is the declared position error [m], None if there is
+    none.
     """
     stated = "no position error is declared" if declared is None else f"{size_words(declared, 'm')} is declared"
     return f"the path may be {size_words(doubt, 'm')} off ({words}), but {stated}: declare the error in {key}"
@@ -66,7 +67,7 @@ def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -
 
 @composed
 def input_states_more(error: StatedError) -> str:
-    """Sentence for a declared error that is smaller than the error that the source of the path states."""
+    """Sentence for a declared error that is smaller than the error stated by the source of the platform path."""
     within = f" ({_axes(error.axes)})" if error.axes else ""
     stated = f"a {error.kind} error of {_sizes(error.stated, error.unit)}{within} is stated"
     return f"{error.words}: {stated}, but {error.declared_words}: declare at least that in {error.key}"
@@ -76,7 +77,8 @@ def input_states_more(error: StatedError) -> str:
 def log_is_flown_as_it_is(figure: str) -> str:
     """Sentence for a row about a flight log whose fixes the processor uses without smoothing.
 
-    `figure` is `grid` for the rounding of the fixes; otherwise the row is about their residual from a smooth path.
+    If `figure` is `grid`, the row is about the rounding of the fixes. Otherwise it is about the residual of the fixes
+    from a smooth path.
     """
     if figure == "grid":
         return "the log quantises its fixes: a uniform error, constant over the aperture at worst"
@@ -100,7 +102,7 @@ def log_is_coarse(step: float, declared: float | None, axis: str, key: str) -> s
 
 @composed
 def input_usually_has_more(error: StatedError) -> str:
-    """Sentence for a declared error below a third of the usual error of flight logs with this quality of fixes."""
+    """Sentence for a declared error that is less than a third of the usual error of flight logs with such fixes."""
     return (
         f"{error.words} usually have an error of {size_words(max(error.stated), error.unit)} on each axis,"
         f" but {error.declared_words}: declare at least a third of the usual error in {error.key}"
@@ -109,7 +111,7 @@ def input_usually_has_more(error: StatedError) -> str:
 
 @composed
 def orbit_errors_are_independent(platform: str, position_m: float, rate: float, velocity: float) -> str:
-    """Sentence for position and velocity errors that are declared independent although the platform is in free fall.
+    """Sentence for a platform in free fall whose position and velocity errors are declared as independent.
 
     `position_m` [m] and `velocity` [m/s] are the declared errors. `rate` is the angular rate of the orbit [rad/s].
     """

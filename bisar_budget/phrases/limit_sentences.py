@@ -1,4 +1,4 @@
-"""Sentences about exceeded limits, by either model, and about the rules behind a limit."""
+"""Sentences about limits that are exceeded by the published or full model, and about the rules behind limits."""
 
 from bisar_budget.phrases.notes import composed
 from bisar_budget.phrases.templates import in_brackets, over_words, size_words
@@ -47,8 +47,8 @@ _SHOWN_PART_FRACTION = 0.99  # of a phase of equal loss, below which its quadrat
 def quadratic_phase_over(phase: float, limit: float, equation: str = "", quadratic: float | None = None) -> str:
     """Sentence for one error whose quadratic phase exceeds its limit.
 
-    `phase` [rad] is the quadratic phase, or the quadratic phase of equal peak loss. In the second case `quadratic`
-    [rad] is the quadratic part alone.
+    `phase` [rad] is the quadratic phase by itself, or the quadratic phase of equal peak loss. In the second case
+    `quadratic` [rad] is its quadratic part alone.
     """
     text = in_brackets(f"QPE {over_words(phase, limit, 'rad')}", equation)
     if quadratic is None or quadratic >= _SHOWN_PART_FRACTION * phase:  # both are infinite where there is no image
@@ -65,7 +65,10 @@ def cubic_phase_over(phase: float, limit: float, equation: str = "") -> str:
 
 @composed
 def location_over(moved: float | None, limit: float, equation: str) -> str:
-    """Sentence for one error that displaces the image too far, `moved` in m; `moved` is None if there is no image."""
+    """Sentence for one error that displaces the image by more than `limit` [m].
+
+    `moved` is the displacement [m], None if there is no image.
+    """
     where = "beyond every ground point" if moved is None else f"by {format_quantity(moved, 'm')}"
     return f"moves the image {where}, {format_limit(limit, 'm')} allowed ({equation})"
 
@@ -74,14 +77,18 @@ def location_over(moved: float | None, limit: float, equation: str) -> str:
 def aggregate_over(
     what: str, size: float, limit: float, unit: str, row_id: str, largest: float, extrapolated: str = ""
 ) -> str:
-    """Sentence for a sum of errors over its limit, with the largest error and a note on the data behind it."""
+    """Sentence for a total of several errors that exceeds its limit.
+
+    `what` names the total, `size` is its value in `unit`. `row_id` and `largest` are the row and size of the largest
+    error. `extrapolated` is a remark if the total relies on extrapolated noise or a folded spur, else empty.
+    """
     text = f"{what} {over_words(size, limit, unit)}; largest: {row_id}, {size_words(abs(largest), unit)}"
     return in_brackets(text, extrapolated)
 
 
 @composed
 def other_model_fails(model: str, size: float, limit: float, unit: str, what: str = "", equation: str = "") -> str:
-    """Sentence for a row or a sum that the gating model passes but the other model fails."""
+    """Sentence for a row or a total of errors that passes by the gating model, but fails by the other model."""
     text = f"fails by the {model} model: {what}".rstrip()
     return in_brackets(f"{text} {over_words(size, limit, unit)}", equation)
 
@@ -90,9 +97,10 @@ def other_model_fails(model: str, size: float, limit: float, unit: str, what: st
 def published_model_does_not_hold(
     row_id: str, published: float | None, full: float | None, unit: str, others: int
 ) -> str:
-    """Sentence for a mission to which the published model does not apply, with the allowables of a row as an example.
+    """Sentence for a mission to which the published model does not apply, with one row as an example.
 
-    `published` and `full` are the allowables by the two models in `unit`; None means that there is no limit.
+    `published` and `full` are the allowables of the row by the two models in `unit`; None means that there is no
+    limit. `others` is the number of other declared errors for which the models differ by more than 5 %.
     """
     by_published, by_full = (
         "without limit" if size is None else format_limit(size, unit) for size in (published, full)

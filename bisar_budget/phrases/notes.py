@@ -1,4 +1,4 @@
-"""A note: a sentence together with its code and the values in it."""
+"""Define the note: a sentence together with its code and the values in it."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -15,7 +15,7 @@ class Note(str):
     values: tuple[object, ...]
 
     def __new__(cls, text: str, code: str = "", values: tuple[object, ...] = ()) -> "Note":
-        """Create a note from a text, a code and values."""
+        """Create a note from its text, the code that identifies the sentence, and the values in the text."""
         note = super().__new__(cls, text)
         note.code, note.values = code, values
         return note

@@ -41,7 +41,7 @@ def effect_words(effect_name: str, size: float) -> str:
 
 @composed
 def confidence(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> str:
-    """Text after `met` for the confidence of a verdict: one sigma or a coverage factor, and stated bounds."""
+    """Text after `met` that states the confidence of a verdict: 1 sigma or coverage factor, and stated bounds."""
     covered = f"with coverage factor {coverage_factor:g}"
     if not has_sigma:
         if not has_bounds:
@@ -53,7 +53,10 @@ def confidence(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> 
 
 @composed
 def effect_is_not_judged(effect_name: str, size: float, total: float, lines: Sequence[str]) -> str:
-    """Sentence for a row with an effect that no requirement limits."""
+    """Sentence for a row with an effect that no requirement limits.
+
+    `size` is the effect of the row alone, and `total` that of all errors together. `lines` are requirements to add.
+    """
     alone = f", {total:.3g} rad with the others" if total > 1.005 * size else ""
     added = " or ".join(f"`{line}`" for line in lines)
     return f"{effect_words(effect_name, size)}{alone}, which no requirement judges: add {added} to requirements"
@@ -61,7 +64,10 @@ def effect_is_not_judged(effect_name: str, size: float, total: float, lines: Seq
 
 @composed
 def effect_is_negligible(effect_name: str, total: float, keys: Sequence[str]) -> str:
-    """Sentence for a mission with a negligible effect that no requirement limits."""
+    """Sentence for a mission with a negligible effect that no requirement limits.
+
+    `total` is the effect of all errors together. `keys` are the requirements that would limit it.
+    """
     return (
         f"negligible: {effect_words(effect_name, total)} in all, which no requirement judges "
         f"({' or '.join(keys)} would): below a tenth of the quadratic requirement and below 0.08 rad"
@@ -76,7 +82,10 @@ def nothing_judges(key: str) -> str:
 
 @composed
 def not_declared_as_required(key: str, lacks: str = "") -> str:
-    """Sentence for a required error that is not declared, or only in part; `lacks` then names the missing key."""
+    """Sentence for a required error that is not declared, or only in part.
+
+    If it is declared in part, `lacks` is the key that the file lacks.
+    """
     if lacks:
         return f"requirements.declare asks for {key}, which is declared in part: the file has no {lacks}"
     return f"the file has no {key}, which requirements.declare asks for"
@@ -84,7 +93,7 @@ def not_declared_as_required(key: str, lacks: str = "") -> str:
 
 @composed
 def declarations_are_missing(keys: Sequence[str]) -> str:
-    """Sentence for all required errors that the file does not declare."""
+    """Sentence for a mission file that does not declare all required errors; it lists the missing ones."""
     *others, last = keys
     said = f"{', no '.join(others)} and no {last}" if others else last
     return f"the file has no {said}, which requirements.declare asks for"

@@ -38,24 +38,24 @@ def _items(value: object) -> list[str]:
 
 
 def size_words(size: float, unit: str) -> str:
-    """Text of a magnitude: lengths with an SI prefix, other quantities without one, such as phases in rad."""
+    """Text with a magnitude and its unit. A length has an SI prefix; other quantities, such as phases, have none."""
     if not math.isfinite(size):
         return "without a value (no ground point has this range history)"
     return format_quantity(size, unit) if unit == "m" else f"{abs(size):.3g} {unit}"
 
 
 def over_words(size: float, limit: float, unit: str) -> str:
-    """Text of a magnitude and its limit, for example `1.2 rad, 0.785 rad allowed`."""
+    """Text with a magnitude and its limit, for example `1.2 rad, 0.785 rad allowed`."""
     return f"{size_words(size, unit)}, {format_limit(limit, unit)} allowed"
 
 
 def level_words(level_db: float, rounding: str = "nearest") -> str:
-    """Text of a level `level_db` in dB, with three digits."""
+    """Text with the level `level_db` in dB, with three digits."""
     return format_quantity(level_db, "dB", 3, rounding)
 
 
 def cycles_words(cycles: float) -> str:
-    """Text of a number of cycles with three digits, rounded down so that a number below a limit stays below it."""
+    """Text with a number of cycles, rounded down to three digits, so that a number below a limit stays below it."""
     return format_quantity(cycles, "", 3, "down")
 
 
@@ -104,10 +104,10 @@ _QUANTITY_FORMATS: Mapping[str, Callable[[object, str], str]] = {
 
 
 class _Filler(string.Formatter):
-    """Fills the fields of a template. A field without a value raises `KeyError`."""
+    """Formatter that fills the fields of a template. A field without a value raises `KeyError`."""
 
     def format_field(self, value: object, format_spec: str) -> str:
-        """Text of one quantity in the format that its field of the template gives."""
+        """Write one quantity in the format that its field in the template specifies."""
         name, _, options = format_spec.partition(" ")
         if name in _QUANTITY_FORMATS:
             return _QUANTITY_FORMATS[name](value, options)
@@ -118,7 +118,7 @@ _FILLER = _Filler()
 
 
 def fill(template: str, quantities: Mapping[str, object]) -> str:
-    """Fill a template.
+    """Fill the fields of a template with quantities by name.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Sentences about noise, echoes and tones."""
+"""Sentences about noise, about tones of vibrations and oscillators, and about their paired echoes."""
 
 from bisar_budget.phrases.notes import composed
 from bisar_budget.phrases.templates import level_words
@@ -25,6 +25,6 @@ TONE_SENTENCES: dict[str, str] = {
 
 @composed
 def echoes_together_over(level_db: float, limit_db: float, row_id: str, count: int) -> str:
-    """Sentence for the paired echoes of all tones together: their level, the limit, and the largest tone."""
+    """Sentence for the paired echoes of all tones together, if they exceed the limit; it names the largest tone."""
     others = f", with {count - 1} near it" if count > 1 else ""
     return f"echoes of {level_words(level_db)}, {level_words(limit_db)} allowed; largest: {row_id}{others}"

@@ -1,4 +1,4 @@
-"""Sentences about vibration, of platforms and of oscillators."""
+"""Sentences about vibrations of platforms and of oscillators."""
 
 from bisar_budget.phrases.notes import composed
 from bisar_budget.phrases.templates import cycles_words
@@ -73,16 +73,19 @@ def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: b
 
 @composed
 def published_rule_is_off(margin_db: float) -> str:
-    """Sentence for the margin in dB between the published limit of a vibration and that from first principles."""
+    """Sentence for a vibration whose published limit differs from the limit from first principles.
+
+    `margin_db` is the difference in dB, positive if the published limit is stricter.
+    """
     comparison = "stricter" if margin_db >= 0 else "more lenient"
     return f"the published rule is {abs(margin_db):.2f} dB {comparison} than first principles"
 
 
 @composed
 def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
-    """Sentence for a vibration of which only the component `along` the line of sight [m] acts on the range.
+    """Sentence for a vibration of which only the component along the line of sight acts on the range.
 
-    With a direct path, the component is that in the range minus the direct path.
+    `along` is this component [m]. With a direct path, it is the change of the range minus the direct path.
     """
     where = "in the range less the direct path" if has_direct_path else "along the line of sight"
     return f"{stated}: {format_quantity(along, 'm')} of it {where}"
@@ -90,9 +93,9 @@ def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
 
 @composed
 def does_as_much_as_along_the_sight(stated: str, along: float, has_direct_path: bool) -> str:
-    """Sentence for a slow vibration along several axes: its equivalent amplitude `along` the line of sight [m].
+    """Sentence for a slow vibration along several axes, with its equivalent amplitude along the line of sight.
 
-    With a direct path, the amplitude is that in the range minus the direct path.
+    `along` is this amplitude [m]. With a direct path, it is that of the range minus the direct path.
     """
     where = "in the range less the direct path" if has_direct_path else "along the line of sight"
     return f"{stated}: in the worst phase equivalent to {format_quantity(along, 'm')} {where}"
@@ -100,16 +103,19 @@ def does_as_much_as_along_the_sight(stated: str, along: float, has_direct_path: 
 
 @composed
 def spectrum_shakes(rms: float, level_db: float) -> str:
-    """Sentence for a vibration spectrum: its rms along the line of sight [m] and its shift in level [dB]."""
+    """Sentence for a vibration stated as a spectrum.
+
+    `rms` is its rms value along the line of sight [m], and `level_db` the shift of the spectrum in level [dB].
+    """
     shift = f", shifted by {level_db:g} dB" if level_db else ""
     return f"{format_quantity(rms, 'm')} rms along the line of sight{shift}, slow parts included"
 
 
 @composed
 def oscillator_does_not_vibrate(turns: bool) -> str:
-    """Sentence for an oscillator on a platform without a stated vibration, sinusoidal or as a spectrum.
+    """Sentence for an oscillator on a platform for which the file states no vibration, neither lines nor spectrum.
 
-    If the platform turns, the acceleration sensitivity acts on the acceleration of the turn only.
+    If `turns` is true, the platform turns, and only the acceleration of its turn acts on the oscillator.
     """
     used = "counts for the turn only" if turns else "has nothing to act on"
     return f"no sinusoidal vibration and no spectrum is stated: the acceleration sensitivity {used}"

@@ -52,7 +52,8 @@ WARNING_SENTENCES: dict[str, str] = {
 def fit_changes_allowables(platform: str, acceleration: float, change: float, row_id: str) -> str:
     """Sentence for a flight log whose noise makes the acceleration of the path uncertain.
 
-    `acceleration` is the 1-sigma uncertainty [m/s²], and `change` the largest relative change of allowables.
+    `acceleration` is the 1-sigma uncertainty of the acceleration [m/s²]. `change` is the largest relative change of
+    an allowable that it causes, in row `row_id`.
     """
     size = format_quantity(acceleration, "m/s^2")
     by = f"by up to {100 * change:.2g} %" if change < 1 else "by a factor of two and more"
@@ -67,7 +68,8 @@ def fit_changes_allowables(platform: str, acceleration: float, change: float, ro
 def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence[float], has_axes: bool) -> str:
     """Sentence for a straight path with the speed of a satellite.
 
-    `speed` is in m/s. `acceleration` are the components of a circular orbit [m/s²] that the path lacks.
+    `speed` is in m/s. `acceleration` has the components of the acceleration on a circular orbit [m/s²], which the
+    path lacks.
     """
     components = ", ".join(f"{component + 0.0:.3f} m/s^2" for component in acceleration)
     if has_axes:

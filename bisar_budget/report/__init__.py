@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 
 class Format(NamedTuple):
-    """A report format: its module in this package, and the endings of its files, the usual ending first.
+    """A report format: the module in this package that writes it, and the endings of its file names.
 
-    `about` is its description in `--help`. The docstring of this module explains `is_piecewise` and `has_pictures`.
-    A format with `is_illustrated` needs the mission and the images of verified limits, which other formats do not
-    keep in memory.
+    The usual ending is first. `about` is the description of the format in `--help`. The docstring of this module
+    explains `is_piecewise` and `has_pictures`. A format with `is_illustrated` needs the mission and the images of
+    verified limits. For other formats these are not kept in memory.
     """
 
     name: str
@@ -53,7 +53,7 @@ FORMATS = {entry.name: entry for entry in _FORMAT_ENTRIES}
 
 
 def format_of(name: str) -> str | None:
-    """Find the report format of a file name such as `budget.sarif` or `needs.json`; None if there is none."""
+    """Find the report format for a file name such as `budget.sarif` or `needs.json`; None if there is none."""
     # With the dot before it, the name `needs.json` ends like `x.needs.json`.
     ending = "." + name.replace("\\", "/").rpartition("/")[2].lower()
     if ending.count(".") == 1:

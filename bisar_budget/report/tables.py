@@ -34,7 +34,10 @@ SWEEP_FORMAT = "bisar-budget/sweep/1"
 
 
 class Described:
-    """A sweep as a table. Keys that vary have the unit of the request; other columns have SI units."""
+    """A sweep with the columns and metadata of its table file.
+
+    Columns of keys that vary are in the unit of the request. Other columns are in SI units.
+    """
 
     def __init__(
         self, swept: Swept, cases: Cases, mission: Mission, version: str, overrides: Sequence[Override] = ()
@@ -54,25 +57,25 @@ class Described:
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """Columns of the table in order, with their units."""
+        """Columns of the table, in the order in which they are written, with their units in the table."""
         return tuple(
             column._replace(unit=self.numbers[column.name].unit) if column.name in self.numbers else column
             for column in self.swept.columns
         )
 
     def values(self, block: Part) -> Mapping[str, Values]:
-        """Values of a block by column name, in the units of the columns."""
+        """Values of a block of cases by column name, converted from SI to the units of the columns."""
         return {name: self.converted(name, values) for name, values in block.values.items()}
 
     def converted(self, name: str, values: Values) -> Values:
-        """Convert SI values of a column to the unit of the column."""
+        """Convert the SI values of the column `name` to the unit that the column has in the table."""
         if name not in self.numbers:
             return values
         return in_unit(self.numbers[name], np.asarray(values, float))
 
 
 def _overrides_text(overrides: Sequence[Override]) -> str:
-    """Write the overrides from outside the file that affect statuses as one line."""
+    """Write, as one line, the overrides from outside the mission file that affect statuses."""
     return "; ".join(printable(f"{override.name} {override.value} ({override.origin})") for override in overrides)
 
 
@@ -102,7 +105,7 @@ def _quoted(text: str | None) -> str:
 
 
 def _cells(column: Column, values: Values) -> list[str]:
-    """Write the cells of a column. A value that many cases share is converted to text only once."""
+    """Write the values of a column as texts for CSV. A value that many cases share is converted only once."""
     if column.is_text:
         texts: list[str] = values.tolist()
         quoted = {text: _quoted(spreadsheet_text(text)) for text in set(texts)}
@@ -158,7 +161,7 @@ def _array(pa: ModuleType, column: Column, values: Values) -> "Array":
 
 
 def _groups(blocks: Iterable[Part]) -> Iterator[list[Part]]:
-    """Group blocks, so that each group except the last has enough rows for a row group."""
+    """Group blocks of cases, so that each group except the last has enough rows for a row group of Parquet."""
     group: list[Part] = []
     rows = 0
     for block in blocks:
@@ -216,7 +219,7 @@ def _hold_to_room(path: str) -> None:
 
 
 def _dimensions(file: "NetcdfFile", described: Described) -> list[Column]:
-    """Create the dimensions of a NetCDF file. Returns the columns that have a value for each case."""
+    """Create the dimensions of a NetCDF file, and return the columns that have a value for each case."""
     cases = described.cases
     if not cases.is_grid:
         file.createDimension("case", cases.count)
@@ -263,7 +266,7 @@ class _Variable:
             begin = end
 
     def close(self) -> None:
-        """Write the list of flag numbers and their meanings for a column of texts."""
+        """Write the attributes that list the flag numbers and their meanings, if the column contains texts."""
         if self.column.is_text and not self.is_free:
             self.variable.flag_values = np.arange(len(self.codes), dtype="i4")
             self.variable.flag_meanings = " ".join("_".join(text.split()) or _EMPTY_MEANING for text in self.codes)
@@ -334,7 +337,7 @@ def _missing(name: str, library: str) -> str:
 
 
 def dataset(described: Described, values_by_column: "Mapping[str, Values | DaskArray]") -> "Dataset":
-    """Make a dataset from the columns of a sweep.
+    """Make an xarray dataset from the columns of a sweep.
 
     Parameters
     ----------

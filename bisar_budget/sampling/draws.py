@@ -1,7 +1,8 @@
 """Random draws of independent errors, and counts of the draws that meet each requirement.
 
 For small errors the full model is linear: the effect of a draw is the sum of standard variables times their effects.
-If a sample of draws shows that exact ranges give another result, every draw is computed by exact ranges.
+A sample of draws is computed by exact ranges too. If the two results differ by more than 1 % of a limit, every draw
+is computed by exact ranges.
 
 Draws are divided into chunks of a fixed size. The random numbers of a chunk depend only on the seed, on the name of
 the variable and on the number of the chunk, so any process can make them. A chunk consists of one or more pieces.
@@ -59,12 +60,12 @@ class Variable(NamedTuple):
 
 
 class HeldSum(NamedTuple):
-    """A requirement with which the draws are compared: its limit, and the errors and effects that are summed for it.
+    """A requirement with which draws are compared: its limit, and the errors and effects that are summed for it.
 
-    `owners` are the owners of the summed errors, and `columns` are the indices of the summed effects. `limit` is in
-    `unit`. The limit of a quadratic phase error includes the `gain` of autofocus. Autofocus does not correct hidden
-    phases, which the bandwidth and the turn of the line of sight do not resolve. Hidden phases are therefore
-    multiplied by `gain` before the comparison.
+    `owners` are the owners of the summed errors. `columns` are the indices, in `Variable.effects`, of the summed
+    effects. `limit` is in `unit`. The limit of a quadratic phase error includes the `gain` of autofocus. Autofocus
+    does not correct hidden phases, which the bandwidth and the turn of the line of sight do not resolve. Hidden
+    phases are therefore multiplied by `gain` before the comparison.
     """
 
     id: str
@@ -76,7 +77,7 @@ class HeldSum(NamedTuple):
 
 
 class DrawsPiece(NamedTuple):
-    """Draws `start` to `stop` - 1, all in one chunk."""
+    """A piece of the draws: the draws with the numbers `start` to `stop` - 1, all in one chunk."""
 
     start: int
     stop: int
@@ -85,8 +86,8 @@ class DrawsPiece(NamedTuple):
 class Drawing(NamedTuple):
     """All data that a process needs to compute pieces of the draws of a mission.
 
-    `name` is the name of the mission. `is_exact` tells whether every draw is computed by exact ranges. `chunk` is
-    the number of draws of a chunk, which has one random stream for each variable.
+    `name` is the name of the mission. `is_exact` tells whether every draw is computed by exact ranges. `chunk` is the
+    number of draws in a chunk; each variable has its own random stream in each chunk.
     """
 
     name: str
@@ -146,9 +147,9 @@ def drawing_of(
 def joined(tallies: Iterable[Tally], count: int) -> tuple[list[int], list[float], int]:
     """Join the tallies of all pieces, in any order; `count` is the number of requirements.
 
-    Returns, for each requirement, the number of draws that meet it and the mean squared error of the draws with an
-    image (NaN without such a draw), and the number of draws that meet all requirements. Squares are added as
-    fractions, without rounding.
+    Returns three values: the number of draws that meet each requirement, the mean squared error of the draws with an
+    image for each requirement, and the number of draws that meet all requirements. A mean is NaN if no draw has an
+    image. Squares are added as fractions, without rounding.
     """
     holds, imaged, all_hold = [0] * count, [0] * count, 0
     squares = [Fraction()] * count
@@ -166,20 +167,26 @@ Share = Callable[[Drawing], Iterable[tuple[DrawsPiece, Tally]]]  # gives every p
 
 
 def in_turn(drawing: Drawing) -> Iterator[tuple[DrawsPiece, Tally]]:
-    """Draw all pieces in this process, one after the other."""
+    """Draw all pieces in this process, one after the other, and yield each piece with its counts."""
     drawer = Drawer(drawing)
     for piece in drawing.pieces():
         yield piece, drawer.tally(piece)
 
 
 def shared_out(drawing: Drawing, mapped: "MapBlocks") -> Iterator[tuple[DrawsPiece, Tally]]:
-    """Draw the pieces on other workers, and yield each piece when it is done, in any order."""
+    """Draw the pieces on other workers, and yield each piece with its counts when it is done.
+
+    The pieces come in any order. `mapped` is the function that distributes them to the workers.
+    """
     of = f"of {printable(drawing.name)}"
     return mapped(tally_of, drawing, drawing.pieces(), lambda piece: f"draws {piece.start} to {piece.stop - 1} {of}")
 
 
 def tally_of(drawing: Drawing, piece: DrawsPiece) -> Tally:
-    """Draw the errors of one piece and count its draws, in a process that keeps no state between pieces."""
+    """Draw the errors of one piece, and count the draws that meet the requirements.
+
+    The process needs no state from other pieces.
+    """
     return Drawer(drawing).tally(piece)
 
 
@@ -190,8 +197,8 @@ class Sums:
     can be called. If `keeps_motion` is set, the errors are summed by owner for exact ranges, and `exact_square` can
     be called. `motion` are then position, velocity and acceleration errors of both platforms, (2, 3, 3, draws).
     `tags` are time tags of both platforms (2, draws), `registered` are errors of registered kinds with their sizes
-    (draws,), and `clock` are clock coefficients (4, draws). `alone` are
-    effects of random errors: quadratic and cubic phase, displacement east and north (4, draws).
+    (draws,), and `clock` are clock coefficients (4, draws). `alone` are the effects of errors of which only effects
+    are known: quadratic and cubic phase, and displacement east and north (4, draws).
     """
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
@@ -320,13 +327,16 @@ class Sums:
 
 
 def _sum(by_owner: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
-    """Add the arrays of several owners; returns `nothing` if none of these owners has an array."""
+    """Add the arrays of several owners; `by_owner` has the array of each owner.
+
+    Returns `nothing` if none of the owners has an array.
+    """
     of_owners = [by_owner[owner] for owner in owners if owner in by_owner]
     return sum(of_owners[1:], of_owners[0]) if of_owners else nothing
 
 
 class Drawer:
-    """A drawing with the state of its random streams, from which pieces of the draws are computed.
+    """Computation of pieces of the draws, with the state of the random streams between two pieces.
 
     If a piece comes after the last computed piece in the same chunk, the random streams of that piece are continued.
     """

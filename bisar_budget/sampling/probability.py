@@ -3,7 +3,8 @@
 The result shows whether root-sum-square and worst case describe the sum of errors well. All declared errors are drawn
 at once, their effects by the full model are added, and the magnitude of the sum is compared with the requirement. For
 small errors the sum is linear in standard variables; for large errors it is computed from exact ranges (see the
-module `draws`). A covariance gives six variables, one along each eigenvector of its correlation matrix.
+module `draws`). A covariance of a position and velocity error gives six variables, one along each eigenvector of its
+correlation matrix.
 
 Errors are drawn from the distributions themselves. The coverage factor, which turns sigmas into bounds, is not
 applied. Vibration is not drawn, because its amplitude is declared and its limits concern paired echoes.
@@ -58,7 +59,7 @@ def monte_carlo(
         Seed of the random numbers; None: `simulation.seed` of the file. The same seed gives the same result.
     share : callable, optional
         Function that computes the pieces of the draws; None: this process computes them one after the other. The
-        result does not depend on it.
+        result is the same in both cases.
 
     Raises
     ------
@@ -160,9 +161,9 @@ def _variable(
 def _requirements(
     mission: Mission, allocation: Allocation, variables: Sequence[Variable], *, is_placed: bool
 ) -> Iterator[HeldSum]:
-    """Yield the requirements of `check` to which declared errors contribute.
+    """Yield the requirements with which draws are compared: those of `check` to which declared errors contribute.
 
-    `is_placed` tells whether the displacements of all errors are known. Without it the location error is left out.
+    `is_placed` tells whether the displacements of all errors are known. If not, the location error is left out.
     """
     present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
@@ -186,7 +187,7 @@ def _requirements(
 
 
 class _Predictions:
-    """Results that need no draws: combined errors as in `check`, variances, and probabilities of a normal sum."""
+    """Results that need no draws: combined errors as in `check`, variances, and probabilities for a normal sum."""
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
         self.together = Together(analysis.errors, "full", (), (), analysis.random, analysis.groups)
@@ -220,11 +221,14 @@ class _Predictions:
         return by_error
 
     def is_normal(self, name: str) -> bool:
-        """Whether all variables of an error or a covariance are normal; those of a covariance always are."""
+        """Whether all variables of an error or a covariance are normally distributed.
+
+        The variables of a covariance always are. `name` is the id of the error or covariance.
+        """
         return all(v.distribution == "normal" for v in self.variables if v.of == name)
 
     def probability_normal(self, judged: HeldSum) -> float:
-        """Probability that a normally distributed sum with the variances of the errors is within the limit."""
+        """Probability that a normally distributed sum, with the variances of the errors, is within the limit."""
         members = [variable.effects for variable in self.variables if variable.owner in judged.owners]
         a, b = judged.columns[0], judged.columns[-1]
         xx, yy, xy = (math.fsum(effects[i] * effects[j] for effects in members) for i, j in ((a, a), (b, b), (a, b)))
@@ -257,7 +261,7 @@ def _within(radius: float, xx: float, yy: float, xy: float) -> float:
 def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
     """Confidence interval of a probability by Wilson's score; `quantile` is the quantile of the standard normal.
 
-    The formula also holds for few draws of which none or all succeed.
+    The formula is also valid for a small number of draws of which none or all succeed.
     """
     p, z = successes / draws, quantile
     middle = p + z**2 / (2 * draws)

@@ -26,7 +26,10 @@ from bisar_budget.settings import TABLE
 
 # ---------------------------------------------------------------------- inputs
 class Moved(NamedTuple):
-    """A value before and after a change, of a key in the file or of the geometry; None where the value is missing."""
+    """The value of a mission key or of a geometry number before and after a change.
+
+    `before` or `after` is None if that version has no such value.
+    """
 
     name: str
     unit: str  # of a number; empty for a text
@@ -58,9 +61,9 @@ def moved_inputs(before: Mission, after: Mission) -> Iterator[Moved]:
 
 
 def texts_of_file(mission: Mission) -> dict[KeyPath, str]:
-    """Texts of the values of a mission file by key path. A list of plain values is one text.
+    """Texts of the values in a mission file, by key path. A list of plain values gives one text.
 
-    The text of a value from a part of the catalogue also has the name of the part.
+    If a value comes from a catalogue part, its text also contains the name of the part.
     """
     texts = {
         path: event.value for path, event in mission.places.items() if isinstance(getattr(event, "value", None), str)
@@ -97,7 +100,10 @@ def _value(mission: Mission, path: KeyPath) -> SectionValue:
 
 
 def moved_geometry(before: MissionFindings, after: MissionFindings) -> Iterator[Moved]:
-    """Yield the numbers of the collection geometry that differ by more than rounding."""
+    """Yield the geometry values, such as slant ranges and angles, that differ by more than rounding.
+
+    The range and cross-range resolutions are included.
+    """
     for (name, unit, old), (_, _, new) in zip(_numbers(before), _numbers(after), strict=True):
         is_unchanged = old == new or (old is not None and new is not None and math.isclose(old, new, rel_tol=1e-9))
         if not is_unchanged:
@@ -131,7 +137,7 @@ _LIMITING_NUMBERS = (
 
 
 class Loosened(NamedTuple):
-    """A rule or declaration that became looser, with texts for before and after.
+    """A rule or declaration that became looser, with its text before and its text after the change.
 
     `id` is the name for `--allow`: a key of the mission file, the id of a row, or the kind of an error.
     """
@@ -147,7 +153,7 @@ class Loosened(NamedTuple):
 
 
 def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Yield the rules and declarations that became looser. Both findings must contain their analysed mission."""
+    """Yield the rules and declarations that became looser. Both findings must contain their analysis."""
     missions = (before.analysed().mission, after.analysed().mission)
     yield from _looser_requirements(*missions)
     yield from _looser_specifications(*missions)
@@ -191,7 +197,7 @@ def _looser_specifications(before: Mission, after: Mission) -> Iterator[Loosened
 
 
 def _declarations(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Yield the entries of `requirements.declare` whose errors are not all required any more."""
+    """Yield the entries of `requirements.declare` that no longer require all their kinds of error to be declared."""
     later_kinds = {kind for word in after.requirements.declare for kind in _owned(word)}
     for word in before.requirements.declare:
         kept = later_kinds.intersection(_owned(word))
@@ -200,12 +206,19 @@ def _declarations(before: Mission, after: Mission) -> Iterator[Loosened]:
 
 
 def _owned(word: str) -> list[str]:
-    """Kinds of error that an entry of `requirements.declare` requires, each with its platform."""
+    """Kinds of error, such as `receiver.position`, that an entry of `requirements.declare` requires to be declared.
+
+    An entry without a platform, except `timing`, stands for this kind of error on both platforms.
+    """
     return [word] if "." in word or word == "timing" else [f"{name}.{word}" for name in PLATFORMS]
 
 
 def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Yield looser values of autofocus, coverage factor, warning threshold, shares, model and rule of combination."""
+    """Yield the rules that became looser.
+
+    They are `n_pull` of the autofocus, the coverage factor, the warning threshold, the shares of the budget, the
+    gating model, and the rule that combines errors.
+    """
     missions = (before.analysed().mission, after.analysed().mission)
     for section, key, sign in _LIMITING_NUMBERS:
         old, new = (getattr(getattr(mission, section), key) for mission in missions)
@@ -221,7 +234,7 @@ def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened
 
 
 def _shares(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Yield the reserves that became smaller, and the shares that grew by more than the reserve shrank."""
+    """Yield the budget reserves that became smaller, and the shares that grew by more than the reserve shrank."""
     for metric, key in (("qpe", "quadratic_phase_error"), ("pslr", "pslr"), ("islr", "islr")):
         old, new = (getattr(findings.allocation, metric) for findings in (before, after))
         if _is_above(old.reserve, new.reserve):
@@ -265,7 +278,10 @@ def _waived_rows(before: MissionFindings, after: MissionFindings) -> Iterator[Lo
 
 
 def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Yield the errors that are no longer declared or now zero. A motion error with all its axes is one error."""
+    """Yield the errors that are no longer declared, or are declared as zero now.
+
+    A motion error with all its axes is one error.
+    """
     old, new = _declared(before), _declared(after)
     stated = (row for row in before.rows if row.declared is not None and row.is_independent)
     for name in dict.fromkeys(_error(row) for row in stated if not _is_sum(row)):
@@ -276,7 +292,7 @@ def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosene
 
 
 def _is_sum(row: Row) -> bool:
-    """Whether a row sums the effects of errors, and is no error itself."""
+    """Whether a row sums the effects of several errors, so that it is not an error itself."""
     kind = row.subject.facts
     return isinstance(kind, SumKind) and kind.is_sum
 
@@ -322,7 +338,10 @@ def _error(row: Row) -> str:
 
 
 def _sources(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Yield the kinds of error that lost their source. Named errors are listed one by one."""
+    """Yield the kinds of error that had a source before the change and have none after it.
+
+    Errors with names of their own are listed one by one.
+    """
     had_source = set(before.kinds.declared) - set(before.kinds.without_source)
     lost = [
         name
@@ -349,7 +368,7 @@ def _named_sources(mission: Mission) -> dict[str, str | None]:
 
 
 def _is_above(value: float, limit: float) -> bool:
-    """Whether a value exceeds a limit by more than rounding in a conversion of units."""
+    """Whether a value exceeds a limit by more than the rounding error of a unit conversion."""
     return value > limit and not math.isclose(value, limit, rel_tol=1e-9)
 
 
@@ -365,7 +384,7 @@ SMALL_FRACTION = 0.01  # changes of a row below this fraction are not shown
 
 
 class Change(NamedTuple):
-    """A row before and after; None if that version of the mission has no such row."""
+    """A row before and after a change; `before` or `after` is None if that version has no such row."""
 
     id: str
     before: Row | None
@@ -392,12 +411,15 @@ class Change(NamedTuple):
 
     @property
     def is_newly_failing(self) -> bool:
-        """Whether the status of the row became worse: to fail, or to not evaluated from another status than fail."""
+        """Whether the status of the row became worse.
+
+        It is worse if it became fail, or if it became not evaluated and was not fail before.
+        """
         return _is_newly_broken(_status(self.before), _status(self.after))
 
     @property
     def words(self) -> str:
-        """Text about the lost margin or the new status, for the message of a gate."""
+        """Text about the lost margin or the new status of the row, for the message of a gate."""
         if self.is_newly_failing:
             return _worse(_status(self.after))
         before, after = self.use
@@ -407,7 +429,7 @@ class Change(NamedTuple):
 
     @property
     def is_change(self) -> bool:
-        """Whether status, declared value, allowable or utilization differ, or only one version has the row."""
+        """Whether the status, declared value, allowable or utilization differs, or only one version has the row."""
         return _reported(self.before) != _reported(self.after)
 
     @property
@@ -430,7 +452,10 @@ class Change(NamedTuple):
 
 
 class RequirementMove(NamedTuple):
-    """A requirement with its status before and after; None if that version has no such requirement."""
+    """A requirement with its status before and after a change.
+
+    A status is None if that version of the mission has no such requirement.
+    """
 
     key: str
     name: str
@@ -444,7 +469,10 @@ class RequirementMove(NamedTuple):
 
     @property
     def is_newly_failing(self) -> bool:
-        """Whether the status of the requirement became worse: to fail, or to not evaluated from another than fail."""
+        """Whether the status of the requirement became worse.
+
+        It is worse if it became fail, or if it became not evaluated and was not fail before.
+        """
         return _is_newly_broken(self.before, self.after)
 
 
@@ -457,13 +485,16 @@ class Refusal(NamedTuple):
 
 
 class Gate(NamedTuple):
-    """A gate for changes: the fraction of a margin that a change may use up, and the ids that it lets through."""
+    """A gate that refuses changes: the largest fraction of a margin that a change may use up, and the exceptions.
+
+    `allowed` are the ids, or patterns of ids, that the gate lets through.
+    """
 
     tolerated: float
     allowed: tuple[str, ...] = ()
 
     def only(self, allowed: str) -> "Gate":
-        """Return this gate with `allowed` as the only id that it lets through."""
+        """Return a copy of this gate that lets only the id or pattern `allowed` through."""
         return self._replace(allowed=(allowed,))
 
     def refusal(self, id: str, words: str, file: str) -> Refusal:
@@ -535,7 +566,7 @@ class ChangeSet(NamedTuple):
         return not all(refusal.is_allowed for refusal in self._all(gate))
 
     def unused(self, gate: Gate) -> list[str]:
-        """Patterns of `--allow` that let nothing through."""
+        """Patterns of `--allow` that do not match any refused change."""
         return [
             pattern
             for pattern in gate.allowed
@@ -575,7 +606,7 @@ def _requirements(before: MissionFindings, after: MissionFindings) -> Iterator[R
 
 
 def _is_newly_broken(before: str | None, after: str | None) -> bool:
-    """Whether a status became worse: from another status to fail, or from any status except fail to not evaluated."""
+    """Whether a status became worse: fail after any other status, or not evaluated after any status except fail."""
     return (after == "fail" != before) or (after == "not_evaluated" and before not in ("fail", "not_evaluated"))
 
 

@@ -39,7 +39,7 @@ def as_text(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False) ->
 
 
 def _run_sentences(comparison: ChangeSet, gate: Gate | None) -> list[str]:
-    """Sentences about new and removed missions, settings, files outside the repository, and unused `--allow`."""
+    """Sentences about the run: new and removed missions, settings, files outside the repository, unused `--allow`."""
     sentences = [f"{file}: new, there is nothing to compare it with" for file in comparison.new]
     if gate is None:
         sentences += [f"{file}: the mission file is gone" for file in comparison.gone]
@@ -55,7 +55,10 @@ def _refusals(change: MissionChange | ChangeSet, gate: Gate | None) -> list[Refu
 
 
 class _ChangeInWords(NamedTuple):
-    """A change as text: its label, such as `input`, its name, and `before -> after` or the reason for a refusal."""
+    """A change as text: its label, such as `input`, its name, and a description.
+
+    The description is `before -> after`, or the reason for a refusal.
+    """
 
     label: str
     name: str
@@ -73,7 +76,7 @@ _TITLE_OF_LABEL = {
 
 
 def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_ChangeInWords]:
-    """Yield the changes of inputs, geometry and requirements; without a gate, also the loosened rules."""
+    """Yield the changed inputs, geometry values and requirements; without a gate, also the loosened rules."""
     for label, moves in (("input", mission.inputs), ("geometry", mission.geometry)):
         for move in moves:
             values = f"{_value_text(move.before, move)} -> {_value_text(move.after, move)}"
@@ -95,7 +98,7 @@ def _refused(change: MissionChange | ChangeSet, gate: Gate | None) -> list[_Chan
 
 
 def _blocks(changes: Iterable[_ChangeInWords]) -> Iterator[list[str]]:
-    """Yield a block of lines for the changes of each label; the first line is a title."""
+    """Yield one block of text lines for each label. The first line of a block is its title."""
     changes = list(changes)
     for label, title in _TITLE_OF_LABEL.items():
         texts = [printable(f"  {change.name}: {change.words}") for change in changes if change.label == label]
@@ -133,7 +136,7 @@ def _text(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[str
 
 
 def _shown(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[Change]:
-    """Changes of rows to show: changes of 1 % or more and refused changes; all changes with `all_rows`."""
+    """List the row changes to show: all with `all_rows`, otherwise changes of 1 % or more and refused changes."""
     refused = mission.broken(gate.tolerated) if gate is not None else []
     return [change for change in mission.changes if all_rows or not change.is_small or change in refused]
 

@@ -33,7 +33,10 @@ _ANY_DAY = date(2000, 1, 1)  # waivers depend on the day, utilizations do not
 
 @dataclass(frozen=True)
 class FallenEffect:
-    """A row with a smaller declared value or utilization than before; `after` is None if the row is gone."""
+    """A row whose declared value or utilization is smaller than before the change.
+
+    `after` is None if the row no longer exists.
+    """
 
     before: Row
     after: Row | None
@@ -45,7 +48,10 @@ class FallenEffect:
 
     @property
     def words(self) -> tuple[str, str]:
-        """Texts of the earlier and later utilization, or declared value if the utilizations cannot be compared."""
+        """Texts of the value before and the value after the change.
+
+        The value is the utilization, or the declared value if the utilizations cannot be compared.
+        """
         if _tells(self.before, self.after):
             uses = [100 * (row.utilization or 0.0) if row else 0.0 for row in (self.before, self.after)]
             old, new = (percent(use / 100) for use in uses)
@@ -61,7 +67,7 @@ class FallenEffect:
 
 
 class NotComparable(NamedTuple):
-    """A key of the later errors that is invalid with the geometry and waveform before the change, and the reason.
+    """A key of a changed error that is invalid with the earlier geometry and waveform, and the reason.
 
     Such a key prevents any comparison of effects.
     """
@@ -71,7 +77,7 @@ class NotComparable(NamedTuple):
 
     @property
     def words(self) -> tuple[str, str]:
-        """Two texts: the way in which effects are compared, and the reason why this comparison is impossible."""
+        """Two texts: how effects are compared, and why this comparison is impossible for the key."""
         return "effects compared in the earlier collection", f"not comparable, since there it {self.problem}"
 
 
@@ -170,7 +176,7 @@ def _errors(findings: MissionFindings, other: MissionFindings) -> list[Row]:
 
 
 def _sums(findings: MissionFindings) -> list[Row]:
-    """Return the rows that follow from the rows of declared errors."""
+    """Return the rows whose value is a sum over declared errors, without the rows of specifications."""
     return [
         row
         for row in findings.rows
@@ -195,14 +201,17 @@ def _size(row: Row) -> tuple[float, float]:
 
 
 def _tells(before: Row, after: Row | None) -> bool:
-    """Whether the utilizations can be compared: the earlier one is positive, and the later one, if any, is known."""
+    """Whether the utilizations of a row before and after a change can be compared.
+
+    The earlier one must be positive. The later one must be known, unless the row is gone.
+    """
     return bool(before.utilization) and (after is None or after.utilization is not None)
 
 
 def _is_less(before: Row, after: Row | None) -> bool:
-    """Whether the effect of a row decreased, or the row is gone.
+    """Whether the effect of a row decreased, or a row with an effect is gone.
 
-    The effect is the utilization, or the declared value if `_tells` is false.
+    The effect is the utilization, or the declared value if the utilizations cannot be compared (`_tells`).
     """
     if after is None:
         return before.declared != 0 or before.unit == "dB"
@@ -215,7 +224,10 @@ def _is_less(before: Row, after: Row | None) -> bool:
 
 
 def _family(row: Row) -> tuple[str, ...]:
-    """Key of the group of a row: owner, kind and axis for a numbered entry of a list, else the id of the row."""
+    """Key of the group within which rows are compared.
+
+    It is owner, kind and axis for a numbered list entry, and the row id for any other row.
+    """
     subject = row.subject
     if subject.entry is None or not subject.facts.has_numbers:
         return (row.id,)
@@ -223,9 +235,9 @@ def _family(row: Row) -> tuple[str, ...]:
 
 
 def _named_anew(before: MissionFindings, after: MissionFindings) -> set[str]:
-    """Ids of the rows with a new source or part, one that the earlier file does not name for the row.
+    """Ids of the rows whose values have a source or part that the earlier file does not name for the row.
 
-    A key that was removed, or that overrides a part, does not name a new source: the source or part that its section
+    A key that was removed, or that overrides a part, does not name a new source. The source or part that its section
     names already applied to the row.
     """
     old = {row.id: row for row in before.rows}
@@ -242,7 +254,10 @@ def _named_anew(before: MissionFindings, after: MissionFindings) -> set[str]:
 
 
 def _source(mission: Mission, row: Row) -> str:
-    """Plain name of the source of a row's values; for a row about the fixes of a log, the name of the log file."""
+    """Normalized name (`plain`) of the evidence for a row's values; empty if there is none.
+
+    For a row about the fixes of a trajectory log, it is the name of the log file.
+    """
     kind = row.subject.facts
     if not (isinstance(kind, SourceKind) and kind.is_of_log):
         return plain(row.evidence)
@@ -251,7 +266,7 @@ def _source(mission: Mission, row: Row) -> str:
 
 
 def _is_named(source: str, mission: Mission, row: Row) -> bool:
-    """Whether a mission already has `source` as the source of a row, or of the section that contains its value.
+    """Whether a mission already names `source` for a row, or for the section that contains the row's value.
 
     It also counts if `source` begins with the name of a part whose values the section overrides. An empty source is
     not a new one, and gives True.
@@ -271,7 +286,7 @@ def _is_named(source: str, mission: Mission, row: Row) -> bool:
 
 
 def _parts(mission: Mission, row: Row) -> set[str]:
-    """Plain names of the catalogue parts that provide a row's values."""
+    """Normalized names of the catalogue parts that provide a row's values."""
     start = f"platforms.{row.owner}."
     keys = {taken.key: set(taken.key.split(".")) for taken in mission.taken if taken.key.startswith(start)}
     word = next(
@@ -281,7 +296,10 @@ def _parts(mission: Mission, row: Row) -> set[str]:
 
 
 def _sensors(mission: Mission, row: Row) -> set[str]:
-    """Plain names of the catalogue parts of a row's platform, even if the file overrides all their values."""
+    """Normalized names of the catalogue parts that the section of a row's platform names.
+
+    They count even if the file overrides all their values.
+    """
     if row.owner not in PLATFORMS:
         return set()
     platform: Platform = getattr(mission.platforms, row.owner)

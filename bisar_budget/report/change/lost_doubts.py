@@ -20,7 +20,7 @@ _NOT_OF_FORM = ("object", "planned")  # keys of an orbit other than the format o
 
 
 class LostDoubt(NamedTuple):
-    """A doubt that only the earlier mission has: the key that removed it, and texts for before and after."""
+    """A doubt that the change removed: the key that removed it, and texts for before and after."""
 
     key: str
     before: str
@@ -28,7 +28,7 @@ class LostDoubt(NamedTuple):
 
 
 def lost_doubts(before: Mission, after: Mission) -> Iterator[LostDoubt]:
-    """Yield the doubts about the earlier paths that disappeared, although the later errors do not cover them."""
+    """Yield the doubts about the earlier paths that are gone, although the later errors do not cover them."""
     doubts = {_name(doubt) for doubt in input_doubts(before)}
     if not doubts:
         return
@@ -54,9 +54,9 @@ def _words(doubt: InputDoubt) -> str:
 
 
 def _takes(doubt: InputDoubt, old: Platform, new: Platform) -> Iterator[tuple[str, str]]:
-    """Yield the keys that suppress a doubt, each with a text about its new value.
+    """Yield the changed keys that suppress a doubt about a path, each with a text about its new value.
 
-    There is none if the path has a new or better source.
+    Nothing is yielded if the path has a new or better source.
     """
     was, now = old.path, new.path
     if was is None:
@@ -75,9 +75,9 @@ def _takes(doubt: InputDoubt, old: Platform, new: Platform) -> Iterator[tuple[st
 
 
 def _is_same_source(old: Platform, new: Platform) -> bool:
-    """Whether a path has a source with the same name as before. Format, folder and file ending are ignored.
+    """Whether the source of a path has the same name as before. Format, folder and file ending are ignored.
 
-    A choice within the file, such as its object or track, counts only if both versions make it.
+    A selection within the file, such as its object or track, is compared only if both versions state it.
     """
     return _files(old) == _files(new) and all(
         plain(was) == plain(now) for was, now in zip(_chosen(old), _chosen(new), strict=True) if was and now
@@ -85,13 +85,13 @@ def _is_same_source(old: Platform, new: Platform) -> bool:
 
 
 def _files(platform: Platform) -> tuple[str, ...]:
-    """Plain names of the files of a path and of its accuracy; empty without a path."""
+    """Normalized names of the file of a path and of its accuracy file; an empty tuple if the path has no file."""
     path = platform.path
     return () if path is None else (plain_file(path.file), plain_file(path.accuracy and path.accuracy[0]))
 
 
 def _chosen(platform: Platform) -> list[str]:
-    """Values of the keys that select a source within a file, such as `track`; empty texts for missing keys."""
+    """Values of the keys that select data within a path file, such as `track`; an empty text for a missing key."""
     choices = [getattr(getattr(platform, platform.way), choice, None) for choice in _CHOICES]
     return ["" if choice is None else str(choice) for choice in choices]
 
@@ -104,7 +104,7 @@ def _key(platform: Platform) -> str:
 
 
 def _is_sourced_anew(doubt: InputDoubt, old: Platform, new: Platform) -> bool:
-    """Whether the declared error now names a source that it did not name before."""
+    """Whether the declared error now names evidence that it did not name before."""
     named = plain(new.motion_error.evidence(doubt.kind))
     error = old.motion_error
     return named not in ("", plain(error.source), plain(error.evidence(doubt.kind)))

@@ -1,4 +1,7 @@
-"""The annex of a compliance report: sweep, images and Monte Carlo if requested; all rows with `--detail full`."""
+"""The annex of a compliance report.
+
+It has the sweep, images and Monte Carlo draws that were requested, and with `--detail full` all rows.
+"""
 
 import math
 from collections import Counter
@@ -48,7 +51,7 @@ _MAX_LISTED_WORDS = 6  # words of an axis that a sentence lists
 
 
 def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
-    """Return the annex of a mission as a list with one chapter; an empty list if the summary shows everything."""
+    """Return the annex chapter of a mission in a list; the list is empty if the summary already shows everything."""
     findings = page.findings
     sections = [] if findings.study is None else [_studied(page, findings.study)]
     if findings.sheet is not None:
@@ -73,7 +76,7 @@ def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
 
 # ---------------------------------------------------------------------- specifications
 def _specified(page: Page, sheet: SpecificationSheet) -> Iterator[doc.Block]:
-    """Yield the specification sheet of a mission, with the number of declared sizes above their specification."""
+    """Yield the specification sheet of a mission, with the number of declared errors larger than specified."""
     outside = sum(spec.declared is not None and not spec.holds(spec.declared) for spec in sheet.specifications)
     silent = sum(spec.declared is None and spec.ordered is not None for spec in sheet.specifications)
     clauses = list[str]()
@@ -135,7 +138,7 @@ def _question(trade: Trade) -> str:
 
 
 def _values(axis: Axis) -> str:
-    """Describe the values of an axis: the words, or the number of values with the first and the last."""
+    """Describe the values of a sweep axis: its words, or for numbers their count, the first and the last."""
     count = len(axis.values)
     if axis.words:
         word_list = ", ".join(map(printable, axis.words[:_MAX_LISTED_WORDS]))
@@ -177,8 +180,7 @@ def _stretches(trade: Trade) -> Iterator[tuple[doc.Line, str]]:
     """Yield the table lines of a sweep over one axis, each with a sentence about it.
 
     Neighbouring numbers with the same status and the same worst row share a line. A value that is a word has its own
-    line. The
-    binding requirement follows the name of the row, unless the name ends with it.
+    line. The binding requirement follows the name of the row, unless the name ends with it.
     """
     (axis,) = trade.axes
     status, rows, uses = (trade.values[name] for name in ("status", "worst_row", "utilization"))
@@ -195,7 +197,7 @@ def _stretches(trade: Trade) -> Iterator[tuple[doc.Line, str]]:
 
 
 def _uses(uses: NumbersOrWords) -> str:
-    """Text of the range of the finite utilizations, from the lowest to the highest; a dash if there is none."""
+    """Text of the range of finite utilizations, from the lowest to the highest; a dash if none is finite."""
     finite_uses = sorted(float(use) for use in uses if math.isfinite(use))
     if not finite_uses:
         return "–"
@@ -309,9 +311,9 @@ def _page_size(image: PointImage) -> tuple[int, int]:
 
 # ---------------------------------------------------------------------- draws
 def _draws(page: Page, drawn: MonteCarlo) -> Iterator[doc.Block]:
-    """Yield the Monte Carlo table: the probability of each requirement, and sums for comparison.
+    """Yield the table of Monte Carlo results and remarks about it.
 
-    Remarks follow the table.
+    The table has the probability of meeting each requirement, and combined sums for comparison.
     """
     lines: list[doc.Line] = []
     for requirement in drawn.requirements:
@@ -358,7 +360,7 @@ def _rows(page: Page) -> Iterator[doc.Block]:
 
 
 def sources(findings: MissionFindings) -> tuple[dict[str, list[str]], list[str]]:
-    """Map each source in the file to the ids of its rows, and list the ids of rows that lack a source."""
+    """Map each source in the file to the ids of its rows, and list the ids of declared rows without a source."""
     by_source: dict[str, list[str]] = {}
     unsourced = []
     for row in findings.rows:

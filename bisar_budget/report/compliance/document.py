@@ -13,7 +13,10 @@ from bisar_budget.report.explain.notation import WorkedEquation
 # ---------------------------------------------------------------------- text of a line
 @dataclass(frozen=True, slots=True)
 class Name:
-    """An id or a path, which may break if it is long. `target` is the anchor of its link."""
+    """An id or a file path as text, which may be broken into lines if it is long.
+
+    `target` is the anchor of the place to which it links.
+    """
 
     text: str
     target: str = ""
@@ -21,7 +24,7 @@ class Name:
 
 @dataclass(frozen=True, slots=True)
 class Styled:
-    """Text with a class of the style sheet. If the text fills a table cell, the cell gets the class.
+    """Text with a class of the style sheet. If the text fills a table cell, the cell also gets the class.
 
     Markdown puts text of the classes `own-id` and `origin` in brackets.
     """
@@ -32,7 +35,7 @@ class Styled:
 
 @dataclass(frozen=True, slots=True)
 class Badge:
-    """A status, or a verdict from an image, shown as a word with a mark and a colour."""
+    """The status of a row or the verdict of its image, shown as a word with a mark and a colour."""
 
     status: str
 
@@ -52,7 +55,7 @@ class Use:
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """A bar that shows a fraction of the whole, in the colour of its owner."""
+    """A bar that shows a fraction of the whole, in the colour of the platform or clock that owns it."""
 
     fraction: float
     owner: str
@@ -60,7 +63,10 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class Swatch:
-    """Colour key for an owner's share in a `Stack`. Markdown cannot show a stack, so it shows a bar instead."""
+    """Colour key for the share of an owner (a platform or the clock) in a `Stack`.
+
+    Markdown cannot show a stack, so it shows the fraction as a bar instead.
+    """
 
     owner: str
     fraction: float
@@ -100,7 +106,7 @@ class Paragraph:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """A list of names with values. A pair without a name belongs to the name before it."""
+    """A list of named values. A value without a name belongs to the name above it."""
 
     pairs: Sequence[tuple[Text, Text]]
     style: str = "facts"
@@ -108,7 +114,7 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Items:
-    """A list whose items have one or more paragraphs; numbered if the order matters."""
+    """A list of items, each with one or more paragraphs. The items are numbered if their order matters."""
 
     items: Sequence[Sequence[Text]]
     style: str = "remarks"
@@ -117,7 +123,7 @@ class Items:
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """The head of a table column. Its style is `number` (aligned to the right), `id` or empty."""
+    """The head of a table column. Its style is `number` (right-aligned), `id` or empty for text."""
 
     text: Text
     style: str = ""
@@ -149,7 +155,10 @@ class TextTable:
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """A bar of the whole budget, divided into shares with owner, fraction and text. Markdown leaves it out."""
+    """A bar of the whole budget, divided into shares. Each share has an owner, a fraction and a text.
+
+    Markdown leaves the bar out.
+    """
 
     label: str
     shares: Sequence[tuple[str, float, str]]
@@ -191,7 +200,7 @@ class Images:
 
 @dataclass(frozen=True, slots=True)
 class Equality:
-    """A general formula that belongs to no row. Both sides are names of formulas in the catalogue."""
+    """An equation between two formulas of the catalogue, given by their names. It belongs to no row."""
 
     left: str
     right: str
@@ -234,7 +243,10 @@ Block = Paragraph | Facts | Items | TextTable | Stack | Figure | Images | Steps 
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """Texts in the page margins when a mission is printed: name, document, and digest or path of the file."""
+    """Texts for the page margins when a mission is printed.
+
+    They are the mission name, the document, and the digest or path of the mission file.
+    """
 
     anchor: str
     name: str

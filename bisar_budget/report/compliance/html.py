@@ -168,7 +168,7 @@ def _chapter(chapter: doc.Chapter) -> Markup:
 
 
 def _cell(tag: str, text: doc.Text, style: str = "", scope: str = "") -> Markup:
-    """Write an element of a table or a list of facts. The element gets the style of its text."""
+    """Write a table cell or an entry of a list of facts as an element, which gets the style class of its text."""
     if isinstance(text, doc.Styled):
         style, text = text.style, text.text
     scoped = Markup(' scope="{}"').format(scope) if scope else ""
@@ -210,7 +210,10 @@ def _stack(stack: doc.Stack) -> Markup:
 
 
 def _inline(figure: doc.Figure) -> Markup:
-    """Inline a drawing. The anchor is put before its ids, because a report may contain a mission twice."""
+    """Write the SVG of a drawing into the page.
+
+    The anchor is put before the ids of the drawing, because a report may contain a mission twice.
+    """
     return Markup(re.sub(r'\b(id|aria-labelledby|aria-describedby)="', rf'\1="{figure.anchor}-', figure.svg))
 
 
@@ -220,7 +223,7 @@ def _step(title: str, equations: Iterable[WorkedEquation | str | doc.Equality], 
 
 
 def _equation(equation: WorkedEquation | str | doc.Equality) -> Markup:
-    """Write an item of a step: a formula as MathML, arithmetic and words as text."""
+    """Write one item of a derivation step: a formula as MathML, arithmetic and words as text."""
     if isinstance(equation, doc.Equality):
         sides = (notation.catalogued(side, notation.MATHML) for side in (equation.left, equation.right))
         formula = notation.math("<mrow>{}<mo>=</mo>{}</mrow>".format(*sides))

@@ -65,14 +65,14 @@ def _text(text: doc.Text, badge: str = "**{}**") -> str:
 
 
 def _inside(text: doc.Text, badge: str) -> str:
-    """Write a part of a line. Leading spaces are kept, and the text after them is escaped."""
+    """Write one of the texts that make up a line. Its leading spaces are kept, and the text after them is escaped."""
     if isinstance(text, str):
         return " " * (len(text) - len(text.lstrip(" "))) + _text(text.lstrip(" "))
     return _text(text, badge)
 
 
 def _bar(fraction: float) -> str:
-    """Draw a fraction of the whole as a bar of characters."""
+    """Draw a fraction from 0 to 1 as a bar of characters."""
     return ("█" * round(_BAR_WIDTH * fraction)).ljust(_BAR_WIDTH, "░")
 
 
@@ -152,7 +152,7 @@ def _table(table: doc.TextTable) -> str:
 
 
 def _formulas(equations: Iterable[WorkedEquation | str | doc.Equality]) -> Iterator[str]:
-    """Yield a LaTeX block for each formula, and a list for the texts between formulas."""
+    """Yield a LaTeX block for each formula, and a list for the texts between the formulas."""
     lines: list[str] = []
     for equation in equations:
         if latex := _latex(equation):

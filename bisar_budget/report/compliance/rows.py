@@ -68,7 +68,7 @@ class Page:
 
     @property
     def judged(self) -> list[Row]:
-        """Rows that were judged or could not be judged, worst first."""
+        """Rows with a verdict, and rows that could not be judged, worst first."""
         return [row for row in self.matrix if STATUS[row.status].is_judged]
 
     @property
@@ -105,7 +105,7 @@ def page_of(findings: MissionFindings, style: Style, anchor: str) -> Page:
 
 # ---------------------------------------------------------------------- matrix
 def matrix_table(page: Page, rows: Iterable[Row], label: str, caption: str) -> doc.TextTable:
-    """Compliance matrix with the given rows of a page."""
+    """Make the table of the compliance matrix with the given rows of a mission."""
     numbers = {row.id: number for number, row in enumerate(page.matrix, start=1)}
     verdicts = {verdict.id: verdict.verdict for verdict in page.findings.verdicts or ()}
     sizes = doc.numbers("Utilization", "Declared", "Allowable", "Margin")
@@ -145,7 +145,7 @@ def undeclared_table(page: Page) -> doc.TextTable:
 
 
 def grouped(row_texts: Iterable[tuple[str, Sequence[str]]]) -> doc.Facts | None:
-    """Group rows by text: each text once, with the ids of all its rows; None if no row has a text."""
+    """Group row ids by text: each text appears once, with the ids of all rows that have it; None without texts."""
     groups: dict[str, list[str]] = {}
     for row_id, texts in row_texts:
         if texts:

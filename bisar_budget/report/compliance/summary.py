@@ -139,7 +139,7 @@ _WAIVED = (
 
 
 def _judged(status: str, waived: Sequence[int]) -> str:
-    """Text of the verdict for a status, with the two counts of `_waived` in `waived`."""
+    """Text of the verdict for a status, followed by the counts of waived rows in `waived` (from `_waived`)."""
     clauses = [f"{count} {words[count > 1]} waived" for count, words in zip(waived, _WAIVED, strict=True) if count]
     return "; ".join([STATUS[status].verdict, *clauses])
 
@@ -218,7 +218,7 @@ def _provenance(report: Report) -> doc.Chapter:
 
 
 def _approval(report: Report) -> doc.Chapter:
-    """Return the chapter for signatures, with a table of the values that a stated level shifts off a data sheet."""
+    """Return the chapter for signatures, with a table of data sheet values that a stated level shifts."""
     blocks: list[doc.Block] = []
     shifted = [
         (findings.name, doc.Styled("id", doc.Name(error.key)), error.level, error.off)
@@ -333,7 +333,8 @@ def _requirements(page: Page) -> doc.TextTable:
 def _drivers(page: Page) -> Iterator[Row]:
     """Yield the rows that decide the verdict.
 
-    They are the rows that fail, warn, cannot be judged or are waived; if all are met, the rows with the largest use.
+    They are the rows that fail, warn, cannot be judged or are waived. If all rows are met, they are the rows with the
+    largest utilization.
     """
     is_met = STATUS[page.findings.status].is_met
     for row in page.judged[:_MAX_DRIVER_ROWS]:

@@ -220,7 +220,7 @@ def _compass(value: float, positive: str, negative: str) -> str:
 
 
 class _Panel(NamedTuple):
-    """A panel: its frame [px], the point `centre` of the drawing plane at its middle [m], and its scale [px/m]."""
+    """One panel of a drawing: its frame [px], the point `centre` that is at its middle [m], and its scale [px/m]."""
 
     frame: svg.Box
     centre: PlanePoint
@@ -309,7 +309,10 @@ def _symbols(view: _View, panels: Sequence[_Panel]) -> Iterator[str]:
 
 
 def _extent(view: _View, centre: PlanePoint, reach: float) -> list[PlanePoint]:
-    """Outermost points of a circle with radius `reach` [m]: four in the view from above, two in the side view."""
+    """Outermost points of a circle with radius `reach` [m] around `centre`.
+
+    There are four in the view from above and two in the side view.
+    """
     x, y = centre
     ends = [(x - reach, y), (x + reach, y)]
     return [*ends, (x, y - reach), (x, y + reach)] if view.is_plan else ends

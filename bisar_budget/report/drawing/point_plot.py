@@ -303,7 +303,7 @@ def archive(images: PointImages, changes: Sequence[SetValue] = ()) -> bytes:
 
 
 def flown_words(mission: Mission) -> str:
-    """Words about the errors in the images of a mission, and about those that no image has."""
+    """Describe the errors with which the images of a mission are formed, and the errors that no image has."""
     factor = mission.allocation.coverage_factor
     times = f", {factor:g} times the file's values" if factor != 1 else ""
     errors = (getattr(mission.platforms, name).motion_error for name in PLATFORMS)
@@ -330,7 +330,10 @@ def flown_words(mission: Mission) -> str:
 
 
 def _stated_effect_words(mission: Mission) -> str:
-    """Words about errors that the file states by their effects, each of which is flown in one way of many."""
+    """Describe errors that the file states by their effects.
+
+    An effect can have many causes. The text states the cause that is simulated in the images.
+    """
     ways = {
         "as a phase of the receiver": ("quadratic_phase_error", "cubic_phase_error"),
         "as a displacement to the east": ("location_error",),
@@ -412,7 +415,11 @@ def _of_the_point(images: PointImages) -> list[str]:
 
 
 def _of_targets(images: PointImages) -> list[str]:
-    """Write a line for each target, with its peak relative to the peak without error and the width of its cut."""
+    """Write a line for each target, below two header lines.
+
+    A line has the position, level, displacement and quadratic phase, and for the images with errors and after
+    autofocus the peak relative to the error-free peak and the width of the cut.
+    """
     lines = [
         f"{'target [m]':>17} {'level':>7} {'moved by [m]':>15} {'phase':>8} {'with errors':>14} {'autofocused':>14}",
         f"{'east':>8} {'north':>8} {'[dB]':>7} {'east':>7} {'north':>7} {'[rad]':>8} "

@@ -1,6 +1,6 @@
-"""Draw the shares of the errors in the limits of rows as stacked bars.
+"""Draw how much each error contributes to the limits of rows, as stacked bars.
 
-The errors have the numbers of the specification sheet.
+The errors have the same numbers as in the specification sheet.
 """
 
 from bisar_budget.faults import printable
@@ -26,14 +26,17 @@ _SHARES_STYLE = (
 
 
 def limiting(sheet: SpecificationSheet) -> list[RowUse]:
-    """Rows of the sheet that limit a specification, in the order of their requirements."""
+    """Rows of a specification sheet that limit at least one specification, ordered by their requirements."""
     rows = [row for row in sheet.rows if row.multiplier > LEAST_WEIGHT_FRACTION]
     order = [*REQUIREMENT_NAMES, None]
     return sorted(rows, key=lambda row: order.index(row.requirement))
 
 
 def share_bars(sheet: SpecificationSheet) -> str:
-    """Draw a bar for each limiting row as SVG, divided into the shares of the errors in its limit."""
+    """Draw a stacked bar as SVG for each row that limits a specification.
+
+    Each part of a bar is the contribution of one error to the limit of the row.
+    """
     canvas = svg.Canvas()
     keys = [spec.key for spec in sheet.specifications]
     rule = "squares add up" if sheet.combine == "rss" else "sizes add up"

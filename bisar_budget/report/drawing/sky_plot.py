@@ -206,7 +206,7 @@ def _square(canvas: svg.Canvas, at: svg.Point, style: str) -> None:
 
 
 def _dates(start: Instant, span: float, width: float) -> Iterator[tuple[float, str]]:
-    """Yield the times of the ticks after the start [s], each with its date or hour as text."""
+    """Yield the tick times of the date axis, in seconds after the start [s], each with its date or hour as text."""
     hours = next(
         (step for step in _DATE_STEPS_HOURS if step * _HOUR_S * width >= span * _DATE_PX), _DATE_STEPS_HOURS[-1]
     )

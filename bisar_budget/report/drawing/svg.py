@@ -149,7 +149,7 @@ class DrawnLabel(NamedTuple):
 
 
 class _LabelPosition(NamedTuple):
-    """Position of a label: its box, the anchor of its text, and the cost of the position."""
+    """A possible position of a label: its box, the anchor of its text, and the cost of the position."""
 
     box: Box
     anchor: str
@@ -508,7 +508,7 @@ class LegendLine(NamedTuple):
 
 
 def line_entry(canvas: Canvas, words: str, style: str) -> LegendLine:
-    """Legend entry for a line that is drawn in `style`."""
+    """Make the legend entry for a line that is drawn in `style`."""
     return LegendLine(words, lambda at: canvas.lines([(at, (at[0] + 25, at[1]))], style))
 
 

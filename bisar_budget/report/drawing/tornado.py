@@ -77,7 +77,7 @@ def _label(slope: Slope) -> str:
 
 
 def _even(slope: Slope) -> str:
-    """Text of the change in a number, of which its bar shows the effect."""
+    """Text of the change in a number whose effect the bar shows."""
     if slope.measure == COMPARED_CHANGE_FRACTION:
         return slope.per_text
     size, _, unit = slope.per_text.partition(" ")

@@ -85,7 +85,10 @@ def trade_drawing(
 
 
 def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
-    """Lines above a drawing in a separate file: mission, fixed values, changes, model, and the axes if polar."""
+    """Lines above a drawing in a separate file: mission, fixed values, changes by options, and gating model.
+
+    For a polar map, a last line names its angle and radius.
+    """
     is_gating = any(axis.key == "allocation.model" for axis in trade.axes)
     model = "" if is_gating else f"{mission.gating_model} model"
     subtitle = ", ".join(filter(None, (*trade.fixed, changes_words(mission.changes), model)))
@@ -138,7 +141,10 @@ def _heat_colour(fraction: float) -> str:
 
 
 def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> svg.Scale:
-    """Axis scale for the values of a column. For utilizations [%] it is logarithmic and includes 10 % and 100 %."""
+    """Make the axis scale for the values of a column.
+
+    For utilizations [%] it is logarithmic and includes 10 % and 100 %.
+    """
     finite = values[np.isfinite(values)]
     if is_use:
         finite = np.append(finite[finite > 0], 100.0)
@@ -221,7 +227,10 @@ def _curve(
 
 
 def _seen(points: Sequence[svg.Point]) -> list[svg.Point]:
-    """Reduce a dense curve to its visible points: the first, lowest, highest and last point in each half pixel."""
+    """Reduce a dense curve to the points that can be seen.
+
+    They are the first, lowest, highest and last point in each half pixel.
+    """
     height = itemgetter(1)
     visible: list[svg.Point] = []
     column: list[svg.Point] = []
@@ -281,9 +290,10 @@ def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Float
 
 # ---------------------------------------------------------------- two keys
 class _Plane(NamedTuple):
-    """Mapping from the keys of a map to the page.
+    """Conversion from the two varied keys of a map to coordinates on the page.
 
-    The scales give horizontal and vertical coordinates [px], or azimuth [rad] and radius [px] around `middle`.
+    The scales give horizontal and vertical coordinates [px]. For a polar map they give azimuth [rad] and radius [px]
+    around `middle`.
     """
 
     across: svg.Scale
@@ -291,13 +301,16 @@ class _Plane(NamedTuple):
     middle: svg.Point | None = None
 
     def at(self, p: float, q: float) -> svg.Point:
-        """Point on the page for a pair of coordinates on the two scales."""
+        """Point on the page [px] for the coordinates that the two scales give."""
         if self.middle is None:
             return p, q
         return self.middle[0] + q * math.cos(p), self.middle[1] - q * math.sin(p)
 
     def line(self, points: Sequence[svg.Point]) -> list[svg.Point]:
-        """Convert a line through points on the two scales to points on the page; curved lines get more points."""
+        """Convert a line in the coordinates of the two scales to points on the page.
+
+        On a polar map, points are added along each segment so that it appears curved.
+        """
         line = [self.at(*points[0])]
         for (p, q), (u, v) in pairwise(points):
             step_count = 1 if self.middle is None else max(1, math.ceil(abs(u - p) / _CURVE_STEP_RAD - 1e-9))
@@ -306,7 +319,7 @@ class _Plane(NamedTuple):
         return line
 
     def fill(self, canvas: svg.Canvas, boxes: Iterator[svg.Box], style: str) -> None:
-        """Fill cells, which are rectangles on the two scales."""
+        """Fill map cells, which are rectangles in the coordinates of the two scales."""
         if self.middle is None:
             canvas.boxes(boxes, style)
             return
@@ -315,7 +328,10 @@ class _Plane(NamedTuple):
 
 
 def _axis_scale(axis: Axis, start: float, end: float) -> svg.Scale:
-    """Scale of an axis. Each word gets a cell of width 1; the scale of numbers goes from the first to the last."""
+    """Make the scale of a map axis from `start` to `end` on the page.
+
+    On an axis of words each word gets a cell of width 1. A scale of numbers goes from the first value to the last.
+    """
     if axis.words:
         return svg.Scale(-0.5, axis.values[-1] + 0.5, start, end)
     return svg.Scale(float(axis.values[0]), float(axis.values[-1]), start, end, axis.is_log)
@@ -425,7 +441,7 @@ def _heat(
 
 
 def _in_cells(canvas: svg.Canvas, trade: Trade, columns: Sequence[float], lines: Sequence[float]) -> None:
-    """Write the utilization and the worst row into each cell of a map of words."""
+    """Write the utilization and the worst row into each cell of a map whose axes both have words."""
     max_characters = int((columns[1] - columns[0]) / 6.5)  # characters of a cell
     for (i, j), use in np.ndenumerate(trade.values["utilization"]):
         if math.isfinite(use):
@@ -479,9 +495,10 @@ def _names(
 
 # ---------------------------------------------------------------- from above
 def _from_above(around: Axis, radius: Axis, frame: svg.Box) -> _Plane:
-    """Scales of a polar map: azimuth counter-clockwise from east, and the other key as the radius.
+    """Make the scales of a polar map: azimuth counter-clockwise from east, and the other key as the radius.
 
-    The middle is 0, or 90 deg if the other key is an elevation, because a platform there is above the scene.
+    The value in the middle is 0. It is 90 deg if the other key is an elevation, because a platform at this elevation
+    is above the scene.
     """
     first, last = float(around.values[0]), float(around.values[-1])
     is_elevation = radius.key.endswith(".elevation")
@@ -494,7 +511,10 @@ def _from_above(around: Axis, radius: Axis, frame: svg.Box) -> _Plane:
 
 
 def _around(canvas: svg.Canvas, plane: _Plane, around: Axis, geometry: BistaticGeometry) -> list[svg.LegendLine]:
-    """Draw directions, circles with their numbers, and a mark at the rim for the platform that does not vary."""
+    """Draw the grid of a polar map: directions, and circles labelled with the values of the radius.
+
+    If only one platform varies, a mark at the rim shows the direction of the other. Returns its legend entry.
+    """
     turn = (0.0, 2 * math.pi)
     names = {0: "east", 90: "north", 180: "west", 270: "south"}
     for degrees in range(0, 360, 45):

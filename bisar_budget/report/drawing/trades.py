@@ -59,7 +59,7 @@ def varying_keys(cases: Cases) -> list[Varied]:
 
 
 class Gathered:
-    """Collects the columns for a plot from the parts of a sweep."""
+    """Collects the table columns that a plot needs while the parts of a sweep are computed."""
 
     def __init__(self, described: Described, names: Sequence[str] = (), column: str | None = None) -> None:
         self.described, self.cases = described, described.cases
@@ -76,18 +76,18 @@ class Gathered:
         self.pieces: dict[str, list[NumbersOrWords]] = {name: [] for name in needed}
 
     def add(self, part: Part) -> None:
-        """Keep the needed columns of a part."""
+        """Keep the columns that the plot needs from one part of a sweep."""
         for name, column_pieces in self.pieces.items():
             column_pieces.append(self.described.converted(name, part.values[name]))
 
     def passing(self, parts: Iterable[Part]) -> Iterator[Part]:
-        """Yield the parts of a sweep unchanged, and keep the needed columns of each part."""
+        """Yield the parts of a sweep unchanged, and keep the columns that the plot needs."""
         for part in parts:
             self.add(part)
             yield part
 
     def trade(self, *, is_polar: bool = False) -> Trade:
-        """Return the sweep with sorted axes. For a polar map, the azimuth is the first axis."""
+        """Return the collected sweep with its axes sorted. For a polar map, the azimuth is the first axis."""
         axes: list[Axis] = []
         varying_indices, fixed, orders = [], [], []
         for index, (varied, values) in enumerate(zip(self.cases.varied, self.cases.columns, strict=True)):
@@ -184,7 +184,10 @@ def stretches(begins: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
 
 
 def runs(axis: Axis, statuses: NumbersOrWords) -> Iterator[tuple[str, float, float]]:
-    """Yield the stretches of an axis with the same status, each with its status, first edge and last edge."""
+    """Yield the stretches of an axis in which neighbouring cases have the same status.
+
+    Each stretch has its status, first edge and last edge.
+    """
     edges = cell_edges(axis)
     for start, stop in stretches(statuses[1:] != statuses[:-1]):
         yield str(statuses[start]), edges[start], edges[stop]
@@ -265,7 +268,7 @@ def _innermost(mask: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def _run(line: NDArray[np.bool_], index: int) -> int:
-    """Number of consecutive True cells of a line around an index."""
+    """Number of consecutive True cells of a line around the cell at an index."""
     ends = np.flatnonzero(~line)
     low = ends[ends < index].max(initial=-1)
     high = ends[ends > index].min(initial=line.size)

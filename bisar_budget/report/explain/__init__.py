@@ -1,1 +1,1 @@
-"""Explanations of the status of a row: the equations with their numbers, and their typesetting."""
+"""Explanations of how the status of a row follows: its equations with their numbers, and their typesetting."""

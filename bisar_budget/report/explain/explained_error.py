@@ -165,9 +165,10 @@ def _motion_values(analysis: Analysis, platform: str, kind: str, axis: str, size
 
 @dataclass(frozen=True)
 class _SetClock:
-    """Symbol of an error of a set clock, and its clock terms t̃₀, t̃₁, t̃₂; H is the time since the clock was set.
+    """Notation for an error of a clock that was set: its symbol, and formulas for its clock terms t̃₀, t̃₁ and t̃₂.
 
-    `direct_title` is the title of its terms if the receiver uses a direct path; empty if they are the same.
+    In the formulas, H is the time since the clock was set. `direct_title` is the title of the terms if the receiver
+    uses a direct path; it is empty if the title stays the same.
     """
 
     symbol: str
@@ -224,7 +225,7 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
 
 
 def _table_i(kind: SourceKind, axis: str) -> str:
-    """Name of the row of Table I with an error of position, velocity or acceleration along an axis of the scene."""
+    """Label of the row of Table I for an error of position, velocity or acceleration along an axis of the scene."""
     assert isinstance(kind, StateKind)
     return f"Table I row {2 + 3 * notation.AXIS_LETTERS.index(axis) + kind.order}"
 
@@ -285,7 +286,7 @@ def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each:
 
 
 def _registered_effect(source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the steps for an error of a registered kind: what its kind says of it, and its published phase."""
+    """Yield the steps for an error of a registered kind: the description of the kind, and its published phase."""
     assert isinstance(source.kind, MotionKind)
     yield step(f"{source.kind.name}, a registered kind of error ({source.equation}): {source.kind.description}")
     unit = f"rad per {source.unit}"
@@ -304,9 +305,9 @@ def _times_declared(source: ErrorSource, size: float, each: str) -> Step:
 
 
 def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[str, float]:
-    """Project the quadratic phases per unit along the axes of the scene on the axis of the error.
+    """Project the quadratic phases along the axes of the scene on the axis of the error, per unit of the error.
 
-    Returns the sum as text and as a number [rad per unit].
+    Returns the sum of the projected phases as text and as a number [rad per unit].
     """
     _, _, kind, axis, frame, _ = source.subject
     state: PlatformState = getattr(analysis.geometry, platform)
@@ -339,9 +340,9 @@ def _common_projected_effect(analysis: Analysis, source: ErrorSource, size: floa
 
 
 def _projected_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the steps for an error along an axis of another frame.
+    """Yield the steps for an error along an axis of a frame other than the scene.
 
-    Its effect is the projection of the effects along the axes of the scene.
+    Its effect is the sum of the effects along the axes of the scene, projected on this axis.
     """
     terms, _ = _projected(analysis, source, source.owner)
     unit = f"rad per {source.unit}"
@@ -409,10 +410,10 @@ _MIN_SHOWN_BEYOND_RAD = 1e-6  # rms phase beyond the cubic that may be rounding
 
 
 class Residual:
-    """Residual range error at the displaced image point of the scene centre, for an error of a signed size.
+    """Range error that remains at the displaced image point of the scene centre, for one error of a signed size.
 
     `image_point` is the displacement east and north [m], None if there is no image. `ranges` are the residual range
-    errors at the nodes of the fit. [m]
+    errors at the nodes of the polynomial fit [m]; the list is empty without an image.
     """
 
     def __init__(self, analysis: Analysis, source: ErrorSource, size: float) -> None:
@@ -436,14 +437,17 @@ class Residual:
 
     @cached_property
     def orders(self) -> list[float]:
-        """Orders 0 to 3 of the range error: its mean, and signed values of orders 1 to 3 at the aperture edge. [m]"""
+        """Polynomial orders 0 to 3 of the residual range error. [m]
+
+        Order 0 is the mean. Orders 1 to 3 are signed values at the aperture edge.
+        """
         return [
             math.fsum(w * m for w, m in zip(weights, self.ranges, strict=True)) for weights in self.exact.fit.tolist()
         ]
 
     @cached_property
     def beyond(self) -> list[float]:
-        """Range error at the nodes after the subtraction of orders 0 to 3. [m]"""
+        """Residual range error at the nodes of the fit, without its polynomial orders 0 to 3. [m]"""
         fitted_orders = np.polynomial.legendre.legvander(self.exact.sampling.places, _CUBIC_ORDER) @ (
             self.orders / LEGENDRE_LEADING
         )
@@ -469,7 +473,7 @@ class Residual:
 
     @property
     def beyond_phase(self) -> float:
-        """Rms phase of the range error beyond the cubic order. [rad]"""
+        """Rms phase of the part of the range error beyond the cubic order. [rad]"""
         return self.k * self.rms(self.beyond)
 
     @property
@@ -486,22 +490,25 @@ class Residual:
 
     @property
     def judged(self) -> float:
-        """Phase that is compared with a limit. [rad]
+        """Phase that is compared with the quadratic phase limit. [rad]
 
         The limit contains the gain of autofocus. Autofocus does not correct the hidden phase, so the hidden phase is
-        multiplied by this gain.
+        multiplied by this gain before both phases are added by their squares.
         """
         return math.hypot(self.phase(_QUADRATIC_ORDER), self.gain * self.hidden)
 
     def sum(self, symbol: str, order: int) -> Sum:
-        """Text of the weighted sum of the range errors that gives the phase of an order."""
+        """Text that computes the phase of a polynomial order as a weighted sum of the range errors at the nodes."""
         terms = self._terms(order)
         return Sum(
             f"{symbol} = 2*π/{number(self.radar.wavelength)}*({terms}) = {with_unit(self.phase(order), 'rad')}"
         )
 
     def steps(self, mark: str = "full") -> Iterator[Step]:
-        """Yield the steps from the residual range error to the phase that is judged."""
+        """Yield the steps from the residual range error to the judged phase, a quadratic phase of equal peak loss.
+
+        `mark` is appended to the symbols of the phases.
+        """
         values = {"B": self.radar.bandwidth, "f_0": self.radar.center_frequency}
         b = math.sqrt(float(self.exact.band[0]))
         orders: list[WorkedEquation | str] = [
@@ -548,12 +555,12 @@ class Residual:
             yield step("Judged against a limit that includes the gain: autofocus corrects no hidden phase", worked)
 
     def listed(self, values: Sequence[float]) -> list[str]:
-        """Write a line with time [s] and value for each node of the fit; `values` are in metres."""
+        """Write one line of text for each node of the fit: its time [s] and its item of `values` [m]."""
         times = self.exact.times[:, 0].tolist()
         return [f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, values, strict=True)]
 
     def rest_steps(self) -> Iterator[Step]:
-        """Yield the steps that list the range error beyond the cubic order and compute its rms phase."""
+        """Yield the steps that list the part of the range error beyond the cubic order and compute its rms phase."""
         yield step("Beyond P₃ there", *self.listed(self.beyond))
         terms = self._products(self.beyond)
         wavelength = number(self.radar.wavelength)
@@ -573,7 +580,7 @@ class Residual:
 
 
 def _without_rounding(values: Sequence[float], full_size: float) -> list[float]:
-    """Replace values by 0 that may be rounding errors of a difference between numbers as large as `full_size`."""
+    """Set to 0 all values that may be only the rounding error of a difference of numbers as large as `full_size`."""
     return [value if abs(value) > VECTOR_ROUNDING_FRACTION * full_size else 0.0 for value in values]
 
 
@@ -592,7 +599,7 @@ def _beyond_phase(residual: Residual) -> float:
 def worse_sign(
     analysis: Analysis, source: ErrorSource, size: float, measure: Callable[[Residual], float] = _judged
 ) -> Residual:
-    """Residual range error for the sign of the error, plus or minus, that gives the larger `measure`."""
+    """Residual range error of `+size` or `-size`, whichever gives the larger value of `measure`."""
     signs = [Residual(analysis, source, signed) for signed in (size, -size)]
     if signs[0].is_small or not signs[1].ranges:
         return signs[0]
@@ -601,9 +608,10 @@ def worse_sign(
 
 
 def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the steps from the signed size of an error to its phases by the full model.
+    """Yield the steps from the size of an error, with its sign, to its phases by the full model.
 
-    `size` is in the unit of the error. An undeclared error has a size of one unit; the text `each` states this.
+    `size` is in the unit of the error. If the error is not declared, its size is one unit. The text `each` then
+    states this, and is inserted into the titles of the steps.
     """
     each = each.replace(" of ", ", for ")
     if not source.is_heard:
@@ -643,7 +651,7 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
 
 
 def _orbit_motion(analysis: Analysis, source: ErrorSource, size: float) -> Iterator[Step]:
-    """Yield the steps for platforms in free fall, with the position error at the first and last node of the fit."""
+    """Yield, for each platform in free fall, a step with its position error at the first and last node of the fit."""
     if source.shifts is None:
         return
     times = analysis.exact.times[:, 0].tolist()
@@ -669,7 +677,7 @@ def _residual_formula(exact: ExactRanges) -> str:
 
 
 def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the step with the result of the full model for comparison; the published model judges the error."""
+    """Yield the step with the quadratic phase by the full model, to compare with the judging published model."""
     residual = worse_sign(analysis, source, size, _of_order(_QUADRATIC_ORDER))
     if not residual.ranges:
         yield step(f"Full model{each}, for comparison: no ground point has the range history")
@@ -683,7 +691,7 @@ def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: s
 def at_the_allowable(
     analysis: Analysis, source: ErrorSource, allowable: float, requirement: str = QUADRATIC
 ) -> Iterator[Step]:
-    """Yield the steps that show that an error as large as an allowable, found by a search, reaches the limit."""
+    """Yield the steps that check an allowable found by a search: an error of this size just reaches the limit."""
     sizes = [Residual(analysis, source, signed) for signed in (allowable, -allowable)]
     if not all(residual.ranges for residual in sizes):
         return
@@ -706,9 +714,9 @@ def _displacement_of(residual: Residual) -> float:
 
 
 def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
-    """Yield the step for a limit beyond which there is no image.
+    """Yield the step with the largest `size` of an error, in `unit`, at which an image still exists.
 
-    Beyond it, no ground point has the range history of the error.
+    If the error is larger, no ground point has its range history.
     """
     yield step(
         "End of the image: no ground point has the range history of a larger error of either sign",
@@ -718,14 +726,14 @@ def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
 
 
 def no_limit(row: Row) -> Step:
-    """Return the step that states that a row has no limit, and the reason."""
+    """Return the step that states that a row has no limit, and why."""
     return step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
 
 
 def smallest_size(row: Row, sizes: Mapping[str, float]) -> Iterator[Step]:
     """Yield the steps to the allowable of a row, the smallest of the `sizes` that its requirements allow.
 
-    `sizes` are given by symbol.
+    The keys of `sizes` are the symbols of the sizes in the explanation, such as `by_QPE`.
     """
     if row.allowable is None or not sizes:
         yield no_limit(row)
@@ -754,7 +762,7 @@ RULE_WORDS = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-squa
 
 
 def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
-    """Yield the steps to the limit of the quadratic phase: budget · share · gain of autofocus."""
+    """Yield the steps to the limit on the quadratic phase of `owner`: budget · share · autofocus gain."""
     total, share, gain = allocation.qpe_total, allocation.qpe.of(owner), allocation.autofocus_gain
     owner_words = {
         "clock": "the receiver’s share" if allocation.qpe.clock is None else "the clock’s share",
@@ -767,7 +775,7 @@ def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[St
 
 
 def autofocus_gain(allocation: Allocation) -> Iterator[Step]:
-    """Yield the steps to the gain, the factor by which autofocus raises the limits of the quadratic phase."""
+    """Yield the steps to the autofocus gain, the factor by which autofocus raises limits on the quadratic phase."""
     if allocation.n_pull is None:
         yield step("No autofocus (autofocus.n_pull): gain = 1")
         return
@@ -789,8 +797,9 @@ def combined(
     symbol: str = "combined",
     unit: str = "rad",
 ) -> Iterator[Step]:
-    """Yield the step that combines the sizes of errors to a total by a rule: the largest, the sum or the rss.
+    """Yield the step that combines the sizes of several errors to a total: their maximum, sum or root-sum-square.
 
+    `rule` selects one of the three.
     If `total` is None, the step only lists the names and sizes.
     """
     title = f"{title}, {RULE_WORDS[rule]}"

@@ -91,7 +91,7 @@ _PHASE_WORDS = ("quadratic phase at the aperture edge", "cubic phase there", "re
 
 
 def explained_random(analysis: Analysis, allocation: Allocation, error: RandomError, row: Row) -> Iterator[Step]:
-    """Yield the steps of a random error, from its line in the file to its allowable."""
+    """Yield the steps that explain a random error, from its line in the mission file to its allowable."""
     mission, model = analysis.mission, row.model or "published"
     yield from _declared(mission, error, row)
     yield from error.subject.facts.find_in(RANDOM_STEPS, error.subject.axis)(analysis, error)
@@ -171,7 +171,7 @@ def _without_arm(analysis: Analysis, error: RandomError) -> RandomError:
 
 
 def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the steps for the effect of a tilt error through the lever arm."""
+    """Yield the steps for a tilt error that also moves the antenna, because the platform has a lever arm."""
     lever = getattr(analysis.mission.platforms, error.owner).motion_error.lever_arm
     if lever is None or lever.arm is None or not INERTIAL_FIGURES[error.subject.axis].tilts:
         return
@@ -241,9 +241,9 @@ def _lever_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _by_unit(values: Sequence[float], unit: str) -> list[str]:
-    """Write a line for each of the effects per unit: quadratic phase, cubic phase and residual after the cubic.
+    """Write one line of text for each effect that one unit of an error has, in `unit`.
 
-    `values` may have fewer than three items.
+    `values` are the quadratic phase, the cubic phase and the residual after the cubic. The last ones may be missing.
     """
     return [
         f"{symbol}/unit = {with_unit(value, unit)}" for symbol, value in zip(_PHASE_SYMBOLS, values, strict=False)
@@ -251,7 +251,7 @@ def _by_unit(values: Sequence[float], unit: str) -> list[str]:
 
 
 def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
-    """Yield the step with the effects per unit by the full model, if they differ from the published model."""
+    """Yield the step with the effects of one unit by the full model, if the published model gives other effects."""
     unit, full = error.published, error.full
     if full[:3] == unit[:3]:
         return
@@ -269,7 +269,7 @@ def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
 
 
 def _displacement(error: RandomError, model: str) -> Iterator[Step]:
-    """Yield the step to the displacement of the image per unit of the error."""
+    """Yield the step with the displacement of the image by one unit of the error."""
     effect = error.effect(model)
     if not effect.displacement > 0:
         return
@@ -286,14 +286,15 @@ def _displacement(error: RandomError, model: str) -> Iterator[Step]:
 
 
 def _per_unit(unit: str, error: RandomError) -> str:
-    """Unit of an effect per unit of an error, such as `rad per m/s`; only `unit` for an error in dB."""
+    """Unit of the effect that one unit of an error has, such as `rad per m/s`. For an error in dB it is `unit`."""
     return unit if error.unit == "dB" else f"{unit} per {'unit' if error.unit == '1' else error.unit}"
 
 
 def _unit_effect(figure: str, order: int, wavelength: float, T: float) -> float:
-    """Phase of one unit of an inertial sensor error along the line of sight. [rad]
+    """Phase caused by one unit of an inertial sensor error along the line of sight. [rad]
 
-    `order` selects the quadratic phase (0), the cubic phase (1) or the residual (2).
+    `figure` is the key of the sensor error. `order` selects the quadratic phase (0), the cubic phase (1) or the
+    residual (2).
     """
     row = evaluators.inertial_phases(1.0, 1.0, 1.0, wavelength, T)[list(_SYMBOLS).index(figure)]
     return row[order]
@@ -311,7 +312,10 @@ def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _changing_delay(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the steps for the zenith delay as a random process, if it changes within the aperture."""
+    """Yield the steps for a zenith delay that changes within the aperture as a random process.
+
+    If the delay is constant over the aperture, there are no steps.
+    """
     correlation_time = correlation_time_of(analysis.mission, error.owner)
     if correlation_time is not None and error.published.quadratic:
         yield from _gauss_markov(
@@ -328,8 +332,8 @@ def _gauss_markov(
 ) -> Iterator[Step]:
     """Yield the steps to the mean squares of a Gauss-Markov process, and to its quadratic phase per unit.
 
-    The phase is that of the published model. `along` is the symbol of the component along the line of sight, `title`
-    the title of the last step.
+    The phase is that by the published model. `along` is the symbol of the component along the line of sight or, for
+    a delay, along the path through the air. `title` is the title of the last step.
     """
     T, quadratic = mission.collection.aperture_time, error.published.quadratic
     yield step(
@@ -376,10 +380,10 @@ def _oscillator(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 def _slow(
     kind: str, frequency: float, remaining: LeftTone, free: float, mission: Mission, unit: str
 ) -> Iterator[Step]:
-    """Yield the step for a tone below one cycle per aperture, or for its folded frequencies below that.
+    """Yield the step with the quadratic and cubic phase of a tone below one cycle per aperture.
 
-    The squares of its phases are added to those of the noise. `free` is its peak phase without synchronization, in
-    `unit`.
+    If synchronization folds the tone, the step uses its folded frequencies below one cycle per aperture. The squares
+    of these phases are added to those of the noise. `free` is the peak phase without synchronization, in `unit`.
     """
     T = mission.collection.aperture_time
     slow = [
@@ -407,15 +411,15 @@ def _pieces_text(pieces: Sequence[PowerLawPiece]) -> list[str]:
 
 
 def _power_of_f(exponent: float) -> str:
-    """Text of a power of f, with brackets around a negative exponent, so that nobody reads it as a difference."""
+    """Text such as `f^2` for a power of f. A negative exponent gets brackets, so that nobody reads a difference."""
     exponent = exponent or 0.0  # white noise has the power −0.0
     return f"f^{exponent:.6g}" if exponent >= 0 else f"f^(\u2212{-exponent:.6g})"
 
 
 def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization) -> Iterator[Step]:
-    """Yield the step for the drift of a clock since it was set.
+    """Yield the step for the drift of a clock since it was last set.
 
-    The step has the standard deviations of orders 0 and 1 of the range error, and their correlation.
+    The step gives the standard deviations of the constant [m] and linear [m/s] range error, and their correlation.
     """
     T, age, averaging = (
         np.array([value or 0.0]) for value in (mission.collection.aperture_time, sync.age, sync.averaging)
@@ -539,7 +543,7 @@ def _spectrum(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _acceleration(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the steps for an accelerated oscillator: random vibration, slow tones, and turn of the platform."""
+    """Yield the steps for an oscillator that is accelerated by random vibration, slow tones or a turning platform."""
     mission, name = analysis.mission, error.owner
     f_0, sync = mission.radar.center_frequency, mission.synchronization
     felt_vibration = felt(mission, name)
@@ -684,7 +688,10 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
 
 
 def _covered(mission: Mission, error: RandomError) -> float:
-    """Coverage factor that the declared value contains; 1 for an oscillator, whose phases contain it instead."""
+    """Coverage factor that the declared value of an error contains.
+
+    It is 1 for an error in dB, such as the noise of an oscillator. There the phases contain the factor instead.
+    """
     return 1.0 if error.unit == "dB" else float(error.coverage(mission))
 
 
@@ -742,9 +749,9 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
 
 
 def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, limited: RandomEffect) -> Iterator[Step]:
-    """Yield the step that adds the power of the cubic phase to the residual.
+    """Yield the step that adds the power of the cubic phase to that of the residual phase.
 
-    It applies if the mission has no requirement on the cubic phase.
+    The step is needed if the mission has no requirement on the cubic phase, so that ISLR limits both.
     """
     k, factor = _covered(mission, error), float(error.coverage(mission))
     values = {"cubic/unit": effect.cubic, "left/unit": effect.spread * k, "k": factor}

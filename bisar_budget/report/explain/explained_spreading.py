@@ -41,9 +41,10 @@ from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, numb
 
 
 def allowed_variance(model: str, power: float, energy: float) -> tuple[str, dict[str, float]]:
-    """Formula of the phase variance that an ISLR allows by a model, and the values of its symbols.
+    """Formula for the phase variance [rad²] that a required ISLR allows, and the values of its symbols.
 
-    `power` is the ISLR as a power ratio, `energy` the fraction of the energy within the first nulls of the response.
+    The formula depends on `model`. `power` is the ISLR as a power ratio. `energy` is the fraction of the energy
+    within the first nulls of the impulse response.
     """
     if model == "published":
         return "ISLR", {"ISLR": power}
@@ -51,13 +52,13 @@ def allowed_variance(model: str, power: float, energy: float) -> tuple[str, dict
 
 
 def _level(model: str, variance: str) -> str:
-    """Formula of the ISLR [dB] that a phase variance causes by a model; `variance` is its symbol."""
+    """Formula for the ISLR [dB] that a phase variance with the symbol `variance` causes according to `model`."""
     ratio = variance if model == "published" else f"(e^{variance} - 1)/E"
     return f"10*log({ratio})/log(10)"
 
 
 def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Yield the steps to the ISLR: the total of all phase variances that spread power, and its allowable."""
+    """Yield the steps to the ISLR, from the sum of all phase variances that spread power, and to its allowable."""
     mission, model, owner = analysis.mission, row.model or "published", row.owner
     members = {each.row_id: each.variance for each in declared_powers(analysis, owner, model)}
     total, energy = math.fsum(members.values()), mainlobe_energy(mission)
@@ -95,7 +96,10 @@ def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iter
 def _tones_and_cubic(
     analysis: Analysis, allocation: Allocation, owner: str, model: str, members: Mapping[str, float]
 ) -> Iterator[Step]:
-    """Yield the steps to the spread power of tones and of the cubic phase, unless these have requirements."""
+    """Yield the steps to the power that tones and the cubic phase spread.
+
+    Tones are left out if PSLR is required. The cubic phase is left out if it has a requirement.
+    """
     powers = [
         Sum(f"{tone.subject.id} = {number(tone.phase)}^2/2 = {with_unit(members[tone.subject.id], 'rad²')}")
         for tone in tones(analysis.mission)
@@ -118,7 +122,7 @@ def _tones_and_cubic(
 
 
 def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
-    """Yield the steps from all tones to their highest echo, where the phases of the tones are the worst possible."""
+    """Yield the steps from all tones to their highest joint echo, with the tones at their worst phases."""
     all_tones = tones(mission)
     echo = highest_echo(all_tones)
     if echo is None:
@@ -154,7 +158,7 @@ def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
 
 
 def _with_its_pair(tone: Tone, pair_tone: Tone | None) -> str:
-    """Text of the peak phase of a tone, or of its root-sum-square with `pair_tone`, which is 90 degrees apart."""
+    """Text with the peak phase of a tone, or with its root-sum-square with `pair_tone`, which is 90 degrees apart."""
     return number(tone.phase) if pair_tone is None else f"sqrt({number(tone.phase)}^2 + {number(pair_tone.phase)}^2)"
 
 
@@ -173,7 +177,10 @@ def _echo_level(echo: Echo) -> Iterator[Step]:
 
 
 def use_of_amplitudes(row: Row) -> Iterator[Step]:
-    """Yield the step to the utilization, a ratio of amplitudes, of a row with values in decibels, if it has one."""
+    """Yield the step to the utilization of a row in decibels, which is a ratio of amplitudes.
+
+    A row without a utilization has no such step.
+    """
     if row.utilization is None or row.declared is None or row.allowable is None:
         return
     values = {"declared": row.declared, "allowable": row.allowable}
@@ -182,9 +189,10 @@ def use_of_amplitudes(row: Row) -> Iterator[Step]:
 
 
 def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) -> Iterator[Step]:
-    """Yield the steps from the orders of a tone to the displacement of the image.
+    """Yield the steps from the orders 0 to 3 of the range error of a tone to the displacement of the image.
 
-    Each item of `parts`, an axis or a folded frequency, has its own step. `moved` is the total east and north. [m]
+    Each item of `parts` is an axis or a folded frequency and has its own step. `moved` is the total displacement
+    east and north. [m]
     """
     source = "(25)" if model == "published" else "exact ranges"
     for index, tone_part in enumerate(parts):
@@ -306,7 +314,7 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
 def _worst_phases(tone: LeftTone, free: float, mission: Mission) -> Iterator[Step]:
     """Yield the steps to the largest quadratic and cubic phase of a tone below three cycles per aperture.
 
-    `free` is the peak phase of the tone without synchronization.
+    `free` is the peak phase of the tone without synchronization. [rad]
     """
     T = mission.collection.aperture_time
     near = [
@@ -329,10 +337,10 @@ def _worst_phases(tone: LeftTone, free: float, mission: Mission) -> Iterator[Ste
 def near_phases(
     mission: Mission, allocation: Allocation, row: Row, judged: float, sizes: dict[str, float]
 ) -> Iterator[Step]:
-    """Yield the steps from the quadratic and cubic phase of a slow tone to the size that their limits allow.
+    """Yield the steps from the quadratic and cubic phase of a slow tone to the tone size that their limits allow.
 
-    `judged` is the quadratic phase [rad]. A tone of three cycles per aperture or more has no such steps. The size is
-    added to `sizes` under its symbol.
+    `judged` is the quadratic phase [rad]. A tone of three cycles per aperture or more has no such steps. The size
+    that the limits allow is added to `sizes` under the key `by_phases`.
     """
     limit, allowed = allocation.qpe_allowed(row.owner), mission.requirements.cubic_phase_error
     if not judged and not row.cubic_rad:
@@ -354,13 +362,16 @@ def near_phases(
 
 
 def smallest_of(row: Row, sizes: Mapping[str, float]) -> Step:
-    """Return the step to the allowable of a tone, the smallest of `sizes`, which are given by symbol."""
+    """Return the step to the allowable of a tone, the smallest of `sizes`.
+
+    The keys of `sizes` are symbols of the explanation, such as `by_echoes`.
+    """
     formula = f"min({', '.join(sizes)})" if len(sizes) > 1 else next(iter(sizes))
     return step("Allowable", WorkedEquation("allowable", formula, sizes, row.allowable or 0.0, row.unit))
 
 
 def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Yield the steps from a stated ISLR to the rms phase that spreads the same power, and to its limit."""
+    """Yield the steps from the ISLR stated for an error to the rms phase that spreads as much, and to its limit."""
     index, model = row.subject.entry or 0, row.model or "full"
     power = next(each for each in stated_powers(mission) if each.subject == row.subject)
     yield from stated(mission, ("other_errors", index, "islr"), row.declared, row.evidence)
@@ -382,5 +393,5 @@ def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Itera
 
 
 def effect_from_elsewhere() -> Step:
-    """Return the step for an error that the file states by its effect on the image."""
+    """Return the step which says that the file states an error by its effect on the image, whatever the cause."""
     return step("Stated by its effect on the image, whatever makes it; it has no coverage factor")

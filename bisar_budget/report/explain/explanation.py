@@ -1,4 +1,4 @@
-"""Explain a row or a requirement by its line in the file, the equations with their numbers, and the verdict."""
+"""Explain a row or a requirement: its line in the mission file, the equations with numbers, and the verdict."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -112,7 +112,10 @@ def _text(mission: Mission, title: str, body: Iterable[str]) -> str:
 
 
 def _fitted(line: str) -> list[str]:
-    """Wrap a line. Continued lines are indented more. An `=` stays with the next word, a unit with its number."""
+    """Wrap a line of an explanation at spaces.
+
+    Continued lines are indented more. No line ends between `=` and the next word, or between a number and its unit.
+    """
     start = len(line) - len(line.lstrip())
     if not start:
         return wrapped(line, "  ")
@@ -124,7 +127,7 @@ def _fitted(line: str) -> list[str]:
 
 
 def chain(mission: Mission, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps from the line in the file to the utilization of a row, or to the reason why it has none."""
+    """Yield the steps from the line of a row in the file to its utilization, or to the reason why it has none."""
     yield from _to_utilization(mission, findings, row)
     yield from not_judged(findings, row)
 
@@ -151,12 +154,12 @@ def _to_utilization(mission: Mission, findings: MissionFindings, row: Row) -> It
 
 
 def _model(row: Row) -> str:
-    """Model whose numbers explain a row."""
+    """Name of the model whose numbers explain a row: `full` or `published`."""
     return "full" if row.model == "full" else "published"
 
 
 def collection_chain(findings: MissionFindings) -> Iterator[Step]:
-    """Yield the steps to the quantities that depend on the geometry only.
+    """Yield the steps to the quantities of a mission that depend on the geometry only.
 
     They are the look direction (11), the smear direction (31) and det Q, the determinant of the matrix in (30).
     """
@@ -179,7 +182,7 @@ def collection_chain(findings: MissionFindings) -> Iterator[Step]:
 
 
 def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]:
-    """Yield the steps from the requirements to the allowable of an error, the smallest size that they allow."""
+    """Yield the steps from the requirements to the allowable of an error, which is the smallest size they allow."""
     allocation, requirements = analysis.allocation, analysis.mission.requirements
     limit = allocation.qpe_allowed(source.owner)
     yield from limit_steps(allocation, source.owner, limit)
@@ -230,7 +233,7 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
 def _vibration_in_its_unit(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
     """Yield the steps that explain a vibration, with the results in the unit of the file.
 
-    A spectral line that is stated as an acceleration is explained in metres, and the results are converted back.
+    If the file states a spectral line as an acceleration, the steps are in metres and convert the results back.
     """
     mission, allocation, tone = analysis.mission, findings.allocation, analysis.slow_tones.get(row.id)
     lines = lines_of(mission, row.owner)
@@ -249,7 +252,7 @@ def _vibration_in_its_unit(analysis: Analysis, findings: MissionFindings, row: R
 
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTone | None) -> Iterator[Step]:
-    """Yield the steps of a vibration from the file to the limits by both models.
+    """Yield the steps of a vibration from its line in the file to its limits by both models.
 
     The vibration is one spectral line, the sum of several lines near each other, or noise.
     """
@@ -345,9 +348,9 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
 def _limit(
     model: str, formula: str, values: Mapping[str, float], result: float, *, is_power: bool
 ) -> Iterator[WorkedEquation]:
-    """Yield the equations for the limit of a vibration amplitude [m] by a model.
+    """Yield the equations for the largest vibration amplitude [m] that a model allows.
 
-    With `is_power` the formula gives an rms value, and a second equation multiplies it by √2.
+    If `is_power` is true, the formula gives an rms value, and a second equation multiplies it by √2.
     """
     if not is_power:
         yield WorkedEquation(model, formula, values, result, "m")
@@ -393,7 +396,7 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, tone: Sl
 
 
 def _of_axes(symbol: str, phases: Sequence[Floats]) -> Sum:
-    """Text of the sum of the `phases` of all axes [rad], with `symbol` for the sum."""
+    """Equation that adds the `phases` [rad] of all axes of a vibration; `symbol` stands for the sum."""
     numbers = [phase.item() for phase in phases]
     return Sum(f"{symbol} = {' + '.join(map(number, numbers))} = {with_unit(math.fsum(numbers), 'rad')}")
 
@@ -414,7 +417,7 @@ def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]
 def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: int, declared: float) -> Iterator[Step]:
     """Yield the step that projects a vibration on the line of sight.
 
-    With a direct path, the vibration is projected on the change of the range minus the direct path.
+    With a direct path, the step gives the effect of the vibration on the range minus the direct path instead.
     """
     vibration = getattr(mission.platforms, platform).motion_error.vibration
     value = vibration.sinusoidal[entry].displacement if is_sinusoid else vibration.wideband.rms
@@ -442,7 +445,7 @@ def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: in
 
 
 def _near_lines(mission: Mission, platform: str, index: int, total: float) -> Iterator[Step]:
-    """Yield the step that adds spectral lines near each other where the sum of their echoes is highest."""
+    """Yield the step that adds the echoes of neighbouring spectral lines at the point where their sum is highest."""
     lines, T = lines_of(mission, platform), mission.collection.aperture_time
     members = near_lines([line.frequency * T for line in lines])[index]
     near = [lines[member] for member in members]
@@ -479,7 +482,7 @@ def _islr(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[S
 
 
 def _specification(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps of a specification: its line in the file, and the largest declared error."""
+    """Yield the steps of a specification: its line in the file, and the largest declared error to compare with it."""
     mission = analysis.mission
     key = next(key for key in mission.specifications if name_of_error(key) == row.subject.axis)
     path = ("specifications", key)
@@ -493,7 +496,7 @@ def _declarations(analysis: Analysis, findings: MissionFindings, row: Row) -> It
 
 
 def _pull_in(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps to the sum of the quadratic phases and to the pull-in range of autofocus."""
+    """Yield the steps to the sum of the quadratic phases and to its limit, the pull-in range of autofocus."""
     together, allocation = analysis.together(_model(row)), findings.allocation
     sizes_by_name = together.phase_parts(quadratics(together.owed(allocation.qpe, row.owner)), "sum")
     yield from combined("QPE of the declared errors", "sum", sizes_by_name, row.declared)
@@ -503,7 +506,7 @@ def _pull_in(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterato
 
 
 def _phase_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps to the sum of the quadratic phases of an owner, and to its limit."""
+    """Yield the steps to the combined quadratic phase of all errors of the row's owner, and to its limit."""
     together, owner, allocation = analysis.together(_model(row)), row.owner, findings.allocation
     members = together.owed(allocation.qpe, owner)
     rule, gain = findings.combine, allocation.autofocus_gain
@@ -610,7 +613,7 @@ def _location_aggregate(analysis: Analysis, findings: MissionFindings, row: Row)
 
 
 def _unstated(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield no step, for the residual of a log of which the file does not state how it is processed."""
+    """Yield no step: the file does not state how the log is processed, so that its residual is not explained."""
     yield from ()
 
 
@@ -647,7 +650,7 @@ _EFFECT_TITLES = {"cubic": "Cubic phase", "spread": "Rms phase that spreads", "t
 
 
 def finding_of(mission: Mission, findings: MissionFindings, requirement: JudgedRequirement) -> Iterator[Step]:
-    """Yield the steps with the line of a requirement in the file, and the rows that judge it."""
+    """Yield the steps with the line of a requirement in the file and with the rows that judge it."""
     path = ("requirements", requirement.key)
     if requirement.key == DECLARE:
         yield from _asked_for(mission)
@@ -666,7 +669,7 @@ def finding_of(mission: Mission, findings: MissionFindings, requirement: JudgedR
 
 
 def declarations(mission: Mission) -> Iterator[Step]:
-    """Yield the steps with the errors that the file must declare, and the errors that it lacks."""
+    """Yield the steps with the errors that the file must declare and with those of them that it does not declare."""
     yield from _asked_for(mission)
     missing_keys = [declaration.lacks or declaration.key for declaration in missing_declarations(mission)]
     yield step("Not in the file", *(missing_keys or ["nothing: all of it is declared"]))
@@ -680,7 +683,7 @@ def _asked_for(mission: Mission) -> Iterator[Step]:
 def not_judged(findings: MissionFindings, row: Row) -> Iterator[Step]:
     """Yield the steps that explain why a row could not be judged.
 
-    The reason is an effect without a requirement, a path in doubt, or an unknown displacement.
+    The reason is an effect without a requirement, a platform path that may be wrong, or an unknown displacement.
     """
     analysis = findings.analysed()
     mission, reason = analysis.mission, _reason(findings, row)
@@ -704,7 +707,8 @@ def not_judged(findings: MissionFindings, row: Row) -> Iterator[Step]:
 def _air_that_changes(reason: Note) -> Step:
     """Return the step for air delays that are declared constant.
 
-    It gives the effect that they would have if they changed, and the fraction of the allowable that this is.
+    It gives the effect that the delays would have if they changed. It also gives this effect as a fraction of the
+    allowable.
     """
     values: Sequence[SectionValue] = reason.values
     _, correlation_time, key, size, use, _ = values
@@ -716,7 +720,7 @@ def _air_that_changes(reason: Note) -> Step:
 
 
 def _reason(findings: MissionFindings, row: Row) -> Note | None:
-    """Reason why a row, or the requirement with the same id, is not judged; None if it is judged."""
+    """Reason why a row, or the requirement with the id of the row, is not judged or is waived; None without one."""
     if row.status in ("not_evaluated", "waived"):
         return row.reason
     if row.status == "not_declared":
@@ -729,7 +733,7 @@ def _reason(findings: MissionFindings, row: Row) -> Note | None:
 def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[Step]:
     """Yield the steps for an effect that no requirement judges.
 
-    They give its size, the size that is negligible, and the contribution of the row.
+    They give the total size of the effect, the size below which it is negligible, and the row's contribution.
     """
     effect_name = untaken.effect
     totals = []
@@ -763,7 +767,7 @@ def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[S
 
 
 def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
-    """Yield the steps for a path in doubt: its possible error, and the position errors that the file declares."""
+    """Yield the steps for a platform path that may be wrong: its possible error and the declared position errors."""
     for doubt in input_doubts(mission):
         if row.owner != "mission" and not is_in_doubt(row.subject, doubt.owner, mission, doubt.state):
             continue
@@ -800,14 +804,14 @@ def _of_log(doubt: InputDoubt) -> Step:
 
 
 def _stated_by_source(doubt: InputDoubt) -> Step:
-    """Return the step with the error that the source of a path states, and the declared error along the same axis."""
+    """Return the step that compares the error stated by the source of a path with the declared error."""
     title = f"The {doubt.kind} error that the source of the {doubt.owner}’s path states exceeds the declared one"
     sizes = {"stated": doubt.doubt, "declared": doubt.declared}
     return step(title, *(f"{name} = {with_unit(size, doubt.unit)}" for name, size in sizes.items()))
 
 
 def _displacing(analysis: Analysis, row: Row) -> Iterator[Step]:
-    """Yield the step with the phases of clocks that displace the image by an unknown amount."""
+    """Yield the step with the phases of clock errors whose displacement of the image is unknown."""
     model, lines = row.model or "published", []
     names = {error.id for error in analysis.random if error.displaces_unknown}
     for contribution in analysis.together(model).own:

@@ -1,4 +1,4 @@
-"""Steps and formulas of an explanation as text with numbers, as MathML and as LaTeX.
+"""Write the steps and formulas of an explanation, with numbers, as text, MathML or LaTeX.
 
 The formulas of the derivation are typeset in `catalogue`. Other formulas, such as a projection on an axis or a sum
 over both platforms, occur only in explanations. They are plain text with the operators + - * / ^, brackets, | |,
@@ -117,7 +117,7 @@ def is_mathematical(formula: str) -> bool:
 
 @lru_cache(maxsize=256)
 def parsed(formula: str) -> Node:
-    """Parse a formula.
+    """Parse the text of a formula to a tree of nodes.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def parsed(formula: str) -> Node:
 
 
 def formula_text(formula: str, language: Language, numbers: Mapping[str, str] | None = None) -> str:
-    """Write a formula in a language, with `numbers` in place of names.
+    """Write a formula in an output language, with the texts in `numbers` in place of the symbols.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def formula_text(formula: str, language: Language, numbers: Mapping[str, str] | 
 
 
 def symbol(name: str, language: Language) -> str:
-    """Typeset a symbol, which has a letter with accents and a subscript."""
+    """Typeset a symbol: a letter that may have accents and a subscript."""
     if name in SYMBOLS:
         return SYMBOLS[name][language.catalogue_index]
     head, _, below = name.partition("_")
@@ -265,12 +265,12 @@ DETERMINANT = TEXTS["determinant"]
 
 
 def motion_symbol(state: str, axis: str, platform: str) -> str:
-    """Symbol of an error of position, velocity or acceleration (`state`), such as `ã_xt`."""
+    """Symbol of a motion error, such as `ã_xt`; `state` is position, velocity or acceleration."""
     return f"{STATE_LETTERS[state]}_{axis}{platform[0]}"
 
 
 def motion_coefficients(state: str, axis: str, platform: str) -> dict[int, str]:
-    """Formulas in Table I for one motion error, by the order of the slow time."""
+    """Formulas in Table I for the coefficients of one motion error; the keys are the powers of slow time."""
     names = {order: f"Table I {motion_symbol(state, axis, platform)} {order}" for order in range(4)}
     return {order: TEXTS[name] for order, name in names.items() if name in TEXTS}
 
@@ -281,25 +281,25 @@ def motion_phase(state: str, axis: str, platform: str) -> str | None:
 
 
 def clock_coefficient(order: int) -> str:
-    """Formula for a clock error in the first row of Table I, for an order of the slow time."""
+    """Formula in the first row of Table I: coefficient of a clock error at the power `order` of slow time."""
     return TEXTS[f"Table I t̃ {order}"]
 
 
 def inertial_phases(symbol: str) -> tuple[str, ...]:
-    """Formulas of the quadratic phase, cubic phase and residual per unit of an inertial sensor error.
+    """Formulas of the quadratic phase, cubic phase and residual that an inertial sensor error causes.
 
-    `symbol` identifies the error. A formula is empty if the error has no such phase.
+    `symbol` is the symbol of the error. A formula is empty if the error has no such phase.
     """
     return tuple(TEXTS.get(f"Inertial sensors {symbol} {order}", "") for order in range(3))
 
 
 def amplitude_share(platform: str) -> str:
-    """Formula of a platform's part of an echo amplitude to which both platforms contribute."""
+    """Formula for the part that one platform contributes to the echo amplitude of both platforms."""
     return TEXTS[f"amplitude share {platform[0]}"]
 
 
 class WorkedEquation(NamedTuple):
-    """A formula as text, with the values of its symbols and its result; the formula is empty for a given number."""
+    """A formula as text, with the values of its symbols and its result; empty if the result is a given number."""
 
     symbol: str
     formula: str
@@ -309,7 +309,10 @@ class WorkedEquation(NamedTuple):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Two lines with aligned equals signs: the formula, and the formula with numbers and its result."""
+        """Two lines with aligned equals signs: the formula with symbols, and the formula with numbers and result.
+
+        A given number has one line.
+        """
         if not self.formula:
             return (f"{self.symbol} = {with_unit(self.result, self.unit)}",)
         margin = " " * sum(not combining(letter) for letter in self.symbol)
@@ -318,7 +321,7 @@ class WorkedEquation(NamedTuple):
 
 
 class Sum(str):
-    """Text of an equation with numbers only. It contains no text from the user's file."""
+    """An equation with numbers only, as text. It contains no text from the user's file."""
 
     __slots__ = ()
 
@@ -409,7 +412,7 @@ def as_mathml(equation: WorkedEquation) -> Typeset:
 
 
 def as_latex(equation: WorkedEquation) -> Typeset:
-    """LaTeX of an equation, without delimiters; its two lines are aligned at their first `=`."""
+    """Write an equation as LaTeX in two lines, aligned at their first `=`, without delimiters."""
     unit = rf"\,\mathrm{{{equation.unit.replace('^2', '^{2}')}}}" if equation.unit else ""
     result = f"{_number_in(LATEX, equation.result)}{unit}"
     formula, numbers = _in_letters_and_numbers(equation, LATEX)
@@ -417,7 +420,7 @@ def as_latex(equation: WorkedEquation) -> Typeset:
 
 
 def _in_letters_and_numbers(equation: WorkedEquation, language: Language) -> tuple[str, str]:
-    """Typeset the formula of an equation twice: with symbols, and with numbers (negative ones in brackets)."""
+    """Typeset the formula of an equation twice: with symbols, then with numbers. Negative numbers get brackets."""
     if equation.formula in FORMULAS:
         formula = FORMULAS[equation.formula][language.catalogue_index]
         index = language.catalogue_index
@@ -429,19 +432,19 @@ def _in_letters_and_numbers(equation: WorkedEquation, language: Language) -> tup
 
 
 def math(content: str) -> str:
-    """Wrap content in an inline `math` element with the size of a displayed formula."""
+    """Wrap MathML in an inline `math` element that has the size of a displayed formula."""
     return f'<math displaystyle="true">{content}</math>'
 
 
 def catalogued(formula: str, language: Language) -> str:
-    """Formula or symbol of the catalogue in a language, without numbers and without the enclosing element."""
+    """Typeset a formula or symbol of the catalogue, with symbols only and without an enclosing `math` element."""
     return (FORMULAS.get(formula) or SYMBOLS[formula])[language.catalogue_index]
 
 
 def _mathml_filled(formula: str, values: Mapping[str, float]) -> str:
-    """Replace the MathML elements of symbols by numbers.
+    """Replace the symbols in a MathML formula by their values.
 
-    A negative number gets brackets. So does a number that is raised to a power, if it is written with a power of ten.
+    A negative number gets brackets. A number with a power of ten gets them where the formula raises it to a power.
     """
 
     def filled_match(match: re.Match[str]) -> str:
@@ -475,7 +478,7 @@ def _latex_symbols(values: Mapping[str, float]) -> re.Pattern[str]:
 
 
 def _number_in(language: Language, value: float) -> str:
-    """Write a number with six digits in a language; a very large or small number gets a power of ten."""
+    """Write a number with six digits in an output language; a very large or small one gets a power of ten."""
     digits, _, exponent = six_digits(abs(value)).partition("e")
     number = language.number % digits
     if exponent:

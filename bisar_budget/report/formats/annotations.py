@@ -52,7 +52,9 @@ class _Annotation(NamedTuple):
 
 
 def as_github(report: Report, style: Style) -> str:
-    """Write one workflow command per finding, worst first; without findings, one line that is not a command.
+    """Write one GitHub workflow command for each finding, worst first.
+
+    Without findings, write one line that is not a command.
 
     The runner shows at most ten errors and ten warnings per step.
     """
@@ -110,7 +112,7 @@ def _command(annotation: _Annotation) -> str:
 
 
 def step_summary(report: Report, style: Style) -> str:
-    """Write the table that GitHub shows on the page of the run, as Markdown."""
+    """Write the Markdown table of findings that GitHub shows on the summary page of a workflow run."""
     missions = counted(len(report.missions), "mission")
     lines = [f"### bisar-budget: {STATUS[report.status].text}, {missions}", ""]
     lines += [markdown_row(("status", "mission", "worst row", "use")), markdown_row(["---"] * 4)]
@@ -329,7 +331,7 @@ def _requirement(
 
 
 def _properties(mission: MissionFindings, **values: str | float | None) -> dict[str, str | float]:
-    """Properties of the mission and of a finding, without missing values. Texts are made printable."""
+    """SARIF properties of a finding and its mission. Missing values are left out, and texts are made printable."""
     values = {
         "mission": mission.name,
         "confidence": mission.confidence,
@@ -346,7 +348,7 @@ def _properties(mission: MissionFindings, **values: str | float | None) -> dict[
 def _located(
     rule: str, level: str, message: str, line: int | None, artifact: _Object, name: tuple[str, ...]
 ) -> _Object:
-    """SARIF result with its location and fingerprint.
+    """Make a SARIF result with its location in the mission file and its fingerprint.
 
     The fingerprint depends on the rule and on `name`, which identifies the finding and does not change when lines
     move. The last item of `name` is the subject of the finding.
@@ -382,7 +384,9 @@ def _sarif_region(line: int | None) -> dict[str, int]:
 
 
 def _suppressed(status: str, waivers: Sequence[AppliedWaiver], artifact: _Object) -> _Object:
-    """SARIF suppression with the first waiver that has not expired; empty if the status is not waived.
+    """Make the SARIF suppression of a waived finding from the first waiver that has not expired.
+
+    It is empty if the status is not `waived`.
 
     The waiver is written in the checked file, which the standard calls `inSource`.
     """

@@ -85,7 +85,7 @@ def _solved(solution: Solution) -> dict[str, object]:
 
 
 def _imaged(imaged: Imaged | None) -> dict[str, object] | None:
-    """JSON item of the row that was verified in an image. The verdict has the form of `verify --format json`."""
+    """JSON item about the row that was verified in an image. The verdict has the form of `verify --format json`."""
     if imaged is None:
         return None
     return {
@@ -99,7 +99,10 @@ def _imaged(imaged: Imaged | None) -> dict[str, object] | None:
 
 
 def _compared(comparison: Comparison) -> dict[str, object]:
-    """JSON item of a comparison of catalogue parts. It has the keys of `_solved`; keys that do not apply are null."""
+    """JSON item about a comparison of catalogue parts.
+
+    It has the same keys as an item of `_solved`. Keys that do not apply are null.
+    """
     best = next(iter(comparison.complying), None)
     return {
         "key": comparison.key,
@@ -159,7 +162,7 @@ def _state(state: State) -> dict[str, object]:
 
 
 def _lines_of_parts(comparison: Comparison, style: Style) -> Iterator[str]:
-    """Yield the lines of a comparison: verdict, table of parts with their use of the budget, and footnotes."""
+    """Yield the lines of a comparison: verdict, table of catalogue parts with their utilization, and footnotes."""
     count, total = len(comparison.complying), len(comparison.parts)
     subject = f"row {printable(comparison.row)} complies" if comparison.row else "the mission complies"
     verdict = f"{subject} with {count} of {total} parts" if count else f"{subject} with none of {total} parts"
@@ -220,7 +223,7 @@ def _range_words(solution: Solution) -> str:
 
 
 def _intervals(solution: Solution) -> Iterator[str]:
-    """Yield a text for each interval of values that complies, such as "up to 3 m"."""
+    """Yield a text for each interval of values with which the mission complies, such as "up to 3 m"."""
     start = ""
     for crossing in solution.crossings:
         value = _value_text(solution, crossing.inside.value)
@@ -281,7 +284,7 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
 
 
 def _shown(imaged: Imaged) -> str:
-    """Text of the verdict that an image gives on the binding row, or of the reason why there is no verdict."""
+    """Text with the verdict from an image on the binding row, or with the reason why there is no verdict."""
     row = f"{printable(imaged.row)} at {printable(imaged.at)}"
     verdict = imaged.verdict
     if verdict is None:
@@ -301,12 +304,12 @@ def _shown(imaged: Imaged) -> str:
 
 
 def _undecided(requirement: str | None) -> str:
-    """Text for a state without a deciding row, with the requirement that cannot be judged, if any."""
+    """Text for a mission state in which no row decides; it names the requirement that cannot be judged, if any."""
     return "no row decides" if requirement is None else f"{REQUIREMENT_NAMES[requirement]} cannot be judged"
 
 
 def _state_words(state: State) -> str:
-    """Text about the mission at one value: its status, the deciding row and the utilization of the requirement."""
+    """Text about the mission at one value of the key: its status, the deciding row and the row's utilization."""
     word = STATUS[state.status].text
     word += f" ({waiver_names(state.waived_by)})" if state.waived_by else ""
     if state.reason:
@@ -375,7 +378,7 @@ def _relaxed(relaxed: Relaxed) -> dict[str, object]:
 
 
 def _lines_of_numbers(sensitivity: Sensitivity, style: Style) -> Iterator[str]:
-    """Yield the lines of a sensitivity. The number whose smallest change uses up the margin comes first."""
+    """Yield the lines of a sensitivity analysis. The number with the smallest change to the limit is first."""
     status = STATUS[sensitivity.status]
     requirement = BINDING_WORDS.get(sensitivity.requirement, sensitivity.requirement.replace("_", " "))
     text = f"worst utilization {percent(sensitivity.utilization)}: {printable(sensitivity.worst_row)} ({requirement})"
@@ -424,9 +427,10 @@ def _table(sensitivity: Sensitivity, style: Style) -> Iterator[str]:
 
 
 def to_limit(sensitivity: Sensitivity, slope: Slope) -> str:
-    """Text of the change in a number that uses up the margin.
+    """Text with the change in a number of the mission file that uses up the margin.
 
-    It is in percent, in degrees or in dB, or a factor if the number changes tenfold or more.
+    The change is in percent, degrees or dB, or a factor if the number changes tenfold or more. It is a hyphen if no
+    change does so.
     """
     change = sensitivity.to_limit(slope)
     if change is None:

@@ -1,4 +1,4 @@
-"""Write requirements and rows as CSV for a spreadsheet: a header, and a line of SI values for each of them.
+"""Write requirements and rows as CSV for a spreadsheet: a header, then a line in SI units for each of them.
 
 The column `kind` says whether a line is a requirement or a row. The line of a requirement has an id such as
 `requirement.islr`, the reached value in the column `declared`, the required value in `allowable`, and the deciding
@@ -161,5 +161,5 @@ def _requirement(requirement: JudgedRequirement) -> dict[str, object]:
 
 
 def _waived_by(judged: Row | JudgedRequirement) -> str | None:
-    """Ids of the waivers in force, spelled as in the file; None without a waiver."""
+    """Ids of the waivers in force for a row or requirement, spelled as in the file; None without a waiver."""
     return "; ".join(waiver.id for waiver in judged.waived_by) or None

@@ -28,7 +28,7 @@ CHECK_FORMAT = "bisar-budget/check/1"
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
-    """Write the JSON item of one mission, with a line for each row. A number that is not finite raises an error."""
+    """Write the JSON item of one mission, each row on its own line. A number that is not finite raises an error."""
     item = _unusable(mission) if isinstance(mission, UnusableMission) else _mission(mission)
     return _indented(item, _INDENTED_LEVELS, _MARGIN)
 
@@ -53,7 +53,7 @@ def _encoder(separator: str) -> Callable[[object], str]:
 
 
 def _indented(value: object, levels: int, margin: str = "") -> str:
-    """Write a value as JSON with only the upper `levels` indented.
+    """Write a value as JSON in which only the outermost `levels` levels of nesting are indented.
 
     `json.dumps` with an indentation would run in pure Python and take as long as the check itself.
     """
@@ -84,7 +84,7 @@ def document_text(form: str, content: Mapping[str, object]) -> str:
 
 
 def outside_item(mission: "AboutMission") -> dict[str, object]:
-    """JSON item of changes and overrides from outside the mission file, the same in all JSON documents."""
+    """JSON item about changes and overrides from outside the mission file. All JSON documents share its form."""
     return {
         "set": [change._asdict() for change in mission.changes],
         "overrides": [override._asdict() for override in mission.overrides],
@@ -201,7 +201,7 @@ def _warning(warning: FileWarning) -> dict[str, object]:
 
 
 def verdict_item(verdict: Verdict) -> dict[str, object]:
-    """JSON item of the verdict from the images at a limit, with the codes of its reasons."""
+    """JSON item about the verdict that the images formed at a limit give, with the codes of its reasons."""
     reasons = {"reason_code": verdict.reason, "reason_autofocus_code": verdict.reason_autofocus}
     return verdict._asdict() | {name: None if reason is None else reason.code for name, reason in reasons.items()}
 
@@ -228,7 +228,7 @@ def _row(row: Row) -> dict[str, object]:
 
 
 def monte_carlo_item(drawn: MonteCarlo) -> dict[str, object]:
-    """JSON item of the Monte Carlo result, with the probability of each requirement."""
+    """JSON item about the Monte Carlo result, with the probability that each requirement is met."""
     return {**drawn._asdict(), "requirements": [requirement._asdict() for requirement in drawn.requirements]}
 
 
@@ -264,9 +264,9 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, object]:
 
 
 def _stated_accuracy(stated: StatedAccuracy) -> dict[str, object]:
-    """JSON item of the standard deviations that the source of a path states.
+    """JSON item about the accuracy that the source of a path states, as standard deviations.
 
-    They are along the axes of the scene, or one total without a direction.
+    There is one for each axis of the scene, or one total without a direction.
     """
     variances = [row[index] for index, row in enumerate(stated.covariance or ())]
     sigmas = [math.sqrt(max(variance, 0.0)) for variance in variances]

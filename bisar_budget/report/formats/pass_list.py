@@ -58,7 +58,7 @@ def as_json(passes: Passes, style: Style) -> str:
 
 
 def _summarized(passes: Passes) -> dict[str, int]:
-    """Number of passes that comply, are waived, fail, are not evaluated, and have no mission."""
+    """Numbers of passes that comply, are waived, fail, are not evaluated, or have no valid mission."""
     counts = passes.counts
     return {
         "comply": len(passes.complying),
@@ -70,7 +70,7 @@ def _summarized(passes: Passes) -> dict[str, int]:
 
 
 def _item(overpass: SatellitePass) -> dict[str, object]:
-    """Values of a pass by their keys in JSON and CSV."""
+    """Values that describe a pass; the keys are those of the JSON document and the CSV columns."""
     state = overpass.state
     values: dict[str, object] = {
         "number": overpass.number,
@@ -111,7 +111,7 @@ def direction(overpass: SatellitePass) -> str:
 
 
 def as_csv(passes: Passes, style: Style) -> str:
-    """Write a line for each pass. Values are in SI and radians; a missing value is an empty cell."""
+    """Write the passes as CSV, one line each. Values are in SI and radians; a missing value is an empty cell."""
     identity = [passes.file, passes.name, passes.platform]
     outside = overrides_words(passes) or None
     lines: list[list[object]] = [["file", "name", "platform", *_item(_NO_PASS), "overrides"]]
@@ -145,7 +145,7 @@ _WAIVERS = ("waived by", "", "<")  # column that is shown only if a pass is waiv
 
 
 def as_text(passes: Passes, style: Style) -> str:
-    """Write text for a terminal: verdict, table of passes and notes.
+    """Write the passes as text for a terminal: verdict, table of passes and notes.
 
     The table is at most 100 columns wide, without the column of waivers. The notes name the deciding rows.
     """
@@ -379,7 +379,7 @@ def _summary(overpass: SatellitePass, passes: Passes) -> str:
 
 
 def _description(overpass: SatellitePass, passes: Passes) -> Iterator[str]:
-    """Yield the facts about a pass, one line for each."""
+    """Yield the lines that describe a pass in its calendar event, one fact per line."""
     yield f"{printable(passes.file)}, {passes.platform}, {passes.model} model"
     state = overpass.state
     if overpass.center is not None and state is not None:
@@ -420,7 +420,7 @@ def _folded(line: str) -> Iterator[str]:
     """Fold a line into lines of at most 75 bytes (RFC 5545). Every line after the first begins with a space.
 
     No character is split. A continued line does not begin with a colon, and two adjacent `#` are put on different
-    lines, because CI logs would take either for a command.
+    lines. Otherwise CI logs could take the text for a command.
     """
     start, size = 0, 0
     for index, letter in enumerate(line):

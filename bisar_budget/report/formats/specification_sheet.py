@@ -93,7 +93,10 @@ def _offer(offer: Offer) -> dict[str, object]:
 
 
 def as_csv(answers: Sequence[Answer], style: Style) -> str:
-    """Write a line for each specification, in SI. The last columns are its shares of the requirements."""
+    """Write the sheets as CSV, one line for each specification, in SI units.
+
+    The last columns are the shares of the requirements that the specification uses.
+    """
     shares = [
         key
         for key in REQUIREMENT_NAMES
@@ -179,13 +182,16 @@ def _offered(offer: Offer) -> str:
 
 
 def _parts_words(spec: Specification) -> str:
-    """Text with the first catalogue parts that meet a specification, and the number of other such parts."""
+    """Text that names the first catalogue parts that meet a specification, and says how many more there are."""
     more = f" and {len(spec.parts) - _LISTED_COUNT} more" if len(spec.parts) > _LISTED_COUNT else ""
     return f"{', '.join(spec.parts[:_LISTED_COUNT])}{more}"
 
 
 def _broken_words(row: Broken) -> list[str]:
-    """Table cells of a row in which the other errors leave no room for the specified errors."""
+    """Table cells for a row in which the fixed errors leave no room for the specified errors.
+
+    They are its id, its utilization by the fixed errors, the allowed utilization, and a remark.
+    """
     if row.used is None:
         return [row.id, "-", percent(row.allowed), "over its limit: they leave no image"]
     if row.used > 1 + MIN_ROOM_FRACTION:
@@ -196,7 +202,7 @@ def _broken_words(row: Broken) -> list[str]:
 
 
 def _way_out(sheet: SpecificationSheet) -> str:
-    """Sentence with the remedy if the other errors leave no room for the specified errors."""
+    """Sentence that says what to change if the fixed errors leave no room for the specified errors."""
     used = [math.inf if row.used is None else row.used for row in sheet.broken]
     room_fraction = 1 - max(used) / (1 - MIN_ROOM_FRACTION)
     permille = math.ceil(1e3 * room_fraction) - 1 if room_fraction > 0 else -1  # strictly less than the room
@@ -206,7 +212,7 @@ def _way_out(sheet: SpecificationSheet) -> str:
 
 
 def _remarks(sheet: SpecificationSheet) -> Iterator[str]:
-    """Yield remarks for the reader of a sheet, about limits and specifications."""
+    """Yield remarks for the reader of a sheet: limits without a requirement, remarks on specifications, and notes."""
     for row in limiting(sheet):
         if row.requirement is None and row.id.startswith("negligible"):
             effect = row.id.partition(".")[2]
@@ -221,7 +227,7 @@ def _remarks(sheet: SpecificationSheet) -> Iterator[str]:
 
 
 def _side(figure: OfferedFigure) -> str:
-    """Text about an offered figure: whether it is inside its specification, or why it cannot be compared."""
+    """Text about a value that a supplier offers: whether it meets its specification, or why it cannot be compared."""
     if figure.is_inside is None:
         return figure.remark
     return "inside" if figure.is_inside else "OUTSIDE"
@@ -289,9 +295,9 @@ def _decided_by(line: RequirementLine) -> doc.Text:
 
 
 def specified(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:
-    """Yield the specifications with their shares, and a drawing of the shares of each limit.
+    """Yield the specifications with their shares of the limits, and a drawing of these shares for each limit.
 
-    If there are no specifications, yield the rows in which other errors leave no room, and the remedy.
+    If there are no specifications, yield the rows in which the fixed errors leave no room, and the remedy.
     """
     if sheet.broken:
         heads = doc.heads("Row", *doc.numbers("Used", "May use"), "")
@@ -347,7 +353,7 @@ ELEMENTS:
 
 
 def as_needs(answers: Sequence[Answer], style: Style) -> str:
-    """Write each specification as a need of the type `req`, with links to the requirements it is derived from."""
+    """Write each specification for Sphinx-Needs: a need of type `req`, with links to the requirements above it."""
     needs: list[tuple[tuple[str, ...], dict[str, object]]] = []
     for sheet, identity, spec in _specified(answers, style):
         content = [_statement(spec), _rationale(sheet, spec), f"{sheet.name}, {identity.path}"]
@@ -411,9 +417,10 @@ def _rationale(sheet: SpecificationSheet, spec: Specification) -> str:
 
 
 def _parents(sheet: SpecificationSheet, spec: Specification) -> list[str]:
-    """Requirement ids of the project from which a specification is derived.
+    """Ids of the project requirements from which a specification is derived.
 
-    They belong to the rows that limit the specification, to the requirements of these rows, and to its own rows.
+    They are the ids that the mission file gives to the rows that limit the specification, to the requirements of
+    these rows, and to the rows about the specified error itself.
     """
     findings = sheet.findings
     if findings is None or findings.mission is None:

@@ -104,7 +104,7 @@ def _alone(mission: MissionFindings) -> list[str]:
 
 
 def _verdict(mission: MissionFindings, style: Style) -> list[str]:
-    """Lines above the tables: verdict, name and document of the mission, model and rule, overrides, and doubts."""
+    """Lines above the tables: verdict, mission name and document, model, rule of combination, overrides, warnings."""
     summary = _summary(mission)
     first, *continuation = wrapped(summary, "  ") if mission.changes else wrapped_counts(summary)
     document = ", ".join(filter(None, (document_words(mission.document), mission.document.author)))
@@ -141,7 +141,7 @@ def _requirements(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 
 def _requirement(line: RequirementLine, widths: Sequence[int], style: Style) -> Iterator[str]:
-    """Yield one entry of the table of requirements. If the deciding row is long, it is written on the next line."""
+    """Yield the lines for one requirement in the table. A long id of the deciding row is put on the next line."""
     start = spaced((line.name, line.allowed, line.reached, line.use), widths, "<>>>")
     decided = ", ".join(filter(None, (line.decided_by, line.remark)))
     if len(start) + 10 + len(decided) <= style.table_width:
@@ -152,9 +152,10 @@ def _requirement(line: RequirementLine, widths: Sequence[int], style: Style) -> 
 
 
 def _head(mission: MissionFindings, style: Style) -> Iterator[tuple[str, str]]:
-    """Yield names and texts of the collection geometry; with -v also the number of rows of each status.
+    """Yield the name and text of each line about the collection geometry; with -v also how many rows have which
+    status.
 
-    The model is left out, because it is written after the name of the mission.
+    The line about the model is left out, because the model is written after the name of the mission.
     """
     yield from ((key, text) for key, text in head(mission) if key != "Model")
     if style.verbosity > 0:
@@ -216,7 +217,7 @@ def _lines(rows: Sequence[Row], cells: Sequence[Sequence[str]], style: Style) ->
 
 
 def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
-    """Text below the table that explains its columns and gives the numbers of hidden rows."""
+    """Text below the table of rows: an explanation of its columns, and how many rows are hidden."""
     key = "use: declared / allowable"
     if any(row.binding_requirement not in (None, "quadratic_phase_error") for row in rows):
         key += "; by: requirement that sets the allowable, or for QPE its table, equation or model"
@@ -240,7 +241,8 @@ def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
 def _limited_by(row: Row) -> str:
     """Text about the limit of a row for a table column.
 
-    It is the name of the requirement that sets the allowable, or the equation if this is the row's own metric.
+    It is the name of the requirement that sets the allowable. If this is the metric in which the row itself is
+    stated, it is the equation of the limit.
     """
     binding = binding_words(row)
     if binding:
@@ -265,7 +267,7 @@ def _short_reference(equation: str) -> str:
 
 
 def _details(mission: MissionFindings, style: Style) -> Iterator[str]:
-    """Yield paragraphs with the reasons of rows that need an explanation. Rows with the same reasons share one.
+    """Yield paragraphs with the reasons for the status of rows. Rows with the same reasons share a paragraph.
 
     With -v every row has a paragraph with its reason, notes and source.
     """

@@ -154,7 +154,7 @@ def _row_case(row: Row, mission: MissionFindings, class_name: str, file: str) ->
 
 
 def _outcome(status_name: str, message: str, text: str, line: int | None, file: str) -> Iterator[str]:
-    """Yield the XML element for the outcome of a test case: failure, skip or remark; nothing for a plain pass."""
+    """Yield the XML element with the outcome of a test case: failure, skip or remark; no element for a plain pass."""
     status = STATUS[status_name]
     if status.junit == "failure":
         location = f"{file}:{line}: " if line is not None else ""
@@ -168,7 +168,7 @@ def _outcome(status_name: str, message: str, text: str, line: int | None, file: 
 
 
 def _properties(values: Iterable[tuple[str, object]]) -> Iterator[str]:
-    """Yield the XML elements of the properties, without missing values."""
+    """Yield the XML elements for the properties of a test case or suite. Missing values are left out."""
     yield "<properties>"
     yield from [_property(name, value) for name, value in values if value is not None]
     yield "</properties>"
@@ -191,7 +191,7 @@ def _class_name(identity: Identity) -> str:
 
 
 def as_needs(report: Report, style: Style) -> str:
-    """Write a need for every requirement and row of every mission. An unusable file is one need of status `error`.
+    """Write `needs.json` with a need for each requirement and row; an unusable file is one need of status `error`.
 
     Needs use only fields that every project of Sphinx-Needs has, so that an import gives no warning. The requirement
     id of the project becomes a link. Numbers are in the content, which Sphinx reads as reStructuredText.
@@ -232,7 +232,7 @@ def identifier(prefix: str, name: tuple[str, ...]) -> str:
 
 
 def _unused(identifier: str, needs: Container[str]) -> str:
-    """Make an identifier unique. If it is already in `needs`, a number from 2 is appended; a file may occur twice."""
+    """Make an identifier unique by a number, from 2 on, if it is already in `needs`. A file may occur twice."""
     unique, number = identifier, 2
     while unique in needs:
         unique, number = f"{identifier}_{number}", number + 1
@@ -268,7 +268,7 @@ def _need(title: str, status: str, texts: Sequence[str], *tags: str, link: str |
 
 
 def _origin(line: int | None, mission: MissionFindings, file: str) -> Iterator[str]:
-    """Yield texts on the origin of a value: file and line, and changes and overrides from outside the file."""
+    """Yield texts on where a value comes from: file and line, then changes and overrides from outside the file."""
     yield f"{mission.name}, {file}" + (f":{line}" if line is not None else "")
     if mission.changes:
         yield f"Not as the file says: {changes_words(mission.changes)}"

@@ -22,7 +22,7 @@ _ANSI = {"optimistic": "1;31", "confirmed": "32", "conservative": "33", "not_eva
 
 
 def as_json(missions: Sequence[VerifiedMission], style: Style) -> str:
-    """Write `verify/1`, with an item per mission."""
+    """Write the verdicts as the JSON document `verify/1`, with an item for each mission."""
     items = [
         {
             "file": mission.file,
@@ -38,7 +38,7 @@ def as_json(missions: Sequence[VerifiedMission], style: Style) -> str:
 
 
 def as_text(missions: Sequence[VerifiedMission], style: Style) -> str:
-    """Write a table per mission: limit, budget, prediction by exact ranges, measurement in the image, verdict."""
+    """Write a table for each mission, with limit, budget, predicted and measured value, and verdict of each row."""
     blocks = [_mission(mission, style) for mission in missions]
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
@@ -67,8 +67,7 @@ def _mission(mission: VerifiedMission, style: Style) -> list[str]:
 def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
     """Make the table of verdicts, a second table of verdicts with autofocus, and remarks below them.
 
-    For a phase, the column `budget` follows from the gating model, and the next column has the value of the other
-    model.
+    For a phase, the column `budget` is by the gating model, and the next column has the value by the other model.
     """
     other_head = next((_OTHER_MODEL_HEADS[row.model] for row in rows), "full")
     heads = ("row", "limit", "budget", other_head, "exact", "image", "verdict")
@@ -144,12 +143,12 @@ def _smaller(row: Verdict) -> float | None:
 
 
 def limit(row: Verdict) -> str:
-    """Text of the size of the error for which the image was formed."""
+    """Text with the size of the error, at its limit, for which the image was formed."""
     return format_limit(row.boundary_error, row.unit)
 
 
 def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
-    """Five table cells of a verdict. Phases are in rad.
+    """Five table cells with the numbers of a verdict. Phases are in rad.
 
     They are the budget, the predictions by Table II, the full model and exact ranges, and the measurement.
     """
@@ -166,9 +165,9 @@ def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
 
 
 def _by_full(row: Verdict) -> float | None:
-    """Quadratic phase by the full model that is compared with the budget. [rad]
+    """Quadratic phase by the full model, to compare with the budget; None if there is none. [rad]
 
-    It is the quadratic phase of equal peak loss if the image was measured in this way.
+    If the peak loss was measured in the image, it is the quadratic phase of equal peak loss.
     """
     if row.full_qpe_rad is None or row.measured_equal_loss_qpe_rad is None:
         return row.full_qpe_rad
@@ -180,7 +179,7 @@ def _budget(row: Verdict) -> str:
 
 
 def refocused_cells(row: Verdict) -> tuple[str, str, str, str, str]:
-    """Five table cells with autofocus: limit, budget, residual phase, loss of the refocused peak, and verdict."""
+    """Five table cells about the image after autofocus: limit, budget, residual phase, peak loss, and verdict."""
     return (
         "-" if row.boundary_autofocus is None else format_limit(row.boundary_autofocus, row.unit),
         _budget(row),

@@ -1,4 +1,4 @@
-"""Heading above findings: mission, geometry, budget, model, paths, and settings from outside the mission file."""
+"""Texts for the heading of a report: mission, geometry, budget, model, paths, settings from outside the file."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -40,7 +40,7 @@ class AboutMission(Protocol):
 
     @property
     def changes(self) -> tuple[SetValue, ...]:
-        """Values from options that replace values of the file."""
+        """Values from command-line options that replace values of the file."""
 
     @property
     def overrides(self) -> tuple[Override, ...]:
@@ -48,7 +48,7 @@ class AboutMission(Protocol):
 
 
 def rule_words(mission: MissionFindings) -> str:
-    """Text about the model and the rule of combination that judge a mission."""
+    """Text that names the model and the rule of combination by which a mission is judged."""
     return f"{_MODEL_WORDS[mission.model]}, {_COMBINATION_WORDS[mission.combine]}"
 
 
@@ -69,7 +69,10 @@ def _overrides(mission: AboutMission, *, with_changes: bool) -> list[str]:
 
 
 def overrides_lines(mission: AboutMission) -> list[str]:
-    """Lines with the overrides, without `--set`, for a terminal: one line, or one for each override if too long."""
+    """Lines with the overrides other than `--set`, for a terminal.
+
+    All are on one line, or each is on its own line if they do not fit.
+    """
     overrides = _overrides(mission, with_changes=False)
     line = f"Overrides: {'; '.join(overrides)}"
     if len(line) <= TEXT_WIDTH or len(overrides) < 2:
@@ -78,7 +81,7 @@ def overrides_lines(mission: AboutMission) -> list[str]:
 
 
 def file_words(mission: AboutMission) -> str:
-    """Text with the file of a mission and the options that changed its values."""
+    """Text with the path of a mission file and with the options that changed its values, if any."""
     return (
         f"{printable(mission.file)} {changes_words(mission.changes)}" if mission.changes else printable(mission.file)
     )
@@ -117,13 +120,13 @@ def narrow_gradients(geometry: BistaticGeometry) -> str:
 
 
 def doubtful_model(mission: MissionFindings) -> str:
-    """Sentence on why the published model may be invalid for this mission; empty if it is valid."""
+    """Sentence that says why the published model may be invalid for this mission; empty if it is valid."""
     doubt = mission.model_doubt
     return f"{sentence(doubt)}." if doubt else ""
 
 
 def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
-    """Yield names and texts of the lines about platforms, geometry, resolution, budget, model and scene."""
+    """Yield the name and text of each line about platforms, geometry, resolution, budget, model and scene."""
     geometry, allocation = mission.geometry, mission.allocation
     is_first = True  # the first squint comes with its explanation
     for name, state in (("Transmitter", geometry.transmitter), ("Receiver", geometry.receiver)):
@@ -181,7 +184,7 @@ def _peak_loss(loss_db: float) -> str:
 
 
 def path_words(path: FlownPath) -> str:
-    """Text about a path: its source, its polynomials, and their distance from the fixes or the orbit."""
+    """Text about a platform path: its source, the fitted polynomials, and their distance from fixes or orbit."""
     text = path.source if path.file is None else f"{path.file}: {path.source}"
     if path.age is not None:
         direction = "old" if path.age >= 0 else "ahead"

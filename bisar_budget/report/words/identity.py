@@ -1,4 +1,4 @@
-"""Names of a mission and its findings that do not depend on the current folder or the machine.
+"""Name a mission and its findings in a way that does not depend on the current folder or the machine.
 
 They are used for the ids of needs, fingerprints and test cases. The name of a mission is the number of its document,
 else the path of its file within the repository, else the file name. A relative path, an absolute path and a symbolic
@@ -19,7 +19,7 @@ _STANDARD_INPUT = "standard input"
 class Identity(NamedTuple):
     """Name of a mission, unique among the files of a run, and the path of its file in reports.
 
-    `shared` are the pairs of requirement id and row id that do not identify a finding without the mission name.
+    `shared` are the pairs of requirement id and row id that identify a finding only together with the mission name.
     """
 
     name: str
@@ -27,9 +27,10 @@ class Identity(NamedTuple):
     shared: frozenset[tuple[str, str]] = frozenset()
 
     def of(self, subject: str, requirement_id: str | None = None) -> tuple[str, ...]:
-        """Unique name of a row or requirement: requirement id of the project and `subject`.
+        """Unique name of a row or requirement: its requirement id in the project, and its id `subject`.
 
-        The mission name replaces a missing requirement id, and is inserted after an id in `shared`.
+        If it has no requirement id, the mission name comes first. If the pair is in `shared`, the mission name is
+        inserted between the two.
         """
         if requirement_id is None:
             return self.name, subject
@@ -65,7 +66,7 @@ def digest(*items: str) -> str:
 
 
 def distinct(spellings: Sequence[str], names: Sequence[tuple[str, ...]]) -> list[str]:
-    """Make the spellings of names unique. If several names have the same spelling, a digest is appended to each."""
+    """Make the spellings of `names` unique. If several names have the same spelling, each gets a digest appended."""
     uses = Counter(spelling for spelling, _ in set(zip(spellings, names, strict=True)))
     return [
         spelling if uses[spelling] == 1 else f"{spelling}_{digest(*name)[:8].upper()}"
@@ -79,7 +80,7 @@ def stem(name: str) -> str:
 
 
 def source_path(file: str, style: Style) -> str:
-    """Path of a mission file for a report: relative to its repository, else to `style.root`, else absolute.
+    """Path of a mission file in a report: relative to its repository, else to `style.root`, else absolute.
 
     It has forward slashes. If `style.root` is empty, the path is returned as given.
     """
@@ -147,13 +148,13 @@ def _below(file: str, folder: str) -> str:
 
 
 def _alike(names: Mapping[str, str]) -> list[str]:
-    """Files that have the same name as another file."""
+    """Files whose name in `names` is also the name of another file."""
     uses = Counter(names.values())
     return [file for file, name in names.items() if uses[name] > 1]
 
 
 def _with_distinct_folders(paths: Mapping[str, str]) -> dict[str, str]:
-    """Add parent folders to equal paths until all paths differ. Absolute paths always differ."""
+    """Extend equal paths by parent folders until all paths differ, which absolute paths always do."""
     names, added = dict(paths), 0
     while alike := _alike(names):
         added += 1
@@ -171,7 +172,7 @@ def _with_folders(file: str, path: str, count: int) -> str:
 def _shared_requirements(
     missions: Sequence[MissionFindings | UnusableMission], files: Sequence[str], names: Mapping[str, str]
 ) -> frozenset[tuple[str, str]]:
-    """Pairs of requirement id and row id that are in several files or whose requirement id is a mission name."""
+    """Pairs of requirement id and row id that occur in several files, or whose requirement id is a mission name."""
     used = {
         (row.requirement_id, row.id, file)
         for mission, file in zip(missions, files, strict=True)

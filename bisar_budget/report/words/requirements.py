@@ -1,4 +1,4 @@
-"""Texts about requirements that all formats use: status, deciding row, and probability by Monte Carlo."""
+"""Texts about requirements that all report formats use: status, deciding row, probability by Monte Carlo."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -27,8 +27,9 @@ REQUIREMENT_COLUMNS = ("requirement", "allowed", "reached", "use", "status", "de
 class RequirementLine(NamedTuple):
     """One line of the table of requirements, as texts.
 
-    `decided_by` is the deciding row, or the reason why nothing could be judged. `remark` has the share of the
-    requirement to which `use` refers, with its reached and allowed values, the gain of autofocus, and the waivers.
+    `decided_by` is the deciding row, or the reason why nothing could be judged. `remark` names the share of the
+    requirement to which the utilization `use` refers, with the reached and allowed values of the share. It also has
+    the autofocus gain and the waivers.
     """
 
     requirement: JudgedRequirement
@@ -65,9 +66,9 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
 
 
 def use_remarks(requirement: JudgedRequirement) -> Iterator[str]:
-    """Yield remarks that explain a utilization different from the ratio of reached to allowed value.
+    """Yield remarks on why the utilization of a requirement is not its reached value over its allowed value.
 
-    They name the row with the largest utilization, the share that decides, and the gain of autofocus.
+    They name the row with the largest utilization, the share that decides, and the autofocus gain.
     """
     if requirement.is_unjudged or requirement.value is None:
         return
@@ -95,7 +96,10 @@ def share_words(requirement: JudgedRequirement, share: DecidingShare) -> str:
 
 
 def share_columns(requirement: JudgedRequirement) -> dict[str, str | float | None]:
-    """Values about the deciding share and the gain of autofocus, by the names of columns and properties."""
+    """Owner, allowed and reached value of the deciding share, and autofocus gain, by name of the output column.
+
+    The values of the share are None if no share decides.
+    """
     share = requirement.share
     return {
         "share_owner": None if share is None else share.owner,
@@ -106,7 +110,7 @@ def share_columns(requirement: JudgedRequirement) -> dict[str, str | float | Non
 
 
 def confidence_words(mission: MissionFindings) -> str:
-    """Confidence at which a mission meets its requirements, as text after a space; empty if a requirement fails."""
+    """Text with the confidence at which a mission meets its requirements, after a space; empty if one fails."""
     status = STATUS[mission.status]
     return f" {mission.confidence}" if status.is_held and not status.fails else ""
 
@@ -115,7 +119,7 @@ _HAS_CONFIDENCE = ("quadratic_phase_error", "cubic_phase_error", "location_error
 
 
 def requirement_finding(requirement: JudgedRequirement, mission: MissionFindings) -> str:
-    """Sentence with the status of a requirement, its values and remarks; with its confidence if it is met."""
+    """Sentence with the status, values and remarks of a requirement, and with the confidence if it is met."""
     text = requirement.name
     if requirement.value is not None:
         limit = requirement_limit(requirement.value, requirement)
@@ -133,9 +137,9 @@ def requirement_finding(requirement: JudgedRequirement, mission: MissionFindings
 
 
 def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
-    """Sentence about the whole mission: every requirement is met, or how many are broken or cannot be judged.
+    """Sentence about the whole mission: all requirements are met, or how many are broken or cannot be judged.
 
-    With `is_brief` the sentence has no verbs.
+    If `is_brief` is true, the sentence leaves out verbs such as "is".
     """
     if mission.is_empty:
         return "the file declares no error" + ("" if is_brief else ", so nothing is judged; the allowables follow")
@@ -168,7 +172,10 @@ def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
 
 
 def _waived(mission: MissionFindings, *, is_brief: bool) -> list[str]:
-    """Text with the number of waived requirements (or else rows) and the waivers; empty if nothing is waived."""
+    """Text with the number of waived requirements, or of waived rows if there are none, and the ids of the waivers.
+
+    The list is empty if nothing is waived, else it has one text.
+    """
     counts = [sum(item.status == "waived" for item in judged) for judged in (mission.requirements, mission.rows)]
     count, noun = (counts[0], "requirement") if counts[0] else (counts[1], "row")
     if not count:
@@ -180,7 +187,7 @@ def _waived(mission: MissionFindings, *, is_brief: bool) -> list[str]:
 
 
 def _met(mission: MissionFindings, waived: Sequence[str]) -> str:
-    """Verdict of a mission that breaks nothing, with a mention of waivers, warnings or autofocus."""
+    """Text of the verdict on a mission that breaks no requirement. It mentions waivers, warnings or autofocus."""
     text = ", ".join(waived) or f"every requirement is judged and met {mission.confidence}"
     if "warn" in mission.statuses:
         return f"{text}, with warnings"
@@ -232,7 +239,7 @@ def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
 
 
 def declared_words(kinds: DeclaredKinds) -> str:
-    """Sentence about the declared kinds of error: their number, and those missing, without source or shifted."""
+    """Sentence with the number of declared kinds of error, and those that are missing, shifted or without source."""
     text = f"Declared {len(kinds.declared)} of {kinds.in_all} kinds of error"
     if kinds.missing:
         text += f"; not declared: {', '.join(kind_names(kinds.missing))}"
@@ -244,7 +251,7 @@ def declared_words(kinds: DeclaredKinds) -> str:
 
 
 def shifted_names(kinds: DeclaredKinds) -> list[str]:
-    """Kinds of error whose stated level shifts them off their data sheet, each with the level."""
+    """Texts with each kind of error that a stated level shifts off its data sheet, and with this level."""
     return [f"{''.join(kind_names([error.kind]))} {error.level}" for error in kinds.shifted]
 
 
@@ -265,9 +272,9 @@ _NAME_WIDTH = 33  # characters
 
 
 def probabilities(drawn: MonteCarlo) -> list[str]:
-    """Make the table of the Monte Carlo result, with warnings and notes.
+    """Make the lines of the table of the Monte Carlo result, with warnings and notes.
 
-    It has the probability of each requirement, and for comparison sums that need no draws.
+    The table has the probability that each requirement is met. For comparison it has sums that need no draws.
     """
     lines = [
         f"Monte Carlo: {drawn.draws:,} draws, seed {drawn.seed}, {drawn.model} model; "
@@ -289,7 +296,7 @@ def probabilities(drawn: MonteCarlo) -> list[str]:
 
 
 def _is_not_drawn(note: Note) -> bool:
-    """Whether a note names errors that are not drawn, which belongs into the first lines."""
+    """Whether a note names errors that are not drawn. Such a note belongs into the first lines of the table."""
     return note.code in ("vibration-is-not-drawn", "stated-power-is-not-drawn")
 
 

@@ -1,4 +1,4 @@
-"""Texts that all formats use: utilizations, causes, sizes in the units of the file, terminal tables, escapes."""
+"""Texts that all report formats use: utilizations, causes, sizes in units of the file, tables, escaped text."""
 
 import math
 import os
@@ -23,9 +23,9 @@ BINDING_WORDS = {
 
 
 def matters(row: Row) -> bool:
-    """Whether a row is declared or limits something.
+    """Whether a row is worth showing, because it is declared or limits something.
 
-    A passing row along axes other than the axes of the file does not matter.
+    A passing row along axes other than those of the file is not worth showing.
     """
     if row.status in ("info", "pass"):
         is_declared = (
@@ -36,7 +36,7 @@ def matters(row: Row) -> bool:
 
 
 def binding_words(row: Row) -> str:
-    """Name of the requirement that sets the allowable of a row; empty if it is the row's own metric."""
+    """Name of the requirement that sets the allowable of a row; empty if this is the metric of the row itself."""
     return "" if row.binding_requirement == row.metric else BINDING_WORDS.get(row.binding_requirement or "", "")
 
 
@@ -73,7 +73,7 @@ def use_words(use: float | None) -> str:
 
 
 def own_id(row: Row) -> str:
-    """Requirement id of the project for a row, in brackets after a space; empty if the file gives none."""
+    """Requirement id that the file gives to a row, in brackets after a space; empty if it gives none."""
     return f" [{row.requirement_id}]" if row.requirement_id else ""
 
 
@@ -97,12 +97,12 @@ def measure(row: Row, mission: MissionFindings) -> str:
 
 
 def cause(row: Row) -> str:
-    """Text with the reason for the status of a row, and its notes; may be empty."""
+    """Text with the reason for the status of a row, and with the notes of the row; empty if it has neither."""
     return "; ".join([row.reason, *row.notes] if row.reason else row.notes)
 
 
 def finding(row: Row, mission: MissionFindings) -> str:
-    """Sentence about a row: its id, its requirement id, `measure` and `cause`."""
+    """Sentence about a row: its id, its requirement id, and the texts of `measure` and `cause`."""
     reason = cause(row)
     return f"{row.id}{own_id(row)}: {measure(row, mission)}{f'. {sentence(reason)}' if reason else ''}"
 
@@ -116,12 +116,12 @@ _LISTED_COUNT = 3  # waivers whose ids a sentence lists
 
 
 def waiver_names(ids: Sequence[str]) -> str:
-    """Text with up to three ids of waivers as in the file, such as `waiver receiver.*`, and the number of others."""
+    """Text such as `waiver receiver.*` with up to three waiver ids as in the file, and how many more there are."""
     return f"waiver{'s' if len(ids) > 1 else ''} {_listed_ids(ids)}"
 
 
 def waived_count(count: int, ids: Sequence[str]) -> str:
-    """Text with a number of waived items and the waivers, such as `12 waived (mission.location_error)`."""
+    """Text with the number of waived items and ids of their waivers: `12 waived (mission.location_error)`."""
     return f"{count} waived ({_listed_ids(ids)})" if ids else f"{count} waived"
 
 
@@ -152,7 +152,7 @@ _LEVEL_REQUIREMENTS = ("pslr", "islr")  # requirements in dB of the image
 
 
 def is_noise_level(row: Row) -> bool:
-    """Whether the numbers of a row are levels of a spectrum relative to the declared spectrum. [dB]"""
+    """Whether the numbers of a row are in dB, as levels of a noise spectrum relative to the declared spectrum."""
     return row.unit == "dB" and row.subject.axis == row.subject.facts.spectrum_axis
 
 
@@ -197,7 +197,7 @@ def allowable_words(row: Row, mission: MissionFindings) -> str:
 
 
 def shown_use(row: Row) -> float | None:
-    """Utilization of a row; None if the row has no limit or cannot be judged, even if this is waived."""
+    """Utilization of a row to show; None if the row has no limit, or if it cannot be judged, waived or not."""
     return None if row.allowable is None or row.is_unjudged or row.status == "not_evaluated" else row.utilization
 
 
@@ -218,7 +218,7 @@ def requirement_limit(value: float | None, requirement: JudgedRequirement) -> st
 
 
 def requirement_size(value: float | None, requirement: JudgedRequirement, rounding: str = "nearest") -> str:
-    """Write a number of a requirement in the unit that the file uses for it; a dash for None."""
+    """Write a value of a requirement in the unit that the file uses for it; a dash for None."""
     if value is None:
         return "-"
     unit = _file_unit(requirement.line, requirement.unit) or (_PHASE_UNIT if requirement.unit == "rad" else "")
@@ -229,7 +229,7 @@ _LEAST_LEVEL_DB = 5e-4  # the level of an echo as strong as its point differs fr
 
 
 def _level(value: float, unit: str) -> float:
-    """Return a value; 0 for a level in dB that differs from 0 dB only by rounding."""
+    """Replace a level in dB by 0 if it differs from 0 dB only by rounding. Other values are returned unchanged."""
     return 0.0 if unit == "dB" and abs(value) < _LEAST_LEVEL_DB else value
 
 
@@ -266,19 +266,19 @@ def wrapped_counts(text: str) -> list[str]:
 
 
 def spaced(cells: Sequence[str], widths: Sequence[int], sides: str) -> str:
-    """Write cells as a line of columns with the given widths, aligned left (`<`) or right (`>`) as in `sides`."""
+    """Write cells as one line of columns. `sides` has `<` or `>` for each column, to align it left or right."""
     return " ".join(f"{cell:{side}{width}}" for cell, width, side in zip(cells, widths, sides, strict=True))
 
 
 def table(rows: Sequence[Sequence[str]], width: int = TEXT_WIDTH) -> list[str]:
-    """Align rows of cells, the header first, in at most `width` columns."""
+    """Write rows of cells, the header first, as lines of an aligned table at most `width` characters wide."""
     return [line for lines in aligned(rows, width) for line in lines]
 
 
 def aligned(rows: Sequence[Sequence[str]], width: int = TEXT_WIDTH) -> Iterator[list[str]]:
     """Yield the lines of each row of a table. Names and the last column are aligned left, numbers right.
 
-    A name that would make its line longer than `width` columns is written on a separate line above its numbers.
+    A name that would make its line longer than `width` characters is written on a line above its numbers.
     """
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     room = width - sum(widths[1:]) - len(widths) + 1
@@ -342,7 +342,7 @@ def rst_text(text: str) -> str:
 
 
 def need_text(text: str) -> str:
-    """Escape a field of a need, because Sphinx-Needs would run `[[function()]]` and look up `<<variant>>`."""
+    """Escape a field for Sphinx-Needs, which would otherwise run `[[function()]]` and look up `<<variant>>`."""
     return printable(text).replace("[[", "[ [").replace("<<", "< <")
 
 
