@@ -178,7 +178,7 @@ class MotionKind(SourceKind):
         What the error is, in one sentence; for messages, the JSON Schema and the explanation.
     motion : callable
         Function `motion(path, times)` that returns the measured minus the true position of the antenna's phase centre
-        for an error of one unit: east, north and up, (3, *times.shape). [m/unit] `path` is the true path, a
+        for an error of one unit: east, north and up, (3, ...) for times (...). [m/unit] `path` is the true path, a
         `PlatformState`; `path.place(times)` are its positions relative to the scene centre. [m] `times` are slow
         times from mid-aperture. [s] The motion error must be proportional to the size of the error, and at most a
         polynomial of degree 12 in time.

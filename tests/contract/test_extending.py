@@ -22,7 +22,7 @@ COMMAND = "import sys; from bisar_budget.cli import main; sys.argv[0] = 'bisar-b
 
 def block(language: str, beginning: str) -> str:
     """A block of the page, without the indentation of its list."""
-    blocks = re.findall(rf"^ *```{language}\n(.*?)^ *```", SECTION, re.DOTALL | re.MULTILINE)
+    blocks = re.findall(rf"^ *```{re.escape(language)}\n(.*?)^ *```", SECTION, re.DOTALL | re.MULTILINE)
     (text,) = (text for text in blocks if text.lstrip().startswith(beginning))
     return (
         "\n".join(line.removeprefix("   ") if text.startswith("   ") else line for line in text.splitlines()) + "\n"
@@ -45,7 +45,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     mission["allocation"] = {"combine": "rss", "model": "full"}
     mission["requirements"]["quadratic_phase_error"] = "140 deg"  # which the other errors meet
     (folder / "without.yaml").write_text(yaml.safe_dump(mission))
-    stated = yaml.safe_load(block("yaml", "platforms:"))["platforms"]["receiver"]["motion_error"]
+    stated = yaml.safe_load(block("{code-block} yaml", "platforms:"))["platforms"]["receiver"]["motion_error"]
     mission["platforms"]["receiver"]["motion_error"] |= stated
     (folder / "mission.yaml").write_text(yaml.safe_dump(mission))
     return folder
