@@ -45,7 +45,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     mission["allocation"] = {"combine": "rss", "model": "full"}
     mission["requirements"]["quadratic_phase_error"] = "140 deg"  # which the other errors meet
     (folder / "without.yaml").write_text(yaml.safe_dump(mission))
-    stated = yaml.safe_load(block("{code-block} yaml", "platforms:"))["platforms"]["receiver"]["motion_error"]
+    stated = yaml.safe_load(block("text", "platforms:"))["platforms"]["receiver"]["motion_error"]
     mission["platforms"]["receiver"]["motion_error"] |= stated
     (folder / "mission.yaml").write_text(yaml.safe_dump(mission))
     return folder
