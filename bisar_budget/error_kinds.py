@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, TypeVar
 
+import numpy as np
+
 from bisar_budget import units
 
 if TYPE_CHECKING:
@@ -158,6 +160,10 @@ class StateKind(SourceKind):
         return self.order < 2
 
 
+class MotionKindError(ValueError):
+    """A registered kind of error gives a motion that cannot be used; the message names the kind."""
+
+
 Motion = Callable[["PlatformState", "Floats"], "Floats"]
 
 
@@ -180,8 +186,8 @@ class MotionKind(SourceKind):
         Function `motion(path, times)` that returns the measured minus the true position of the antenna's phase centre
         for an error of one unit: east, north and up, (3, ...) for times (...). [m/unit] `path` is the true path, a
         `PlatformState`; `path.place(times)` are its positions relative to the scene centre. [m] `times` are slow
-        times from mid-aperture. [s] The motion error must be proportional to the size of the error, and at most a
-        polynomial of degree 12 in time.
+        times from mid-aperture. [s] The motion error must be proportional to the size of the error, and smooth: a
+        motion that the nodes of the aperture do not resolve, such as a vibration, is refused.
     equation : str
         Source of the motion, such as an equation of a paper; for reports.
 
@@ -206,6 +212,21 @@ class MotionKind(SourceKind):
     def unit(self) -> str:
         """Unit of the size in SI."""
         return self.dimension.si
+
+    def moved(self, path: "PlatformState", times: "Floats") -> "Floats":
+        """Motion error per unit at slow times (...), east, north and up, (3, ...). [m/unit]
+
+        Raises
+        ------
+        MotionKindError
+            The motion has another shape, or numbers that are not finite.
+        """
+        motion = np.asarray(self.motion(path, times), dtype=float)
+        if motion.shape != (3, *times.shape):
+            raise MotionKindError(f"{self.name}: motion has the shape {motion.shape}; accepted: {(3, *times.shape)}")
+        if not np.isfinite(motion).all():
+            raise MotionKindError(f"{self.name}: motion has numbers that are not finite")
+        return motion
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

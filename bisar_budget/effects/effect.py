@@ -212,7 +212,7 @@ class ErrorSource(NamedTuple):
     @property
     def motion(self) -> Motion | None:
         """Motion of the platform per unit, which a registered kind of error states; None for any other kind."""
-        return self.kind.motion if self.is_registered and isinstance(self.kind, MotionKind) else None
+        return self.kind.moved if self.is_registered and isinstance(self.kind, MotionKind) else None
 
     @property
     def is_covered(self) -> bool:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.arrays import PerCase
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.combined import squared
 from bisar_budget.effects.effect import (
@@ -23,7 +23,7 @@ from bisar_budget.effects.effect import (
     override_notes,
     subject,
 )
-from bisar_budget.error_kinds import POSITION_KIND, STATE_KINDS, MotionKind, StateKind, kind_of
+from bisar_budget.error_kinds import POSITION_KIND, STATE_KINDS, MotionKind, MotionKindError, StateKind, kind_of
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, VectorArrays, Vectors, dot
 from bisar_budget.image_plane import nodes_for
@@ -35,6 +35,8 @@ from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, FullEffect
 if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
 
+_BETWEEN_NODES = np.linspace(-1.0, 1.0, 65)  # slow times over half the aperture at which a stated motion is checked
+_UNRESOLVED_FRACTION = 1e-3  # of a motion; the effects of the rest are as small a part of those of the motion
 AnyEffect = TypeVar("AnyEffect", Effect, FullEffect)
 AnyVector = TypeVar("AnyVector", VectorArrays, Vectors)
 _UNIT_VECTORS: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -545,7 +547,7 @@ class ErrorListing:
             for key, value in error.registered.items():
                 kind = kind_of(key)
                 assert isinstance(kind, MotionKind)
-                x, y, z = (np.broadcast_to(moved, exact.times.shape) for moved in kind.motion(path, exact.times))
+                x, y, z = self._resolved(kind, path)
                 along_look = -dot(path.look, (x, y, z))
                 orders = np.einsum("fn,nc->fc", exact.fit, along_look)
                 orders = np.where(
@@ -565,6 +567,28 @@ class ErrorListing:
                     shifts=((x, y, z), (x, y, z)),
                     is_registered=True,
                 )
+
+    def _resolved(self, kind: MotionKind, path: PlatformState) -> Floats:
+        """Motion per unit of a registered kind of error at the nodes, (3, nodes, cases). [m/unit]
+
+        Raises
+        ------
+        MotionKindError
+            The motion cannot be used, or the polynomial through the nodes is not the motion between the nodes.
+        """
+        exact, places = self.exact, self.exact.sampling.places
+        moved = kind.moved(path, exact.times)
+        between = np.broadcast_to(_BETWEEN_NODES[:, None] * exact.half, (_BETWEEN_NODES.size, exact.times.shape[1]))
+        truth = kind.moved(path, between)
+        to_orders = np.linalg.inv(np.polynomial.legendre.legvander(places, places.size - 1))
+        through = np.polynomial.legendre.legvander(_BETWEEN_NODES, places.size - 1) @ to_orders
+        strays = np.abs(np.einsum("tn,anc->atc", through, moved) - truth).max()
+        if strays > _UNRESOLVED_FRACTION * np.abs(truth).max():
+            raise MotionKindError(
+                f"{kind.name}: motion changes faster than {places.size} nodes of the aperture resolve; accepted: a "
+                "smooth motion"
+            )
+        return moved
 
     def _of_terrain(self) -> Iterator[ErrorSource]:
         """Yield the error due to a scene that is higher than the processor assumes; nothing if the file states none.

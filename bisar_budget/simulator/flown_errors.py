@@ -8,7 +8,7 @@ from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.simulator.phase_history import Course, Errors, PathError, superposed
 
-_MOTION_SAMPLES = 513  # samples of a registered kind's motion, a polynomial of degree 12 at most
+_MOTION_SAMPLES = 513  # of the smooth motion that a registered kind states
 
 
 def flown(source: ErrorSource, size: float, geometry: BistaticGeometry, aperture_time_s: float) -> Errors:
@@ -31,7 +31,7 @@ def flown(source: ErrorSource, size: float, geometry: BistaticGeometry, aperture
     for platform_index in source.platforms:
         if source.motion is not None:
             times = np.linspace(-aperture_time_s / 2, aperture_time_s / 2, _MOTION_SAMPLES)
-            motion = np.broadcast_to(source.motion(geometry.both[platform_index], times), (3, times.size))
+            motion = source.motion(geometry.both[platform_index], times)
             error = PathError(course=Course(times, size * motion.T))
         elif source.kind.flown_as == "time_tag":
             error = PathError(time_tag=size)

@@ -1,5 +1,7 @@
 """The registry of kinds of error: ids of rows, names, and kinds that a package adds."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -132,3 +134,36 @@ def test_large_draws_of_a_registered_kind_are_those_of_its_motion() -> None:
     assert by_motion["mission.location_error"]["sigma"] == pytest.approx(
         by_velocity["mission.location_error"]["sigma"], rel=0.05
     )
+
+
+def refused(name: str, motion: Callable[..., np.ndarray]) -> pytest.ExceptionInfo[ValueError]:
+    bb.register(bb.MotionKind(name=name, dimension=units.LENGTH, description="Error.", motion=motion))
+    mission = bb.load(str(ROOT / "specs/missions/tandem_x.yaml"))
+    with pytest.raises(error_kinds.MotionKindError) as refusal:
+        bb.check(mission.replace({f"platforms.receiver.motion_error.registered.{name}": "1 m"}))
+    return refusal
+
+
+def test_a_motion_without_numbers_or_of_another_shape_is_no_pass() -> None:
+    """NaN gave a row without a limit that did not fail."""
+    assert "not finite" in str(refused("nothing", lambda path, times: np.full((3, *times.shape), np.nan)).value)
+    assert "shape" in str(refused("turned", lambda path, times: np.zeros((*times.shape, 3))).value)
+
+
+@pytest.mark.parametrize(("turns", "is_smooth"), [(0.25, True), (0.5, True), (3.0, False), (300.0, False)])
+def test_a_motion_that_the_nodes_do_not_resolve_is_refused(turns: float, is_smooth: bool) -> None:
+    """A vibration of 1 m had a limit and passed: its samples at the nodes looked like another motion."""
+    mission = bb.load(str(ROOT / "specs/missions/tandem_x.yaml"))
+    T = mission.collection.aperture_time
+
+    def swaying(path: object, times: np.ndarray) -> np.ndarray:
+        return np.stack([0 * times, np.sin(2 * np.pi * turns * times / T), 0 * times])
+
+    if not is_smooth:
+        assert "smooth" in str(refused("swaying", swaying).value)
+        return
+    bb.register(bb.MotionKind(name="swaying", dimension=units.LENGTH, description="Error.", motion=swaying))
+    row = bb.check(mission.replace({"platforms.receiver.motion_error.registered.swaying": "1 mm"}))[
+        "receiver.swaying"
+    ]
+    assert row.allowable is not None
