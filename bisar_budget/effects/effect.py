@@ -58,6 +58,13 @@ class Subject(NamedTuple):
         """The kind itself, with all that is known about it."""
         return kind_of(self.kind)
 
+    @property
+    def source_kind(self) -> SourceKind:
+        """The kind itself, of the subject of an error."""
+        facts = self.facts
+        assert isinstance(facts, SourceKind), "the subject is that of a sum"
+        return facts
+
 
 @cache
 def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: int | None = None) -> Subject:
@@ -205,9 +212,7 @@ class ErrorSource(NamedTuple):
     @property
     def kind(self) -> SourceKind:
         """The kind of the error, with all that is known about it."""
-        facts = self.subject.facts
-        assert isinstance(facts, SourceKind)
-        return facts
+        return self.subject.source_kind
 
     @property
     def motion(self) -> Motion | None:

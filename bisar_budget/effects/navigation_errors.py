@@ -45,7 +45,6 @@ from bisar_budget.mission.instruments import GaussMarkov, LeverArm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import RAW, CommonMotionError, FlownPath, LogNoise, MotionError
 
-CORRELATED = ("random", "trajectory")  # kinds of error that are correlated noise of a position
 _CONSTANT_S = 1e9  # correlation time of an error that is constant over any aperture
 _UNIFORM_SIGMA_RATIO = 12**-0.5  # ratio of sigma to step for an error that is uniformly distributed over the step
 

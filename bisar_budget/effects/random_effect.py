@@ -163,10 +163,8 @@ class RandomError(NamedTuple):
 
     @property
     def kind(self) -> SourceKind:
-        """The kind of the error, with the facts about it."""
-        facts = self.subject.facts
-        assert isinstance(facts, SourceKind)
-        return facts
+        """The kind of the error, with all that is known about it."""
+        return self.subject.source_kind
 
     @property
     def is_covered(self) -> bool:
