@@ -11,6 +11,7 @@ PACKAGES_OF_EXTRA: Mapping[str, tuple[str, ...]] = {
     "fast": ("finufft", "numba"),
     "formats": ("sarkit",),
     "logs": ("pynmea2",),
+    "office": ("openpyxl",),
     "orbits": ("pyerfa", "sgp4"),
     "tables": ("netCDF4", "pyarrow", "xarray"),
 }
@@ -19,3 +20,7 @@ PACKAGES_OF_EXTRA: Mapping[str, tuple[str, ...]] = {
 def install_command(extra: str) -> str:
     """Command that installs the packages of an extra into the current environment."""
     return f"pip install {' '.join(PACKAGES_OF_EXTRA[extra])}"
+
+
+class MissingExtraError(Exception):
+    """The packages of an extra are not installed; the message names them and the command that installs them."""

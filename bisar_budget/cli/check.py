@@ -325,6 +325,9 @@ def check(
     own_reports = _reports_of(projects) if len(projects) > 1 else []
     formats = [format_name, *(its_format for _, its_format in named_reports), *(each[2] for each in own_reports)]
     destinations = [*named_reports, *(each[1:] for each in own_reports), (output or "-", format_name)]
+    for name, its_format in destinations:
+        if name == "-" and FORMATS[its_format].is_binary:
+            raise click.UsageError(f"--format {its_format} needs -o FILE.")
     folders = [_folder_of_pictures(name, its_format) for name, its_format in destinations]
     spare(
         files,
@@ -600,13 +603,20 @@ def _say_faults(missions: "Iterable[MissionFindings | UnusableMission | None]") 
 
 def _write_report(path: str, format_name: str, report: "Report", style: "Style") -> None:
     """Write the pictures of a report and then its text, so that the text never names a missing picture."""
-    from bisar_budget.report import pictures, render
+    from bisar_budget.extras import MissingExtraError
+    from bisar_budget.report import content, pictures, render
 
+    if FORMATS[format_name].is_binary:
+        try:
+            write_file(path, content(format_name, report, style))
+        except MissingExtraError as error:
+            fail(str(error))
+        return
     folder = _folder_of_pictures(path, format_name)
     style = style._replace(assets=os.path.basename(folder))
     text = render(format_name, report, style)
-    for name, content in pictures(format_name, report, style).items():
-        write_file(os.path.join(folder, name), content)
+    for name, picture in pictures(format_name, report, style).items():
+        write_file(os.path.join(folder, name), picture)
     deliver(text, path, format_name)
 
 

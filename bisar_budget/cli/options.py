@@ -72,7 +72,22 @@ def format_option(formats: Iterable[str], words: str, **overrides: Any) -> _Opti
 
 
 OUTPUT = output_option()
-TEXT_OR_JSON = format_option(("text", "json"), "Format of the output.")
+
+
+def answer_options(command: str, words: str = "") -> _Option:
+    """Make the options `--format` and `--output` of a command whose answer is in the table of answers.
+
+    `words` is added to the help text of `--format`.
+    """
+    from bisar_budget.report.answers import ANSWERS
+
+    formats = format_option(
+        ANSWERS[command].formats,
+        f"Format of the answer (default: that of the suffix of -o, else text); xlsx needs -o.{words}",
+        default=None,
+        show_default=False,
+    )
+    return lambda function: formats(output_option()(function))
 
 
 def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[SetValue, ...]":

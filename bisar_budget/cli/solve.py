@@ -16,9 +16,8 @@ from bisar_budget.cli.options import (
     DATE,
     MISSIONS,
     MODEL,
-    OUTPUT,
     SET,
-    TEXT_OR_JSON,
+    answer_options,
     ask_each,
     plot_option,
     wrong_usage,
@@ -26,7 +25,7 @@ from bisar_budget.cli.options import (
 from bisar_budget.cli.streams import (
     BROKEN_EXIT_CODE,
     PICTURE_SUFFIXES,
-    deliver_found,
+    deliver_answer,
     expand,
     load_all,
     spare,
@@ -71,8 +70,7 @@ if TYPE_CHECKING:
 @SET
 @DATE
 @click.option("--verify", "is_imaged", is_flag=True, help="Form images of the row that binds at the solution.")
-@TEXT_OR_JSON
-@OUTPUT
+@answer_options("solve")
 def solve(
     missions: Sequence[str],
     key: str,
@@ -83,7 +81,7 @@ def solve(
     model: str | None,
     changes: "tuple[SetValue, ...]",
     today: datetime | None,
-    format_name: str,
+    format_name: str | None,
     is_imaged: bool,
     output: str | None,
 ) -> None:
@@ -96,7 +94,6 @@ def solve(
     waived, or if the image refutes the limit (--verify); 2 for wrong usage or an unusable mission file.
     """
     from bisar_budget.front import questions
-    from bisar_budget.report.formats import answers
 
     with wrong_usage():
         questions.hold_to_parts(key, between, is_scale)
@@ -104,7 +101,7 @@ def solve(
     spare(files, [output])
     ask = partial(questions.solve, key=key, between=between, scale=is_scale, row=row, target=target, verify=is_imaged)
     solutions = [answer.found for answer in ask_each(load_all(files, model, changes), model, today, ask)]
-    deliver_found(answers, solutions, format_name, output)
+    deliver_answer("solve", solutions, format_name, output)
     is_broken = any(each.status == "none" or (each.imaged and each.imaged.is_optimistic) for each in solutions)
     sys.exit(BROKEN_EXIT_CODE if is_broken else 0)
 
@@ -115,8 +112,7 @@ def solve(
 @MODEL
 @SET
 @DATE
-@TEXT_OR_JSON
-@OUTPUT
+@answer_options("sensitivity")
 @plot_option("Draw the effects of a mission as bars: .svg, .png, .pdf.")
 def sensitivity(
     missions: Sequence[str],
@@ -124,7 +120,7 @@ def sensitivity(
     model: str | None,
     changes: "tuple[SetValue, ...]",
     today: datetime | None,
-    format_name: str,
+    format_name: str | None,
     output: str | None,
     plot: str | None,
 ) -> None:
@@ -137,7 +133,6 @@ def sensitivity(
     one error is doubled. Exit code: 0, or 2 for wrong usage or an unusable mission file.
     """
     from bisar_budget.front import questions
-    from bisar_budget.report.formats import answers
 
     kind = suffix_of(plot, PICTURE_SUFFIXES)[1:]
     files = expand(missions)
@@ -148,4 +143,4 @@ def sensitivity(
     results = [*ask_each(load_all(files, model, changes), model, today, ask)]
     if plot is not None:
         write_file(plot, results[0].plot().of(kind))
-    deliver_found(answers, [result.found for result in results], format_name, output)
+    deliver_answer("sensitivity", [result.found for result in results], format_name, output)

@@ -16,13 +16,12 @@ from bisar_budget.faults import MissionError, printable
 from bisar_budget.resources import FILES_READ, locked, special_file
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
     from bisar_budget.faults import Fault, SetValue
     from bisar_budget.mission.model import Mission
 
 MISSION_SUFFIXES = (".yaml", ".yml")
 PICTURE_SUFFIXES = (".svg", ".png", ".pdf")
+BINARY_FORMATS = ("xlsx",)  # formats that no terminal shows
 _TEMPORARY = (".bisar-budget.", ".tmp")  # prefix and suffix of the name of a temporary folder
 BROKEN_EXIT_CODE, USAGE_EXIT_CODE, DEFECT_EXIT_CODE, INTERRUPTED_EXIT_CODE = 1, 2, 3, 130
 
@@ -255,15 +254,38 @@ def deliver(text: str, output: str | None = None, format_name: str = "text") -> 
         write_file(output, harmless(text, format_name).replace("\n", _LINE_ENDS.get(format_name, "\n")))
 
 
-def deliver_found(form: "ModuleType", results: object, format_name: str, output: str | None) -> None:
-    """Write results to `output` in the format NAME, with the function `as_NAME` of the module `form`."""
-    from bisar_budget.report import Style
+def deliver_answer(command: str, answers: "Sequence[object]", format_name: str | None, output: str | None) -> None:
+    """Write the answers of a command, one for each mission, to `output`, or to standard output if it is None or `-`.
 
+    Without a format name, the format is that of the suffix of `output`, or else text.
+    """
+    from bisar_budget.extras import MissingExtraError
+    from bisar_budget.report import Style
+    from bisar_budget.report.answers import files
+
+    is_file = output is not None and output != "-"
+    format_name = format_name or _format_of_output(command, output)
+    if format_name in BINARY_FORMATS and not is_file:
+        raise click.UsageError(f"--format {format_name} needs -o FILE.")
     root, is_checkout = root_of_names()
     style = Style(root=root, is_checkout=is_checkout)
-    if output is None:
+    if not is_file:
         style = style._replace(color=wants_color(), table_width=table_width())
-    deliver(getattr(form, f"as_{format_name}")(results, style), output, format_name)
+    try:
+        contents = files(command, format_name, answers, style, output if output is not None and is_file else "")
+    except MissingExtraError as error:
+        fail(str(error))
+    for path, content in contents.items():
+        if isinstance(content, bytes):
+            write_file(path, content)
+        else:
+            deliver(content, path or None, format_name)
+
+
+def _format_of_output(command: str, output: str | None) -> str:
+    from bisar_budget.report.answers import format_of_file
+
+    return (format_of_file(command, output) if output is not None else None) or "text"
 
 
 def write_file(path: str, content: str | bytes) -> None:

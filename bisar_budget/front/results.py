@@ -10,7 +10,7 @@ from datetime import date
 from functools import cached_property, partial
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from bisar_budget import __version__, notebook
 from bisar_budget.arrays import Complexes
@@ -24,7 +24,8 @@ from bisar_budget.findings.specification import SpecificationSheet
 from bisar_budget.findings.status import exit_code
 from bisar_budget.json_types import JsonDocument
 from bisar_budget.mission.model import Mission
-from bisar_budget.report import FORMATS, Style, format_of, pictures, render
+from bisar_budget.report import FORMATS, Style, content, format_of, pictures, render
+from bisar_budget.report.answers import files, format_of_file, records_of, suffixes, written
 from bisar_budget.report.words.requirements import declared_words, requirement_lines, verdict
 from bisar_budget.report.words.sentences import allowable_words, matters, row_size, shown_use, use_words, waived_count
 from bisar_budget.resources import special_file
@@ -203,7 +204,7 @@ class CheckResult(Mapping[str, Row]):
         return _frame_of_rows(rows, library)
 
     def report(self, path: str | os.PathLike[str], detail: str = "summary") -> None:
-        """Write a report; the suffix .html, .md, .json, .csv, .xml, .sarif or .txt selects the format.
+        """Write a report; the suffix .html, .md, .json, .csv, .xlsx, .xml, .sarif or .txt selects the format.
 
         Parameters
         ----------
@@ -216,6 +217,8 @@ class CheckResult(Mapping[str, Row]):
         ------
         ValueError
             The suffix does not belong to a format of reports.
+        MissingExtraError
+            The format needs a package that is not installed.
         """
         name = os.fspath(path)
         form = format_of(name)
@@ -228,11 +231,11 @@ class CheckResult(Mapping[str, Row]):
             from bisar_budget.front.checks import with_sheets
 
             shown = shown._replace(missions=tuple(with_sheets(shown.missions, self.model, self.day)))
-        text = render(form, shown, style)
-        for picture, content in pictures(form, shown, style).items():
+        data = content(form, shown, style)
+        for picture, drawing in pictures(form, shown, style).items():
             os.makedirs(folder, exist_ok=True)
-            write_file(os.path.join(folder, picture), content)
-        write_file(name, text.encode())
+            write_file(os.path.join(folder, picture), drawing)
+        write_file(name, data)
 
     @property
     def _report(self) -> Report:
@@ -278,8 +281,12 @@ _SPECIFIED = ("key", "value", "ordered", "unit", "declared")
 # ---------------------------------------------------------------------- answers to other questions
 @dataclass(frozen=True, repr=False, eq=False)
 class _Answer:
-    """Base class of results, which wrap the findings `found` and have all attributes of `found`."""
+    """Base class of results, which wrap the findings `found` and have all attributes of `found`.
 
+    `COMMAND` is the command of the same answer. A notebook shows a result as `_repr_html_` of its class writes it.
+    """
+
+    COMMAND: ClassVar[str] = ""
     found: Any
 
     def __getattr__(self, name: str) -> Any:
@@ -291,15 +298,49 @@ class _Answer:
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *dir(self.found)} - set(dir(tuple)))
 
-    def _document(self) -> str:
-        from bisar_budget.report.formats.answers import as_json
-
-        return as_json([self.found], Style())
+    @property
+    def _answers(self) -> Sequence[object]:
+        """The answer in the form that the module of `report.answers` takes."""
+        return [self.found]
 
     def to_dict(self) -> JsonDocument:
         """Return, as a dictionary, the document that the command of the same name writes with `--format json`."""
-        document: JsonDocument = json.loads(self._document())
+        document: JsonDocument = json.loads(written(self.COMMAND, "json", self._answers, Style()))
         return document
+
+    def to_dataframe(self, library: str | None = None) -> DataFrame:
+        """Return, as a data frame of pandas or polars, the lines that the command writes with `--format csv`.
+
+        Numbers are in SI and radians.
+
+        Raises
+        ------
+        MissingPackageError
+            The library is not installed, or neither of the two is.
+        """
+        records = records_of(self.COMMAND, self._answers)
+        return frame_of({name: records.column(name) for name in records.columns}, library)
+
+    def report(self, path: str | os.PathLike[str]) -> None:
+        """Write the answer to a file; its suffix selects the format, such as .html, .md, .json, .csv, .xlsx or .txt.
+
+        Drawings of a .md file are written to a folder next to it.
+
+        Raises
+        ------
+        ValueError
+            The suffix belongs to no format of the answer.
+        MissingExtraError
+            The format needs a package that is not installed.
+        """
+        name = os.fspath(path)
+        form = format_of_file(self.COMMAND, name)
+        if form is None:
+            raise ValueError(f"{name}: the suffix must be one of {', '.join(suffixes(self.COMMAND))}")
+        for file, data in files(self.COMMAND, form, self._answers, Style(), name).items():
+            if folder := os.path.dirname(file):
+                os.makedirs(folder, exist_ok=True)
+            write_file(file, data if isinstance(data, bytes) else data.encode())
 
 
 def _waived(waivers: Sequence[Sequence[str]]) -> str:
@@ -318,6 +359,7 @@ class SolveResult(_Answer):
     names a part of the catalogue, it has `parts` with complying parts first, `complying` and `status`.
     """
 
+    COMMAND: ClassVar[str] = "solve"
     found: "Solution | Comparison"
 
     def __repr__(self) -> str:
@@ -357,6 +399,7 @@ class SolveResult(_Answer):
 class SensitivityResult(_Answer):
     """Result of `sensitivity`: `slopes` has the effect of each number on the worst utilization, largest first."""
 
+    COMMAND: ClassVar[str] = "sensitivity"
     found: "Sensitivity"
 
     def __repr__(self) -> str:

@@ -20,7 +20,8 @@ class Format(NamedTuple):
     """A report format: the module in this package that writes it, and the endings of its file names.
 
     The usual ending is first. `about` is the description of the format in `--help`. The docstring of this module
-    explains `is_piecewise` and `has_pictures`. A format with `is_illustrated` needs the mission and the images of
+    explains `is_piecewise` and `has_pictures`. Files of a format with `is_binary` are bytes, which no terminal shows. A
+    format with `is_illustrated` needs the mission and the images of
     verified limits. For other formats these are not kept in memory.
     """
 
@@ -31,6 +32,7 @@ class Format(NamedTuple):
     is_piecewise: bool = False
     is_illustrated: bool = False
     has_pictures: bool = False
+    is_binary: bool = False
 
 
 _FORMAT_ENTRIES = (
@@ -42,12 +44,13 @@ _FORMAT_ENTRIES = (
     Format("github", "formats.annotations", (), "annotations of a pull request"),
     Format("needs", "formats.traceability", (".needs.json",), "Sphinx-Needs"),
     Format(
-        "html", "compliance.html", (".html", ".htm"), "a compliance report for a review board", is_illustrated=True
+        "html", "answers.check", (".html", ".htm"), "a compliance report for a review board", is_illustrated=True
     ),
     Format(
-        "markdown", "compliance.markdown", (".md", ".markdown"), "the same with its drawings beside it",
+        "markdown", "answers.check", (".md", ".markdown"), "the same with its drawings beside it",
         is_illustrated=True, has_pictures=True,
     ),
+    Format("xlsx", "answers.check", (".xlsx",), "the same as a workbook", is_illustrated=True, is_binary=True),
 )  # fmt: skip
 FORMATS = {entry.name: entry for entry in _FORMAT_ENTRIES}
 
@@ -92,12 +95,26 @@ def _module(format_name: str) -> "ModuleType":
 
 
 def render(format_name: str, report: "Report", style: Style) -> str:
-    """Write a report in a format of `FORMATS`; the text ends with a newline."""
+    """Write a report in a format of `FORMATS` that is text; the text ends with a newline."""
     if FORMATS[format_name].is_piecewise:
         pieces = [piece(mission, format_name, style) for mission in report.missions]
         return joined(format_name, pieces, report.version, style)
     text: str = getattr(_module(format_name), f"as_{format_name}")(report, style)
     return text
+
+
+def content(format_name: str, report: "Report", style: Style) -> bytes:
+    """Write a report in a format of `FORMATS`, as the content of a file.
+
+    Raises
+    ------
+    MissingExtraError
+        The format needs a package that is not installed; the message names the command that installs it.
+    """
+    if not FORMATS[format_name].is_binary:
+        return render(format_name, report, style).encode()
+    data: bytes = getattr(_module(format_name), f"as_{format_name}")(report, style)
+    return data
 
 
 class Piece(NamedTuple):

@@ -22,7 +22,7 @@ from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.row import worst_first
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style, pictures, render
-from bisar_budget.report.compliance.document import (
+from bisar_budget.report.document import (
     Badge,
     Compliance,
     Facts,

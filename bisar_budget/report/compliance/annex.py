@@ -20,7 +20,7 @@ from bisar_budget.findings.monte_carlo import MonteCarlo
 from bisar_budget.findings.specification import SpecificationSheet
 from bisar_budget.findings.status import STATUS, complying
 from bisar_budget.findings.trade import Axis, Trade, TradeStudy
-from bisar_budget.report.compliance import document as doc
+from bisar_budget.report import document as doc
 from bisar_budget.report.compliance.rows import (
     Page,
     all_contributions,

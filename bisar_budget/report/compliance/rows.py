@@ -13,7 +13,7 @@ from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row, worst_first
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import Style
-from bisar_budget.report.compliance import document as doc
+from bisar_budget.report import document as doc
 from bisar_budget.report.words.identity import source_path
 from bisar_budget.report.words.sentences import (
     allowable_words,

@@ -16,7 +16,7 @@ from bisar_budget.mission.model import Document
 from bisar_budget.mission.platforms import Platforms
 from bisar_budget.mission.propagation import Propagation
 from bisar_budget.report import Style
-from bisar_budget.report.compliance import document as doc
+from bisar_budget.report import document as doc
 from bisar_budget.report.compliance.annex import annex, sources
 from bisar_budget.report.compliance.rows import (
     Page,
@@ -92,7 +92,7 @@ _COMBINATION_SENTENCES = {
 }
 
 
-def compliance(report: Report, style: Style) -> doc.Compliance:
+def compliance(report: Report, style: Style) -> doc.AnswerDocument:
     """Make the compliance report of a run as a document.
 
     Raises
@@ -128,7 +128,7 @@ def compliance(report: Report, style: Style) -> doc.Compliance:
     about.append(("Tool", f"bisar-budget {report.version}"))
     sections = [_index(index)] if count > 1 else []
     sections += [*missions, _provenance(report), _approval(report), *annexes]
-    return doc.Compliance(report.version, subject, doc.Facts(about), margins, sections)
+    return doc.AnswerDocument(report.version, subject, doc.Facts(about), margins, sections)
 
 
 # ---------------------------------------------------------------------- the run

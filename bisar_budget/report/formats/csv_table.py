@@ -73,7 +73,12 @@ _values_of = attrgetter(*_ROW_COLUMNS)
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
     """Write a line for each requirement and row of a mission, or for each fault of an unusable file."""
-    return csv_text(_faults(mission) if isinstance(mission, UnusableMission) else _rows(mission))
+    return csv_text(lines_of(mission))
+
+
+def lines_of(mission: MissionFindings | UnusableMission) -> Iterator[list[object]]:
+    """Yield the cells of each line about a mission, in the order of `CSV_COLUMNS`."""
+    return _faults(mission) if isinstance(mission, UnusableMission) else _rows(mission)
 
 
 def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:

@@ -14,7 +14,7 @@ from bisar_budget.findings.specification import MIN_ROOM_FRACTION, Broken, Speci
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.report import Style
-from bisar_budget.report.compliance import document as doc
+from bisar_budget.report import document as doc
 from bisar_budget.report.drawing.share_bars import LEAST_WEIGHT_FRACTION, limiting, share_bars
 from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.json_document import document_text, outside_item
@@ -236,19 +236,19 @@ def _side(figure: OfferedFigure) -> str:
 # ---------------------------------------------------------------- for a board, and a supplier
 def as_markdown(answers: Sequence[Answer], style: Style) -> str:
     """Write the sheets as Markdown, without drawings."""
-    from bisar_budget.report.compliance.markdown import markdown_document
+    from bisar_budget.report.renderers.markdown import markdown
 
-    return markdown_document(_sheets(answers), "")
+    return markdown(_sheets(answers), "")
 
 
 def as_html(answers: Sequence[Answer], style: Style) -> str:
     """Write the sheets as one page of HTML."""
-    from bisar_budget.report.compliance.html import page
+    from bisar_budget.report.renderers.html import page
 
     return page(_sheets(answers))
 
 
-def _sheets(answers: Sequence[Answer]) -> doc.Compliance:
+def _sheets(answers: Sequence[Answer]) -> doc.AnswerDocument:
     chapters = [_chapter(answer, f"sheet-{number}") for number, answer in enumerate(answers, 1)]
     names = [printable(sheet.name) for sheet, _ in answers]
     facts = doc.Facts([("Tool", f"bisar-budget {__version__}")])
@@ -257,7 +257,7 @@ def _sheets(answers: Sequence[Answer]) -> doc.Compliance:
         for chapter, name, (sheet, _) in zip(chapters, names, answers, strict=True)
     ]
     subject = names[0] if len(names) == 1 else f"{len(names)} missions"
-    return doc.Compliance(__version__, subject, facts, margins, chapters, title="Specification sheet")
+    return doc.AnswerDocument(__version__, subject, facts, margins, chapters, title="Specification sheet")
 
 
 def _chapter(answer: Answer, anchor: str) -> doc.Chapter:

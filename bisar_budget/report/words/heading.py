@@ -68,6 +68,11 @@ def _overrides(mission: AboutMission, *, with_changes: bool) -> list[str]:
     ]
 
 
+def other_overrides(mission: AboutMission) -> list[str]:
+    """Texts about the settings from outside the file other than `--set`, one for each."""
+    return _overrides(mission, with_changes=False)
+
+
 def overrides_lines(mission: AboutMission) -> list[str]:
     """Lines with the overrides other than `--set`, for a terminal.
 

@@ -1,10 +1,12 @@
-"""A report as data: chapters with blocks of text, tables and pictures, independent of the output language.
+"""An answer as data: chapters with blocks of text, tables and pictures, independent of the output format.
 
-The modules `html` and `markdown` write a document. Its texts are plain, and each module escapes them.
+The modules of `renderers/` write a document for a terminal, as Markdown, as HTML and as a workbook. Its texts are
+plain, and each renderer escapes them.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import compress
 
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report.explain.notation import WorkedEquation
@@ -121,12 +123,20 @@ class Items:
     is_numbered: bool = False
 
 
+TERMINAL, PAGE = "terminal", "page"  # media; a column or a block for neither is for both
+
+
 @dataclass(frozen=True, slots=True)
 class Head:
-    """The head of a table column. Its style is `number` (right-aligned), `id` or empty for text."""
+    """The head of a table column. Its style is `number` (right-aligned), `id` or empty for text.
+
+    `unit` is the unit of the numbers below it. If `medium` is `TERMINAL` or `PAGE`, only that medium has the column.
+    """
 
     text: Text
     style: str = ""
+    unit: str = ""
+    medium: str = ""
 
 
 def heads(*heads: Head | str) -> list[Head]:
@@ -134,9 +144,45 @@ def heads(*heads: Head | str) -> list[Head]:
     return [Head(head) if isinstance(head, str) else head for head in heads]
 
 
-def numbers(*heads: str) -> list[Head]:
-    """Make the heads of columns of numbers."""
-    return [Head(head, "number") for head in heads]
+def numbers(*heads: str, medium: str = "") -> list[Head]:
+    """Make the heads of columns of numbers, for one medium or for both."""
+    return [Head(head, "number", medium=medium) for head in heads]
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """The beginning of an answer: its verdict, the mission that it is about, and settings from outside the file.
+
+    `status` is a key of `STATUS`; it gives the colour of the verdict. `more` are texts that belong to the verdict.
+    `file` includes the values that options replace, `terms` names the model and the like, and `overrides` are the
+    other settings from outside the file. On a page, the name of the mission is the title of the chapter.
+    """
+
+    verdict: str
+    status: str
+    file: str
+    name: str
+    terms: str = ""
+    overrides: Sequence[str] = ()
+    more: Sequence[str] = ()
+
+    def page_blocks(self) -> "Iterator[Block]":
+        """Yield the blocks that a page has in place of the opening: the verdict, and named values below it."""
+        yield Paragraph(self.verdict, f"verdict {self.status}")
+        for text in self.more:
+            yield Paragraph(text)
+        pairs: list[tuple[Text, Text]] = [("File", Name(self.file))]
+        pairs += [("Terms", self.terms)] if self.terms else []
+        pairs += [("Overrides" if not number else "", text) for number, text in enumerate(self.overrides)]
+        yield Facts(pairs)
+
+
+@dataclass(frozen=True, slots=True)
+class Only:
+    """Blocks that only one medium shows, `TERMINAL` or `PAGE`."""
+
+    medium: str
+    blocks: Sequence["Block"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +197,14 @@ class TextTable:
     heads: Sequence[Head]
     rows: Sequence[Sequence[Text]]
     style: str = ""
+
+    def on(self, medium: str) -> "TextTable":
+        """Return the table with the columns that `medium` shows."""
+        shown = [head.medium in ("", medium) for head in self.heads]
+        if all(shown):
+            return self
+        heads, *rows = ([*compress(cells, shown)] for cells in (self.heads, *self.rows))
+        return replace(self, heads=heads, rows=rows)
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,7 +292,7 @@ class Chapter:
     is_listed: bool = True  # whether the contents list the chapter
 
 
-Block = Paragraph | Facts | Items | TextTable | Stack | Figure | Images | Steps | Group | Chapter
+Block = Opening | Only | Paragraph | Facts | Items | TextTable | Stack | Figure | Images | Steps | Group | Chapter
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,8 +309,8 @@ class Margins:
 
 
 @dataclass(frozen=True, slots=True)
-class Compliance:
-    """A whole report. `subject` is the name of the mission or the number of missions, `title` the kind of report."""
+class AnswerDocument:
+    """A whole answer. `subject` is the name of the mission or the number of missions, `title` the kind of answer."""
 
     version: str
     subject: str
@@ -266,12 +320,12 @@ class Compliance:
     title: str = "Compliance report"
 
 
-def blocks_of(block: Compliance | Block) -> Iterator[Block]:
+def blocks_of(block: AnswerDocument | Block) -> Iterator[Block]:
     """Yield all blocks of a report or a block in order, including nested blocks."""
     inner: Sequence[Block] = ()
-    if isinstance(block, Compliance):
+    if isinstance(block, AnswerDocument):
         inner = block.chapters
-    elif isinstance(block, Chapter | Group):
+    elif isinstance(block, Chapter | Group | Only):
         inner = block.blocks
     for child in inner:
         yield child

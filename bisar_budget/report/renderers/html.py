@@ -1,4 +1,4 @@
-"""The compliance report as an HTML page for light and dark screens and paper, without scripts or external files."""
+"""Write a document as an HTML page for light and dark screens and paper, without scripts or external files."""
 
 import re
 from base64 import b64encode
@@ -9,11 +9,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 from bisar_budget.faults import printable
-from bisar_budget.findings.mission import Report
 from bisar_budget.findings.status import STATUS
-from bisar_budget.report import Style
-from bisar_budget.report.compliance import document as doc
-from bisar_budget.report.compliance.summary import compliance
+from bisar_budget.report import document as doc
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.notation import Sum, WorkedEquation
 from bisar_budget.resources import resource
@@ -41,12 +38,7 @@ def _page() -> Template:
     return environment.get_template("report.html.j2")
 
 
-def as_html(report: Report, style: Style) -> str:
-    """Write the page of a compliance report."""
-    return page(compliance(report, style))
-
-
-def page(document: doc.Compliance) -> str:
+def page(document: doc.AnswerDocument) -> str:
     """Write the page of a document."""
     return _page().render(
         document=document,
@@ -111,8 +103,12 @@ def _block(block: doc.Block) -> Markup:
             return _element("dl", style, Markup("\n{}").format(Markup("").join(rows)))
         case doc.Items(items, style, is_numbered):
             return _element("ol" if is_numbered else "ul", style, Markup("\n").join(["", *map(_item, items), ""]))
+        case doc.Opening():
+            return _blocks(block.page_blocks())
+        case doc.Only(medium, blocks):
+            return _blocks(blocks if medium == doc.PAGE else ())
         case doc.TextTable():
-            return _table(block)
+            return _table(block.on(doc.PAGE))
         case doc.Stack():
             return _stack(block)
         case doc.Figure(title=title, style=style):
@@ -183,7 +179,10 @@ def _item(paragraphs: doc.Line) -> Markup:
 
 
 def _table(table: doc.TextTable) -> Markup:
-    heads = (_cell("th", head.text, "number" if head.style == "number" else "", "col") for head in table.heads)
+    heads = (
+        _cell("th", (head.text, f" [{head.unit}]") if head.unit else head.text, _head_style(head), "col")
+        for head in table.heads
+    )
     lines = [Markup("<caption>{}</caption>").format(_text(table.caption))]
     lines += [Markup("<thead><tr>{}</tr></thead>").format(Markup("").join(heads)), Markup("<tbody>")]
     styles = [head.style for head in table.heads]
@@ -193,6 +192,10 @@ def _table(table: doc.TextTable) -> Markup:
         lines.append(Markup("<tr>{}</tr>").format(Markup("").join(cells)))
     element = _element("table", table.style, Markup("\n").join(["", *lines, Markup("</tbody>\n")]))
     return _scroll(table.label, element) if table.label else element
+
+
+def _head_style(head: doc.Head) -> str:
+    return "number" if head.style == "number" else ""
 
 
 def _stack(stack: doc.Stack) -> Markup:

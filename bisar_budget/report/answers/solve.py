@@ -1,59 +1,79 @@
-"""Write the answers of the commands solve and sensitivity as text and as JSON: `solve/1` and `sensitivity/1`."""
+"""The answer of the command solve: the borders of compliance of a number, or a comparison of catalogue parts."""
 
-import math
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from bisar_budget.design.compare import Comparison, PartState
-from bisar_budget.design.sensitivity import MIN_SHOWN_CHANGE_FRACTION, Relaxed, Sensitivity, Slope
 from bisar_budget.design.solve import Crossing, Imaged, Solution, State
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.formats.json_document import document_text, outside_item, verdict_item
-from bisar_budget.report.words.heading import title_lines
-from bisar_budget.report.words.sentences import (
-    BINDING_WORDS,
-    counted,
-    percent,
-    table,
-    use_words,
-    waived_count,
-    waiver_names,
-    wrapped,
-)
+from bisar_budget.report import document as doc
+from bisar_budget.report.answers import Records
+from bisar_budget.report.answers.words import mission_chapter, mission_document, opening
+from bisar_budget.report.formats.json_document import outside_item, verdict_item
+from bisar_budget.report.words.sentences import percent, use_words, waived_count, waiver_names
 from bisar_budget.units import format_quantity
 
-_SGR = {"crossing": "32", "all": "32", "some": "32", "waived": STATUS["waived"].sgr, "none": "1;31"}
+_STATUSES = {"crossing": "pass", "all": "pass", "some": "pass", "waived": "waived", "none": "fail"}  # for the colour
 
-Answer = Solution | Comparison | Sensitivity
-
-
-def as_json(answers: Sequence[Answer], style: Style) -> str:
-    """Write `solve/1` or `sensitivity/1`, depending on the answers. Values are in SI; a missing value is null."""
-    command = "sensitivity" if isinstance(answers[0], Sensitivity) else "solve"
-    missions = [
-        {"file": answer.file, "name": answer.name, **outside_item(answer), **_document(answer)} for answer in answers
-    ]
-    return document_text(f"bisar-budget/{command}/1", {"missions": missions})
+Answer = Solution | Comparison
 
 
-def _document(answer: Answer) -> dict[str, object]:
-    if isinstance(answer, Sensitivity):
-        return _ranked(answer)
-    return _solved(answer) if isinstance(answer, Solution) else _compared(answer)
+# ---------------------------------------------------------------- for programs
+def content(answers: Sequence[Answer]) -> dict[str, object]:
+    """Content of the JSON document `solve/1`. Values are in SI; a missing value is null."""
+    return {"missions": [_item(answer) for answer in answers]}
 
 
-def as_text(answers: Sequence[Answer], style: Style) -> str:
-    """Write each answer as text for a terminal: crossings, a table of parts, or a table of slopes."""
-    return "\n\n".join("\n".join(_lines(answer, style)) for answer in answers) + "\n"
+def _item(answer: Answer) -> dict[str, object]:
+    item = _solved(answer) if isinstance(answer, Solution) else _compared(answer)
+    return {"file": answer.file, "name": answer.name, **outside_item(answer), **item}
 
 
-def _lines(answer: Answer, style: Style) -> Iterator[str]:
-    if isinstance(answer, Sensitivity):
-        return _lines_of_numbers(answer, style)
-    return _lines_of_crossings(answer, style) if isinstance(answer, Solution) else _lines_of_parts(answer, style)
+_OF_STATE = ("status", "row", "requirement", "utilization", "reason")
+
+
+def records(answers: Sequence[Answer]) -> Records:
+    """Table of the answers: one line for each crossing, or for each part of the catalogue.
+
+    A search without a crossing has one line without a value. The columns about `inside` are those of the last value
+    that complies, and the columns about `outside` are those of the next value, which does not comply.
+    """
+    if any(isinstance(answer, Comparison) for answer in answers):
+        return Records(_PART_COLUMNS, [line for answer in answers for line in _part_lines(_item(answer))])
+    return Records(_CROSSING_COLUMNS, [line for answer in answers for line in _crossing_lines(_item(answer))])
+
+
+_OF_ANSWER = ("file", "name", "key", "unit", "target", "model", "status")
+_CROSSING_COLUMNS = (
+    *_OF_ANSWER, "value", "complies", "is_verified",
+    *(f"{side}_{name}" for side in ("inside", "outside") for name in ("value", *_OF_STATE)),
+)  # fmt: skip
+_PART_COLUMNS = (
+    *(name for name in _OF_ANSWER if name not in ("unit", "status")), "part", "part_name", "kind", "is_given",
+    *_OF_STATE, "own_row", "own_utilization", "waived_by",
+)  # fmt: skip
+
+
+def _crossing_lines(item: Mapping[str, Any]) -> Iterator[dict[str, object]]:
+    answer = {name: item[name] for name in _OF_ANSWER}
+    for crossing in item["crossings"]:
+        sides = {
+            f"{side}_{name}": crossing[side][name] for side in ("inside", "outside") for name in ("value", *_OF_STATE)
+        }
+        yield {**answer, **{name: crossing[name] for name in ("value", "complies", "is_verified")}, **sides}
+    if not item["crossings"]:
+        yield answer
+
+
+def _part_lines(item: Mapping[str, Any]) -> Iterator[dict[str, object]]:
+    answer = {name: item[name] for name in _OF_ANSWER if name not in ("unit", "status")}
+    for part in item["parts"]:
+        line = {name: part[name] for name in (*_OF_STATE, "kind", "is_given", "own_row", "own_utilization")}
+        names = {"part": part["id"], "part_name": part["name"], "waived_by": "; ".join(part["waived_by"]) or None}
+        yield {**answer, **names, **line}
 
 
 def _solved(solution: Solution) -> dict[str, object]:
@@ -161,48 +181,60 @@ def _state(state: State) -> dict[str, object]:
     return {**state._asdict(), "reason": state.reason or None, "waived_by": list(state.waived_by)}
 
 
-def _lines_of_parts(comparison: Comparison, style: Style) -> Iterator[str]:
-    """Yield the lines of a comparison: verdict, table of catalogue parts with their utilization, and footnotes."""
+# ---------------------------------------------------------------- for people
+def document(answers: Sequence[Answer], style: Style) -> doc.AnswerDocument:
+    """Text of each answer: its crossings, or a table of catalogue parts."""
+    chapters = [
+        mission_chapter(
+            answer, number, _crossing_blocks(answer) if isinstance(answer, Solution) else _part_blocks(answer)
+        )
+        for number, answer in enumerate(answers, 1)
+    ]
+    return mission_document("Design value", answers, chapters)
+
+
+def _part_blocks(comparison: Comparison) -> Iterator[doc.Block]:
+    """Yield the blocks of a comparison: verdict, table of catalogue parts with their utilization, and remarks."""
     count, total = len(comparison.complying), len(comparison.parts)
     subject = f"row {printable(comparison.row)} complies" if comparison.row else "the mission complies"
     verdict = f"{subject} with {count} of {total} parts" if count else f"{subject} with none of {total} parts"
     if standings := [state.standing for state in comparison.parts if state.standing.status == "waived"]:
         waivers = tuple(dict.fromkeys(waiver for standing in standings for waiver in standing.waived_by))
         verdict += f", {waived_count(len(standings), waivers)}"
-    remark = f"; {comparison.model} model{', neither fails nor warns' if comparison.target == 'warn' else ''}"
-    yield from title_lines(
-        comparison, f"{printable(comparison.key)}: {verdict}", _SGR[comparison.status], style, remark=remark
-    )
+    terms = f"{comparison.model} model{', neither fails nor warns' if comparison.target == 'warn' else ''}"
+    status = _STATUSES[comparison.status]
+    yield opening(comparison, f"{printable(comparison.key)}: {verdict}", status, terms)
     is_mixed = len({state.kind for state in comparison.parts}) > 1
-    rows = [["part", *(["kind"] if is_mixed else []), "status", "use", ""]]
+    heads = doc.heads("part", *(["kind"] if is_mixed else []), "status", *doc.numbers("use"), "decided by")
+    rows: list[doc.Line] = []
     for state in comparison.parts:
         standing = state.standing
         row = printable(state.reason) if state.reason else standing.row or _undecided(standing.requirement)
         row += f" ({waiver_names(standing.waived_by)})" if standing.waived_by else ""
         marks = f"{' *' if state.is_given else ''}{' -' if state.silent_on else ''}"
         kind = [state.kind] if is_mixed else []
-        rows.append([f"{state.id}{marks}", *kind, STATUS[standing.status].text, use_words(standing.utilization), row])
-    yield from table(rows, style.table_width)
-    yield ""
+        rows.append([f"{state.id}{marks}", *kind, doc.Badge(standing.status), use_words(standing.utilization), row])
+    yield doc.TextTable("Parts", "Parts of the catalogue", heads, rows)
+    yield doc.Items([[text] for text in _part_remarks(comparison)])
+
+
+def _part_remarks(comparison: Comparison) -> Iterator[str]:
     if any(state.is_given for state in comparison.parts):
         stays = "; the part of the other kind is kept" if comparison.kept else ""
-        yield from wrapped(f"*  named by the file{stays}", "   ")
+        yield f"*  named by the file{stays}"
     if any(state.silent_on for state in comparison.parts):
-        yield from wrapped("-  lacks figures that other parts have: these errors are not declared", "   ")
-    yield from wrapped(
-        "Parts that comply come first, smallest margin first; then those that do not, nearest miss first.", "  "
-    )
+        yield "-  lacks figures that other parts have: these errors are not declared"
+    yield "Parts that comply come first, smallest margin first; then those that do not, nearest miss first."
     if comparison.overridden:
-        yield from wrapped(f"Stated by the file itself, with every part: {', '.join(comparison.overridden)}.", "  ")
+        yield f"Stated by the file itself, with every part: {', '.join(comparison.overridden)}."
     if comparison.imaged is not None:
-        yield from wrapped(f"Imaged: {_shown(comparison.imaged)}.", "  ")
+        yield f"Imaged: {_shown(comparison.imaged)}."
 
 
-def _lines_of_crossings(solution: Solution, style: Style) -> Iterator[str]:
+def _crossing_blocks(solution: Solution) -> Iterator[doc.Block]:
     verdict = f"{_key_words(solution)}: {_range_words(solution)}"
-    yield from title_lines(solution, verdict, _SGR[solution.status], style)
-    for name, text in _facts(solution):
-        yield from wrapped(f"{name:<12} {text}", " " * 13)
+    yield opening(solution, verdict, _STATUSES[solution.status])
+    yield doc.Facts(list(_facts(solution)))
 
 
 def _key_words(solution: Solution) -> str:
@@ -327,179 +359,3 @@ def _resolution(crossing: Crossing) -> str:
         return ""
     sizes = (format_quantity(size, "m") for size in (state.range_resolution_m, state.cross_range_resolution_m))
     return "; resolution {} range, {} cross range".format(*sizes)
-
-
-def _ranked(sensitivity: Sensitivity) -> dict[str, object]:
-    return {
-        "model": sensitivity.model,
-        "status": sensitivity.status,
-        "worst_row": sensitivity.worst_row,
-        "binding_requirement": sensitivity.requirement,
-        "utilization": sensitivity.utilization,
-        "row": sensitivity.row,
-        "row_utilization": sensitivity.row_utilization,
-        "numbers": [_slope(slope) | {"to_limit": sensitivity.to_limit(slope)} for slope in sensitivity.slopes],
-        "without_effect": list(sensitivity.unchanging),
-        "skipped": [skipped._asdict() for skipped in sensitivity.skipped],
-        "relaxed": [_relaxed(relaxed) for relaxed in sensitivity.relaxed] if sensitivity.is_balanced else None,
-    }
-
-
-def _slope(slope: Slope) -> dict[str, object]:
-    return {
-        "key": slope.key,
-        "text": slope.text,
-        "value": slope.value,
-        "unit": slope.unit,
-        "per": slope.per_text,
-        "per_value": slope.per,
-        "step": slope.step,
-        "difference": slope.difference,
-        "utilization_change": slope.change,
-        "row_change": slope.row_change,
-        "worst_row_below": slope.row_below,
-        "worst_row_above": slope.row_above,
-        "is_mixed": slope.is_mixed,
-        "part": slope.part or None,
-    }
-
-
-def _relaxed(relaxed: Relaxed) -> dict[str, object]:
-    def platform(change: tuple[str, float, float] | None) -> dict[str, object] | None:
-        return None if change is None else dict(zip(("row", "before", "after"), change, strict=True))
-
-    return {
-        "key": relaxed.key,
-        "share_transmitter": {"before": relaxed.shares_before[0], "after": relaxed.shares_after[0]},
-        "share_receiver": {"before": relaxed.shares_before[1], "after": relaxed.shares_after[1]},
-        "transmitter": platform(relaxed.transmitter),
-        "receiver": platform(relaxed.receiver),
-    }
-
-
-def _lines_of_numbers(sensitivity: Sensitivity, style: Style) -> Iterator[str]:
-    """Yield the lines of a sensitivity analysis. The number with the smallest change to the limit is first."""
-    status = STATUS[sensitivity.status]
-    requirement = BINDING_WORDS.get(sensitivity.requirement, sensitivity.requirement.replace("_", " "))
-    text = f"worst utilization {percent(sensitivity.utilization)}: {printable(sensitivity.worst_row)} ({requirement})"
-    row_text = []
-    if sensitivity.row is not None and sensitivity.row_utilization is not None:
-        row_text = [f"row {printable(sensitivity.row)}: {percent(sensitivity.row_utilization)}"]
-    remark = f": {status.text}, {sensitivity.model} model"
-    yield from title_lines(sensitivity, text, status.sgr, style, more=row_text, remark=remark)
-    yield from _table(sensitivity, style)
-    yield from _notes(sensitivity)
-    if sensitivity.is_balanced:
-        yield ""
-        yield from _balance(sensitivity, style)
-
-
-def _table(sensitivity: Sensitivity, style: Style) -> Iterator[str]:
-    shown = sensitivity.shown
-    if not shown:
-        yield "No number of the file changes the utilization."
-        return
-    row_head = [] if sensitivity.row is None else ["of the row"]
-    rows = [["key", "value", "to limit", "per", "worst", *row_head, ""]]
-    for slope in shown:
-        row_cell = [] if slope.row_change is None else [_points(slope.row_change)]
-        mixed = next((row for row in (slope.row_above, slope.row_below) if row != sensitivity.worst_row), "")
-        note = f"({printable(mixed)})" if slope.is_mixed else ""
-        rows.append(
-            [
-                printable(slope.key),
-                printable(slope.given),
-                to_limit(sensitivity, slope),
-                slope.per_text,
-                _points(slope.change),
-                *row_cell,
-                note,
-            ]
-        )
-    yield from table(rows, style.table_width)
-    yield ""
-    yield from wrapped(
-        "to limit: change of this number alone that brings the utilization to 100 %, extrapolated from its slope "
-        "here; smallest first. worst: change of the utilization in percentage points when the number grows by the "
-        "step under per; a negative value becomes more negative.",
-        "  ",
-    )
-
-
-def to_limit(sensitivity: Sensitivity, slope: Slope) -> str:
-    """Text with the change in a number of the mission file that uses up the margin.
-
-    The change is in percent, degrees or dB, or a factor if the number changes tenfold or more. It is a hyphen if no
-    change does so.
-    """
-    change = sensitivity.to_limit(slope)
-    if change is None:
-        return "-"
-    if slope.is_proportional:
-        ratio = change / slope.value
-        return f"{100 * ratio:+.3g} %" if -0.99 < ratio < 9 else f"x {float(f'{1 + ratio:.3g}'):g}"
-    return f"{change:+.3g} dB" if slope.per_text.endswith("dB") else f"{math.degrees(change):+.3g} deg"
-
-
-def _points(change: float) -> str:
-    return f"{100 * change:+.3g}" if change else "0"
-
-
-def _notes(sensitivity: Sensitivity) -> Iterator[str]:
-    shown = sensitivity.shown
-    if any(slope.is_mixed for slope in shown):
-        yield from wrapped(
-            "In parentheses: the worst row on the other side of the value. The change combines the slopes of both.",
-            "  ",
-        )
-    if negligible := len(sensitivity.slopes) - len(shown):
-        yield f"Effect below a ten-thousandth of it: {counted(negligible, 'number')} (JSON lists them)."
-    if sensitivity.unchanging:
-        yield f"Without effect: {counted(len(sensitivity.unchanging), 'number')} (JSON lists them)."
-    if sensitivity.skipped:
-        kinds = ", ".join(
-            dict.fromkeys(re.split("[:;]", skipped.reason)[0].removeprefix("is ") for skipped in sensitivity.skipped)
-        )
-        yield from wrapped(f"Left out: {len(sensitivity.skipped)} keys ({kinds}).", "  ")
-
-
-def _balance(sensitivity: Sensitivity, style: Style) -> Iterator[str]:
-    moving_errors = [error for error in sensitivity.relaxed if error.moves_shares]
-    if not moving_errors:
-        yield "Shares are balanced; doubling an error does not change them."
-        return
-    yield from wrapped("Shares are balanced. Cost of doubling an error for the other errors:", "  ")
-    yield ""
-    rows = [["doubled", "shares t/r", "transmitter", "receiver", ""]]
-    for error in moving_errors:
-        shares = [
-            "/".join(f"{100 * share:.3g}" for share in platform_shares)
-            for platform_shares in (error.shares_before, error.shares_after)
-        ]
-        rows.append(
-            [
-                printable(error.key),
-                " -> ".join(shares),
-                _change_words(error.transmitter),
-                _change_words(error.receiver),
-                "",
-            ]
-        )
-    yield from table(rows, style.table_width)
-    yield ""
-    yield from wrapped(
-        "For each platform the worst utilization of its other errors, before and after; shares in percent.", "  "
-    )
-    if unmoved := len(sensitivity.relaxed) - len(moving_errors):
-        yield f"Doubling does not change the shares for {counted(unmoved, 'other error')}."
-
-
-def _change_words(change: tuple[str, float, float] | None) -> str:
-    if change is None:
-        return "-"
-    _, before, after = change
-    return (
-        percent(before)
-        if abs(after - before) <= MIN_SHOWN_CHANGE_FRACTION * before
-        else f"{percent(before)} -> {percent(after)}"
-    )

@@ -1,14 +1,11 @@
-"""The compliance report as Markdown for GitHub, readable as plain text; its drawings are separate files."""
+"""Write a document as Markdown for GitHub, readable as plain text; its drawings are separate files."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from html import escape, unescape
 
 from bisar_budget.faults import printable
-from bisar_budget.findings.mission import Report
-from bisar_budget.report import Style
-from bisar_budget.report.compliance import document as doc
-from bisar_budget.report.compliance.summary import compliance
+from bisar_budget.report import document as doc
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.notation import Sum, WorkedEquation
 from bisar_budget.report.words.sentences import markdown_row, markdown_text, uri
@@ -18,22 +15,17 @@ _BRACKETED = {"own-id": " ({})", "origin": "({})"}
 _DESCRIPTION = re.compile("<desc[^>]*>(.*?)</desc>", re.DOTALL)
 
 
-def as_markdown(report: Report, style: Style) -> str:
-    """Write the report, with links to the drawings in the folder `style.assets`."""
-    return markdown_document(compliance(report, style), uri(style.assets))
-
-
-def markdown_document(document: doc.Compliance, assets: str) -> str:
+def markdown(document: doc.AnswerDocument, assets: str) -> str:
     """Write a document. `assets` is the folder of its drawings; if empty, the document has no drawings."""
     subject = "Motion-measurement error budget, bistatic SAR."
-    texts = [f"# {document.title}", subject, *_blocks([document.facts, *document.chapters], assets)]
+    texts = [f"# {document.title}", subject, *_blocks([document.facts, *document.chapters], uri(assets))]
     return "\n\n".join(text.rstrip("\n") for text in texts if text) + "\n"
 
 
-def pictures(report: Report, style: Style) -> Mapping[str, bytes]:
-    """Return the drawings and images of the report by the names of their files."""
+def pictures(document: doc.AnswerDocument) -> Mapping[str, bytes]:
+    """Return the drawings and images of a document by the names of their files."""
     files: dict[str, bytes] = {}
-    for block in doc.blocks_of(compliance(report, style)):
+    for block in doc.blocks_of(document):
         if isinstance(block, doc.Figure):
             files[block.name] = block.svg.encode()
         elif isinstance(block, doc.Images):
@@ -104,12 +96,16 @@ def _block(block: doc.Block, assets: str, is_introduced: bool) -> Iterator[str]:
                 yield f"{number}. " + "\n\n   ".join(map(_text, paragraphs))
         case doc.Items(items):
             yield "\n".join(f"- {' '.join(map(_text, paragraphs))}" for paragraphs in items)
+        case doc.Opening():
+            yield from _blocks(block.page_blocks(), assets)
+        case doc.Only(medium, inner):
+            yield from _blocks(inner if medium == doc.PAGE else (), assets)
         case doc.TextTable():
             if not is_introduced:
                 caption = _text(block.caption)
                 is_sentence = ":" in caption or caption.endswith(".")
                 yield f"{caption.removesuffix('.')}." if is_sentence else f"{caption}:"
-            yield _table(block)
+            yield _table(block.on(doc.PAGE))
         case doc.Figure(title=title):
             if assets:
                 yield f"![{_text(title)}]({assets}/{block.name})"
@@ -145,7 +141,7 @@ def _facts(pairs: Iterable[tuple[doc.Text, doc.Text]]) -> Iterator[str]:
 
 
 def _table(table: doc.TextTable) -> str:
-    heads = [_text(head.text) for head in table.heads]
+    heads = [_text((head.text, f" [{head.unit}]") if head.unit else head.text) for head in table.heads]
     rules = ["---:" if head.style == "number" else "---" for head in table.heads]
     rows = [[_text(cell, badge="{}") for cell in row] for row in table.rows]
     return "\n".join(map(markdown_row, (heads, rules, *rows)))

@@ -1,0 +1,134 @@
+"""Write the answer of any command in any format. The table of answers names the module of each.
+
+The module of an answer has three functions, each of which takes the sequence of answers, one for each mission:
+
+- `content(answers)` returns the content of the JSON document, without its first keys `format` and `version`;
+- `records(answers)` returns the table of numbers for CSV, data frames and workbooks, in SI units and radians;
+- `document(answers, style)` returns the text of the answer, for a terminal, Markdown, HTML and workbooks.
+
+A format that only one answer has is a function `as_NAME(answers, style)` of its module, such as `as_sdoc`.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from bisar_budget.report import Style
+
+
+class AnswerForm(NamedTuple):
+    """The answer of a command: the module in this package that describes it, and formats that only it has."""
+
+    command: str
+    module: str
+    own_formats: tuple[str, ...] = ()
+
+    @property
+    def formats(self) -> tuple[str, ...]:
+        """Names of all formats of the answer."""
+        return (*COMMON_FORMATS, *self.own_formats)
+
+
+COMMON_FORMATS = ("text", "json", "csv", "markdown", "html", "xlsx")
+ANSWERS = {
+    form.command: form
+    for form in (
+        AnswerForm("solve", "solve"),
+        AnswerForm("sensitivity", "sensitivity"),
+    )
+}
+_SUFFIXES = {
+    ".txt": "text", ".json": "json", ".csv": "csv", ".md": "markdown", ".markdown": "markdown", ".html": "html",
+    ".htm": "html", ".xlsx": "xlsx", ".needs.json": "needs", ".sdoc": "sdoc", ".ics": "ics",
+}  # fmt: skip
+
+
+class Records(NamedTuple):
+    """A table of numbers and short texts: the names of its columns, and one mapping of them for each line."""
+
+    columns: Sequence[str]
+    lines: Sequence[Mapping[str, object]]
+
+    def column(self, name: str) -> list[object]:
+        """Values of a column; None for a line without a value."""
+        return [line.get(name) for line in self.lines]
+
+
+def suffixes(command: str) -> dict[str, str]:
+    """Formats of the answer of a command, by the suffixes of their files."""
+    return {suffix: name for suffix, name in _SUFFIXES.items() if name in ANSWERS[command].formats}
+
+
+def format_of_file(command: str, name: str) -> str | None:
+    """Find the format of an answer for a file name such as `limits.csv`; None if the suffix belongs to no format."""
+    lowered = name.lower()
+    matches = [suffix for suffix in suffixes(command) if lowered.endswith(suffix)]
+    return _SUFFIXES[max(matches, key=len)] if matches else None
+
+
+def module_of(command: str) -> "ModuleType":
+    """Return the module that describes the answer of a command. It is imported at its first use."""
+    return import_module(f"bisar_budget.report.answers.{ANSWERS[command].module}")
+
+
+def records_of(command: str, answers: Sequence[Any]) -> Records:
+    """Return the table of an answer."""
+    records: Records = module_of(command).records(answers)
+    return records
+
+
+def written(command: str, format_name: str, answers: Sequence[Any], style: "Style") -> str | bytes:
+    """Write answers of a command, one for each mission, in one of its formats, without the drawings of Markdown.
+
+    Texts end with a newline. A workbook is bytes.
+
+    Raises
+    ------
+    MissingExtraError
+        The format needs a package that is not installed; the message names the command that installs it.
+    """
+    return files(command, format_name, answers, style, "")[""]
+
+
+def files(
+    command: str, format_name: str, answers: Sequence[Any], style: "Style", path: str
+) -> dict[str, str | bytes]:
+    """Write answers of a command to be stored in the file `path`.
+
+    Returns the content of each file by its path: the drawings of Markdown, which are in a folder beside the file, and
+    the file itself at the end. If `path` is empty, there are no drawings. Errors are those of `written`.
+    """
+    module = module_of(command)
+    if format_name in ANSWERS[command].own_formats:
+        return {path: getattr(module, f"as_{format_name}")(answers, style)}
+    if format_name == "json":
+        from bisar_budget.report.formats.json_document import document_text
+
+        return {path: document_text(f"bisar-budget/{command}/1", module.content(answers))}
+    if format_name == "csv":
+        from bisar_budget.report.renderers.csv import csv_of
+
+        return {path: csv_of(module.records(answers))}
+    document = module.document(answers, style)
+    if format_name == "xlsx":
+        from bisar_budget.report.renderers.xlsx import workbook
+
+        return {path: workbook(document, module.records(answers))}
+    if format_name == "html":
+        from bisar_budget.report.renderers.html import page
+
+        return {path: page(document)}
+    if format_name == "markdown":
+        from bisar_budget.report.renderers.markdown import markdown, pictures
+
+        drawings = pictures(document) if path else {}
+        folder = f"{os.path.splitext(path)[0]}.assets" if drawings else ""
+        text = markdown(document, os.path.basename(folder))
+        return {**{os.path.join(folder, name): drawing for name, drawing in drawings.items()}, path: text}
+    from bisar_budget.report.renderers.text import text as terminal_text
+
+    return {path: terminal_text(document, style)}

@@ -1,0 +1,129 @@
+"""Write a document for a terminal: aligned tables, wrapped sentences, and colours for verdicts and statuses."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from bisar_budget.faults import printable
+from bisar_budget.findings.status import STATUS
+from bisar_budget.report import Style
+from bisar_budget.report import document as doc
+from bisar_budget.report.words.sentences import TEXT_WIDTH, aligned, wrapped
+
+_MIN_NAME_WIDTH = 12  # of the names of facts
+_VERDICT_SGR = {"optimistic": "1;31", "confirmed": "32", "conservative": "33"}  # of images; others are of `STATUS`
+_VERDICT_WORDS = {"not_evaluated": "not eval"}
+
+
+def text(document: doc.AnswerDocument, style: Style) -> str:
+    """Write a document as text. Lines are at most 80 columns wide, and those of tables `style.table_width`."""
+    chapters = ("\n".join(_lines(chapter.blocks, style)) for chapter in document.chapters)
+    return "\n\n".join(chapters) + "\n"
+
+
+# ---------------------------------------------------------------------- parts of a line
+def plain(line: doc.Text) -> str:
+    """Write a text without its marks. Bars and colour keys, which repeat numbers, are left out."""
+    match line:
+        case tuple():
+            return "".join(map(plain, line))
+        case doc.Styled(_, inner):
+            return plain(inner)
+        case doc.Badge(status):
+            return _badge_words(status)
+        case doc.Use() | doc.Bar() | doc.Swatch():
+            return ""
+        case doc.Name(words) | doc.Code(words):
+            return printable(words)
+    return printable(line)
+
+
+def _badge_words(status: str) -> str:
+    return STATUS[status].text if status in STATUS else status.replace("_", " ")
+
+
+def _sgr(status: str) -> str:
+    return STATUS[status].sgr if status in STATUS else _VERDICT_SGR.get(status, "0")
+
+
+# ---------------------------------------------------------------------- blocks
+def _lines(blocks: Iterable[doc.Block], style: Style) -> Iterator[str]:
+    """Yield the lines of blocks, with an empty line between two blocks."""
+    is_first = True
+    for block in blocks:
+        for number, line in enumerate(_block(block, style)):
+            if not (number or is_first):
+                yield ""
+            yield line
+            is_first = False
+
+
+def _block(block: doc.Block, style: Style) -> Iterator[str]:
+    match block:
+        case doc.Opening():
+            yield from _opening(block, style)
+        case doc.Only(doc.TERMINAL, blocks):
+            yield from _lines(blocks, style)
+        case doc.Paragraph(words, paragraph_style):
+            first, *more = wrapped(plain(words), "  ")
+            is_verdict = paragraph_style.startswith("verdict ")
+            yield style.coloured(first, _sgr(paragraph_style.removeprefix("verdict "))) if is_verdict else first
+            yield from more
+        case doc.Facts(pairs):
+            width = max([_MIN_NAME_WIDTH, *(len(plain(name)) for name, _ in pairs)])
+            for name, value in pairs:
+                yield from wrapped(f"{plain(name):<{width}} {plain(value)}", " " * (width + 1))
+        case doc.Items(items, is_numbered=is_numbered):
+            for number, paragraphs in enumerate(items, start=1):
+                start = f"{number}. " if is_numbered else ""
+                yield from wrapped(start + " ".join(map(plain, paragraphs)), "  ")
+        case doc.TextTable():
+            yield from _table(block.on(doc.TERMINAL), style)
+        case doc.Group(_, blocks, heading):
+            yield from [plain(heading)] if heading else []
+            yield from _lines(blocks, style)
+        case doc.Chapter(title, blocks):
+            yield from wrapped(plain(title), "  ")
+            yield ""
+            yield from _lines(blocks, style)
+
+
+def _opening(opening: doc.Opening, style: Style) -> Iterator[str]:
+    first, *continuation = wrapped(printable(opening.verdict), "  ")
+    yield style.coloured(first, STATUS[opening.status].sgr)
+    yield from continuation
+    terms = f"; {opening.terms}" if opening.terms else ""
+    for words in (*opening.more, f"{opening.file}, {opening.name}{terms}"):
+        yield from wrapped(printable(words), "  ")
+    line = f"Overrides: {'; '.join(opening.overrides)}"
+    if len(line) <= TEXT_WIDTH or len(opening.overrides) < 2:
+        yield from wrapped(line, "  ") if opening.overrides else []
+        return
+    yield "Overrides:"
+    for override in opening.overrides:
+        yield from wrapped(f"  {override}", "    ")
+
+
+def _table(table: doc.TextTable, style: Style) -> Iterator[str]:
+    """Yield the lines of a table. Statuses have a colour; a missing value is a hyphen instead of a dash."""
+    heads = [[plain(head.text) for head in table.heads]]
+    heads += [[head.unit for head in table.heads]] if any(head.unit for head in table.heads) else []
+    cells = [["-" if cell == "–" else cell for cell in map(plain, row)] for row in table.rows]
+    sides = "".join(">" if head.style == "number" else "<" for head in table.heads)
+    lines_of_rows = list(aligned([*heads, *cells], style.table_width, sides))
+    for lines in lines_of_rows[: len(heads)]:
+        yield from lines
+    for row, lines in zip(table.rows, lines_of_rows[len(heads) :], strict=True):
+        yield from _coloured(row, lines, style)
+
+
+def _coloured(row: doc.Line, lines: Sequence[str], style: Style) -> Iterator[str]:
+    if not style.color:
+        yield from lines
+        return
+    *above, line = lines
+    for place, cell in enumerate(row):
+        if isinstance(cell, doc.Badge):
+            word = _badge_words(cell.status)
+            start = "" if not place else " "
+            line = line.replace(f"{start}{word}", start + style.coloured(word, _sgr(cell.status)), 1)
+    yield from above
+    yield line
