@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, ask_each, format_option
+from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, SET, answer_options, ask_each
 from bisar_budget.cli.streams import (
     BROKEN_EXIT_CODE,
     MISSION_SUFFIXES,
     complain,
-    deliver_found,
+    deliver_answer,
     expand,
     fail,
     load_all,
@@ -54,11 +54,7 @@ if TYPE_CHECKING:
 @MODEL
 @SET
 @DATE
-@format_option(
-    ("text", "json", "csv", "markdown", "html", "needs", "sdoc"),
-    "Format of the sheet; needs and sdoc are requirements for Sphinx-Needs and StrictDoc.",
-)
-@OUTPUT
+@answer_options("allocate", "needs and sdoc are requirements for Sphinx-Needs and StrictDoc.")
 def allocate(
     missions: Sequence[str],
     keys: Sequence[str],
@@ -67,7 +63,7 @@ def allocate(
     model: str | None,
     changes: "tuple[SetValue, ...]",
     today: datetime | None,
-    format_name: str,
+    format_name: str | None,
     output: str | None,
 ) -> None:
     """Find specifications for the errors of a mission that together meet every requirement.
@@ -91,7 +87,6 @@ def allocate(
     if (twice := next((key for place, key in enumerate(keys) if key in keys[:place]), None)) is not None:
         raise click.UsageError(f"--for {twice}: is given twice; accepted: each key once.")
     from bisar_budget.front import questions
-    from bisar_budget.report.formats import specification_sheet
 
     offer = None if other is None else load_all([other], model, changes)[0]
     kept_free = None if reserve is None else reserve / 100
@@ -100,7 +95,7 @@ def allocate(
     if is_mission and output is not None:  # before the report, so that a failure leaves no output
         _write_mission(sheets[0][0], output, model)
         output = None
-    deliver_found(specification_sheet, sheets, format_name, output)
+    deliver_answer("allocate", sheets, format_name, output)
     complies = all(sheet.complies and (of_offer is None or of_offer.complies) for sheet, of_offer in sheets)
     sys.exit(0 if complies else BROKEN_EXIT_CODE)
 

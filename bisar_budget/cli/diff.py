@@ -13,15 +13,14 @@ from bisar_budget.cli.options import (
     DATE,
     FILE,
     GATING_MODEL,
-    OUTPUT,
     ParamType,
+    answer_options,
     day_and_outside,
-    format_option,
     set_option,
     settings_here,
 )
 from bisar_budget.cli.projects import folder_of_file
-from bisar_budget.cli.streams import BROKEN_EXIT_CODE, deliver, expand, fail, read_all, spare
+from bisar_budget.cli.streams import BROKEN_EXIT_CODE, deliver_answer, expand, fail, read_all, spare
 from bisar_budget.faults import printable
 from bisar_budget.resources import DISK, Files
 
@@ -72,9 +71,8 @@ class _Part(ParamType[float]):
     help="With --fail-on-erosion: accept this change. ID is that of the comparison, or a pattern; FILE:ID for one "
     "mission only. Repeatable.",
 )
-@format_option(("text", "markdown", "json"), "Format of the comparison.")
+@answer_options("diff")
 @click.option("--all", "all_rows", is_flag=True, help="Also show rows that changed by less than 1 %.")
-@OUTPUT
 @DATE
 def diff(
     files: Sequence[str],
@@ -82,7 +80,7 @@ def diff(
     changes: "tuple[SetValue, ...]",
     tolerated: float | None,
     allowed: tuple[str, ...],
-    format_name: str,
+    format_name: str | None,
     all_rows: bool,
     output: str | None,
     today: datetime | None,
@@ -103,7 +101,7 @@ def diff(
 
     Exit code: 0; 1 with --fail-on-erosion; 2 for wrong usage, an unusable file or an unknown revision.
     """
-    from bisar_budget.report.change import difference
+    from bisar_budget.report.answers.diff import Compared
     from bisar_budget.report.change.comparison import Gate
 
     if base is not None and changes:
@@ -119,12 +117,7 @@ def diff(
     else:
         comparison = _with_files(files, changes, output, today)
     gate = None if tolerated is None else Gate(tolerated, allowed)
-    if format_name == "json":
-        text = difference.as_json(comparison, gate)
-    else:
-        write = difference.as_text if format_name == "text" else difference.as_markdown
-        text = write(comparison, gate, all_rows)
-    deliver(text, output, format_name)
+    deliver_answer("diff", [Compared(comparison, gate, all_rows)], format_name, output)
     sys.exit(BROKEN_EXIT_CODE if gate is not None and comparison.is_refused(gate) else 0)
 
 

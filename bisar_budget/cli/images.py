@@ -9,9 +9,8 @@ import click
 from bisar_budget.cli.options import (
     FILE,
     MISSIONS,
-    OUTPUT,
     SET,
-    TEXT_OR_JSON,
+    answer_options,
     output_option,
     plot_option,
     scheduler_options,
@@ -22,7 +21,7 @@ from bisar_budget.cli.streams import (
     USAGE_EXIT_CODE,
     complain,
     deliver,
-    deliver_found,
+    deliver_answer,
     expand,
     fail,
     load_all,
@@ -41,8 +40,7 @@ if TYPE_CHECKING:
 @click.command()
 @MISSIONS
 @click.option("--only", default="*", metavar="GLOB", help="Verify only the rows whose id matches.")
-@TEXT_OR_JSON
-@OUTPUT
+@answer_options("verify")
 @SET
 @click.option(
     "--jobs",
@@ -54,7 +52,7 @@ if TYPE_CHECKING:
 def verify(
     missions: Sequence[str],
     only: str,
-    format_name: str,
+    format_name: str | None,
     output: str | None,
     changes: "tuple[SetValue, ...]",
     jobs: int | None,
@@ -70,14 +68,13 @@ def verify(
     """
     from bisar_budget.front.imaging import verify_all
     from bisar_budget.front.progress import workers_of
-    from bisar_budget.report.formats import verification
 
     files = expand(missions)
     spare(files, [output])
     loaded = load_all(files, changes=changes)
     with wrong_usage(), workers_of(scheduler, patience) as workers:
         verified = verify_all(loaded, only, jobs, workers)
-    deliver_found(verification, verified, format_name, output)
+    deliver_answer("verify", verified, format_name, output)
     doubts = [mission for mission in verified if mission.doubt]
     for mission in doubts:
         complain(f"{printable(mission.file)}: {mission.doubt}")

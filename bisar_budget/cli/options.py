@@ -74,20 +74,21 @@ def format_option(formats: Iterable[str], words: str, **overrides: Any) -> _Opti
 OUTPUT = output_option()
 
 
-def answer_options(command: str, words: str = "") -> _Option:
+def answer_options(command: str, words: str = "", output: str = "", metavar: str = "FILE") -> _Option:
     """Make the options `--format` and `--output` of a command whose answer is in the table of answers.
 
-    `words` is added to the help text of `--format`.
+    `words` is added to the help text of `--format`. `output` replaces the help text of `--output`.
     """
     from bisar_budget.report.answers import ANSWERS
 
     formats = format_option(
         ANSWERS[command].formats,
-        f"Format of the answer (default: that of the suffix of -o, else text); xlsx needs -o.{words}",
+        f"Format of the answer (default: that of the suffix of -o, else text); xlsx needs -o.{words and f' {words}'}",
         default=None,
         show_default=False,
     )
-    return lambda function: formats(output_option()(function))
+    target = output_option(output, metavar) if output else output_option()
+    return lambda function: formats(target(function))
 
 
 def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[SetValue, ...]":

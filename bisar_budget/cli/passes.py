@@ -16,9 +16,8 @@ from bisar_budget.cli.options import (
     FILE,
     MODEL,
     SET,
+    answer_options,
     day_and_outside,
-    format_option,
-    output_option,
     plot_option,
     wrong_usage,
 )
@@ -28,8 +27,7 @@ from bisar_budget.cli.streams import (
     PICTURE_SUFFIXES,
     USAGE_EXIT_CODE,
     complain,
-    deliver,
-    deliver_found,
+    deliver_answer,
     fail,
     read_all,
     say_faults,
@@ -44,8 +42,6 @@ if TYPE_CHECKING:
     from bisar_budget.design.passes import SatellitePass
     from bisar_budget.faults import SetValue
     from bisar_budget.front.results import PassesResult
-
-_FORMAT_BY_SUFFIX = {".txt": "text", ".json": "json", ".csv": "csv", ".ics": "ics"}  # by the suffix of -o
 
 
 @click.command()
@@ -87,15 +83,11 @@ _FORMAT_BY_SUFFIX = {".txt": "text", ".json": "json", ".csv": "csv", ".ics": "ic
 @MODEL
 @SET
 @DATE
-@format_option(
-    _FORMAT_BY_SUFFIX.values(),
-    "Format of the list; ics is a calendar (default: that of -o's suffix, else text).",
-    default=None,
-    show_default=False,
-)
-@output_option(
-    "Write to FILE: .txt, .json, .csv or .ics. Into a folder DIR, or a name that ends in /, go mission files, "
-    "one for each pass that complies or is waived.",
+@answer_options(
+    "passes",
+    "ics is a calendar.",
+    output="Write to FILE. Into a folder DIR, or a name that ends in /, go mission files, one for each pass that "
+    "complies or is waived.",
     metavar="FILE|DIR",
 )
 @plot_option("Draw tracks in the sky and resolutions: .svg, .png or .pdf.")
@@ -124,15 +116,11 @@ def passes(
         raise click.UsageError(f"--days: nan is no number of days; accepted: more than 0, up to {MAX_DAYS:g}.")
     kind = suffix_of(plot, PICTURE_SUFFIXES)[1:]
     is_folder = output is not None and (output.endswith(("/", os.sep)) or os.path.isdir(output))
-    if format_name is None:
-        is_file = output not in (None, "-") and not is_folder
-        format_name = _FORMAT_BY_SUFFIX[suffix_of(output, tuple(_FORMAT_BY_SUFFIX))] if is_file else "text"
     spare([mission], [None if is_folder else output, plot])
     from bisar_budget.faults import MissionError
     from bisar_budget.front import questions
     from bisar_budget.mission.load import load_mission
     from bisar_budget.mission.quantities import QuestionError
-    from bisar_budget.report.formats import pass_list
 
     judged_on, from_outside = day_and_outside(today)
     with wrong_usage():
@@ -161,10 +149,7 @@ def passes(
         output = None
     if plot is not None:
         write_file(plot, result.plot().of(kind))
-    if format_name == "ics":
-        deliver(pass_list.as_ics(result.found, judged_on), output, format_name)
-    else:
-        deliver_found(pass_list, result.found, format_name, output)
+    deliver_answer("passes", [result.found], format_name, output)
     sys.exit(0 if result.accepted else BROKEN_EXIT_CODE)
 
 

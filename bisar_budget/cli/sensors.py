@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.options import FILE, TEXT_OR_JSON
+from bisar_budget.cli.options import FILE, format_option
 from bisar_budget.cli.streams import USAGE_EXIT_CODE, complain, deliver, expand, say_faults, spare
 from bisar_budget.faults import file_fault, printable, sentences
 from bisar_budget.json_types import JsonObject
@@ -29,7 +29,7 @@ _IN_A_FOLDER = "accepted: a folder with files that end in .yaml or .yml"
 @click.argument("patterns", nargs=-1, type=FILE, metavar="[PATTERN|FILE]...")
 @click.option("--kind", type=click.Choice(list(_KIND_TITLES)), help="Only parts of this kind.")
 @click.option("--check", "checking", is_flag=True, help="Check files of parts of your own, instead of a list.")
-@TEXT_OR_JSON
+@format_option(("text", "json"), "Format of the output.")
 def sensors(patterns: Sequence[str], kind: str | None, checking: bool, format_name: str) -> None:
     """List parts of the catalogue, their figures and the sources.
 

@@ -135,7 +135,10 @@ class UnknownTime(NamedTuple):
 
 
 class Passes(NamedTuple):
-    """The passes of one platform's orbit over the scene of a mission, in order of time."""
+    """The passes of one platform's orbit over the scene of a mission, in order of time.
+
+    `day` is the day on which waivers were judged (UTC).
+    """
 
     file: str
     name: str
@@ -146,6 +149,7 @@ class Passes(NamedTuple):
     min_elevation: float
     squint: float
     found: tuple[SatellitePass, ...]
+    day: date
     unknown: tuple[UnknownTime, ...] = ()
     changes: tuple[SetValue, ...] = ()
     overrides: tuple[Override, ...] = ()
@@ -232,6 +236,7 @@ def passes(
         file=mission.file,
         name=mission.name,
         model=model if model is not None and not mission.has_direct_path else mission.gating_model,
+        day=today,
         platform=chosen,
         start=start,
         stop=start.after(days * DAY_S),

@@ -275,7 +275,6 @@ class CheckResult(Mapping[str, Row]):
 
 
 _NESTED = ("displacement_m", "notes")  # fields of a row that fit in no cell of a table
-_SPECIFIED = ("key", "value", "ordered", "unit", "declared")
 
 
 # ---------------------------------------------------------------------- answers to other questions
@@ -426,6 +425,7 @@ class AllocateResult(_Answer):
     mission of a supplier, `offer` compares its declared errors with the specifications; otherwise `offer` is None.
     """
 
+    COMMAND: ClassVar[str] = "allocate"
     found: SpecificationSheet
     offer: "Offer | None" = None
 
@@ -434,15 +434,9 @@ class AllocateResult(_Answer):
         verdict_words = "complies" if self.found.complies else "does not comply"
         return f"<allocate of {self.found.name!r}: {len(self.found.specifications)} specifications, {verdict_words}>"
 
-    def _document(self) -> str:
-        from bisar_budget.report.formats.specification_sheet import as_json
-
-        return as_json([(self.found, self.offer)], Style())
-
-    def to_dataframe(self, library: str | None = None) -> DataFrame:
-        """The specifications as a data frame; sizes are in SI, and are lists of three values if the axes differ."""
-        (mission,) = self.to_dict()["missions"]
-        return _frame_of_rows([{key: row[key] for key in _SPECIFIED} for row in mission["specifications"]], library)
+    @property
+    def _answers(self) -> Sequence[object]:
+        return [(self.found, self.offer)]
 
     def _repr_html_(self) -> str:
         rows = [(each.key, each.text or "no limit") for each in self.found.specifications]
@@ -455,6 +449,7 @@ class AllocateResult(_Answer):
 class VerifyResult(_Answer):
     """Result of `verify`: `rows` has the verdict of images on each limit, and `status` summarizes the verdicts."""
 
+    COMMAND: ClassVar[str] = "verify"
     found: VerifiedMission
 
     def __repr__(self) -> str:
@@ -462,16 +457,6 @@ class VerifyResult(_Answer):
         counts = Counter(row.verdict for row in self.found.rows)
         verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
         return f"<verify of {self.found.name!r}: {verdicts}>"
-
-    def _document(self) -> str:
-        from bisar_budget.report.formats.verification import as_json
-
-        return as_json([self.found], Style())
-
-    def to_dataframe(self, library: str | None = None) -> DataFrame:
-        """The verdicts of the images as a data frame, with one row for each limit."""
-        (mission,) = self.to_dict()["missions"]
-        return _frame_of_rows(mission["rows"], library)
 
     def _repr_html_(self) -> str:
         rows = [(row.id, row.boundary_error, row.unit, row.verdict) for row in self.found.rows]
@@ -488,6 +473,7 @@ class PassesResult(_Answer):
     `mission` and `model` are the arguments of the function `passes`.
     """
 
+    COMMAND: ClassVar[str] = "passes"
     found: "Passes"
     mission: Mission
     model: str | None = None
@@ -519,20 +505,11 @@ class PassesResult(_Answer):
         changes = [*self.mission.changes, *of_model, *in_folder(self.mission, os.fspath(folder)), *at_mid_time]
         return with_values(self.mission.data.decode("utf-8-sig"), changes)
 
-    def _document(self) -> str:
-        from bisar_budget.report.formats.pass_list import as_json
-
-        return as_json(self.found, Style())
-
-    def to_dataframe(self, library: str | None = None) -> DataFrame:
-        """The passes as a data frame; angles are in radians, lengths in metres, and times are texts in UTC."""
-        return _frame_of_rows(self.to_dict()["passes"], library)
-
     def plot(self) -> Picture:
         """Draw the tracks of the satellite in the sky of the scene, and the resolutions of the passes over time."""
+        from bisar_budget.report.answers.passes import verdict
         from bisar_budget.report.drawing.figure import drawing_file
         from bisar_budget.report.drawing.sky_plot import sky_plot
-        from bisar_budget.report.formats.pass_list import verdict
 
         title = f"Passes over the scene of {self.found.name}"
         return Picture(title, partial(drawing_file, sky_plot(self.found, title, verdict(self.found))))

@@ -20,9 +20,9 @@ class Format(NamedTuple):
     """A report format: the module in this package that writes it, and the endings of its file names.
 
     The usual ending is first. `about` is the description of the format in `--help`. The docstring of this module
-    explains `is_piecewise` and `has_pictures`. Files of a format with `is_binary` are bytes, which no terminal shows. A
-    format with `is_illustrated` needs the mission and the images of
-    verified limits. For other formats these are not kept in memory.
+    explains `is_piecewise` and `has_pictures`. A file of a format with `is_binary` is no text. A format with
+    `is_illustrated` needs the mission and the images of verified limits. For other formats these are not kept in
+    memory.
     """
 
     name: str

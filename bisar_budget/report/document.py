@@ -139,6 +139,12 @@ class Head:
     medium: str = ""
 
 
+def page_head(head: Head) -> Text:
+    """Text of a column head on a page, which begins with a capital letter and has the unit behind it."""
+    text = head.text[:1].upper() + head.text[1:] if isinstance(head.text, str) else head.text
+    return (text, f" [{head.unit}]") if head.unit else text
+
+
 def heads(*heads: Head | str) -> list[Head]:
     """Make a list of column heads. A plain string becomes the head of a column of text."""
     return [Head(head) if isinstance(head, str) else head for head in heads]
@@ -203,8 +209,8 @@ class TextTable:
         shown = [head.medium in ("", medium) for head in self.heads]
         if all(shown):
             return self
-        heads, *rows = ([*compress(cells, shown)] for cells in (self.heads, *self.rows))
-        return replace(self, heads=heads, rows=rows)
+        rows = [[*compress(row, shown)] for row in self.rows]
+        return replace(self, heads=[*compress(self.heads, shown)], rows=rows)
 
 
 @dataclass(frozen=True, slots=True)

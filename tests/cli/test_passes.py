@@ -16,8 +16,9 @@ import yaml
 from bisar_budget.design.passes import passes, start_of
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style
-from bisar_budget.report.formats import pass_list
-from bisar_budget.report.formats.pass_list import _folded as folded
+from bisar_budget.report.answers import passes as pass_list
+from bisar_budget.report.answers import written
+from bisar_budget.report.answers.passes import _folded as folded
 from tests.conftest import ROOT, TODAY
 from tests.design.test_passes import ROOF, tree
 from tests.drawing import Drawing
@@ -128,8 +129,8 @@ def test_a_use_without_a_number_is_null_and_one_pass_is_said_as_one(tmp_path: Pa
     (one,) = found.found
     assert pass_list.verdict(found).startswith("one pass, which complies: transmitter above 20 deg and at broadside,")
     lost = found._replace(found=(one._replace(utilization=math.inf, status="fail", requirement=None, row=None),))
-    assert json.loads(pass_list.as_json(lost, Style()))["passes"][0]["utilization"] is None
-    text = pass_list.as_text(lost, Style())
+    assert json.loads(written("passes", "json", [lost], Style()))["passes"][0]["utilization"] is None
+    text = str(written("passes", "text", [lost], Style()))
     assert text.startswith("one pass, which does not comply:")
     assert ">1e5 %" in text
     assert "decides" not in text.partition("above:")[0]

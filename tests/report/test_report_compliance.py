@@ -22,6 +22,7 @@ from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.row import worst_first
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style, pictures, render
+from bisar_budget.report.compliance.summary import compliance
 from bisar_budget.report.document import (
     Badge,
     Compliance,
@@ -38,7 +39,6 @@ from bisar_budget.report.document import (
     Use,
     blocks_of,
 )
-from bisar_budget.report.compliance.summary import compliance
 from bisar_budget.report.words.sentences import sentence
 from bisar_budget.sampling.probability import monte_carlo
 from tests.conftest import COMPLIES, ROOT, by_turns, examples, findings, found_in, mission_text, name_of

@@ -8,7 +8,7 @@ from bisar_budget.design.allocate import allocate
 from bisar_budget.findings.specification import Broken
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import Style
-from bisar_budget.report.formats.specification_sheet import as_text
+from bisar_budget.report.answers import written
 from tests.conftest import TODAY, mission_text
 
 KEYS = {"platforms.receiver.motion_error.velocity": 1.0}
@@ -19,6 +19,10 @@ MISSION = mission_text(
 )
 
 
+def text_of(found) -> str:
+    return " ".join(str(written("allocate", "text", [(found, None)], Style())).split())
+
+
 def sheet(reserve: float):
     return allocate(parse_mission(MISSION), keys=KEYS, reserve=reserve, today=TODAY)
 
@@ -27,7 +31,7 @@ def sheet(reserve: float):
 def test_a_reserve_that_is_advised_leaves_room(used: float) -> None:
     """`--reserve 0% or less` was advised where other errors use all of a limit but a millionth."""
     broken = sheet(0.0)._replace(broken=(Broken("mission.islr", "islr", used, 0.3),))
-    found = re.search(r"--reserve ([\d.]+)% or less", " ".join(as_text([(broken, None)], Style()).split()))
+    found = re.search(r"--reserve ([\d.]+)% or less", text_of(broken))
     assert found is not None
     assert used < (1 - float(found[1]) / 100) * (1 - 1e-6)
 
@@ -35,7 +39,7 @@ def test_a_reserve_that_is_advised_leaves_room(used: float) -> None:
 @pytest.mark.parametrize("used", [0.9999991, 0.99999999, 1.0, 1.5])
 def test_no_reserve_is_advised_where_there_is_no_room(used: float) -> None:
     broken = sheet(0.0)._replace(broken=(Broken("mission.islr", "islr", used, 1.0),))
-    text = " ".join(as_text([(broken, None)], Style()).split())
+    text = text_of(broken)
     assert "--reserve" not in text
     assert "99.99" not in text
 
@@ -43,6 +47,6 @@ def test_no_reserve_is_advised_where_there_is_no_room(used: float) -> None:
 def test_the_advice_of_a_mission_is_taken() -> None:
     refused = sheet(0.9)
     assert refused.broken
-    advised = re.search(r"--reserve ([\d.]+)% or less", " ".join(as_text([(refused, None)], Style()).split()))
+    advised = re.search(r"--reserve ([\d.]+)% or less", text_of(refused))
     assert advised is not None
     assert not sheet(float(advised[1]) / 100).broken

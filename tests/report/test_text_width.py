@@ -6,8 +6,8 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style
+from bisar_budget.report.answers import written
 from bisar_budget.report.explain.explanation import explain
-from bisar_budget.report.formats.verification import as_text
 from bisar_budget.report.words.sentences import TEXT_WIDTH, table
 from tests.conftest import ROOT, TODAY, findings, mission_text
 
@@ -100,7 +100,7 @@ def test_verdicts() -> None:
     rows += [row._replace(unit="m", **level) for row in rows]
     verified = VerifiedMission(file="a-folder/" + "x" * 60 + ".yaml", name=NAME, rows=tuple(rows), conditions=NAME)
     for color in (False, True):
-        text = as_text([verified], Style(color=color))
+        text = str(written("verify", "text", [verified], Style(color=color)))
         assert too_long(text.replace("\x1b[33m", "").replace("\x1b[1;31m", "").replace("\x1b[0m", "")) == []
     assert "\x1b[1;31moptimistic" in text
 

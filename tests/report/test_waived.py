@@ -16,7 +16,7 @@ import bisar_budget as bb
 from bisar_budget.design.solve import Crossing, Solution, State
 from bisar_budget.findings.status import RANK, STATUS, complying, exit_code
 from bisar_budget.report import Style
-from bisar_budget.report.formats.answers import as_json
+from bisar_budget.report.answers import written
 from tests.conftest import ROOT
 
 Run = Callable[..., Result]
@@ -369,5 +369,5 @@ def test_the_binding_row_is_the_one_that_breaks() -> None:
         high=3.0, is_circle=False, given=None, crossings=(Crossing(inside, outside, True, True),), nearest=inside,
         is_constant=False, skipped=0, texts={1.0: "1 m", 2.0: "2 m", 0.0: "0 m", 3.0: "3 m"},
     )  # fmt: skip
-    (one,) = json.loads(as_json([found], Style()))["missions"]
+    (one,) = json.loads(str(written("solve", "json", [found], Style())))["missions"]
     assert (one["binding_row"], one["binding_requirement"]) == ("b", "islr")

@@ -6,6 +6,7 @@ import math
 import re
 
 import pytest
+from bisar_budget.report.formats.verification import evidence, numbers
 from click.testing import CliRunner
 
 from bisar_budget.budget.verdicts import with_verdicts
@@ -14,7 +15,6 @@ from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.status import exit_code
 from bisar_budget.report import Style
 from bisar_budget.report.formats import verification
-from bisar_budget.report.formats.verification import evidence, numbers
 from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import TODAY, findings, mission_text
 from tests.conftest import row as row_of

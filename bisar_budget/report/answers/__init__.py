@@ -39,6 +39,10 @@ ANSWERS = {
     for form in (
         AnswerForm("solve", "solve"),
         AnswerForm("sensitivity", "sensitivity"),
+        AnswerForm("allocate", "allocate", ("needs", "sdoc")),
+        AnswerForm("passes", "passes", ("ics",)),
+        AnswerForm("verify", "verify"),
+        AnswerForm("diff", "diff"),
     )
 }
 _SUFFIXES = {

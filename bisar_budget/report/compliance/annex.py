@@ -21,6 +21,8 @@ from bisar_budget.findings.specification import SpecificationSheet
 from bisar_budget.findings.status import STATUS, complying
 from bisar_budget.findings.trade import Axis, Trade, TradeStudy
 from bisar_budget.report import document as doc
+from bisar_budget.report.answers import verify as verification
+from bisar_budget.report.answers.allocate import specified
 from bisar_budget.report.compliance.rows import (
     Page,
     all_contributions,
@@ -40,8 +42,6 @@ from bisar_budget.report.drawing.evidence_drawings import (
 from bisar_budget.report.drawing.trade_drawing import trade_drawing
 from bisar_budget.report.drawing.trades import per_word, stretches
 from bisar_budget.report.explain.explanation import chain, collection_chain
-from bisar_budget.report.formats import verification
-from bisar_budget.report.formats.specification_sheet import specified
 from bisar_budget.report.words.requirements import probability_words
 from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, sentence, waived_count
 from bisar_budget.units import format_quantity
@@ -252,7 +252,7 @@ def _evidence(page: Page) -> Iterator[doc.Block]:
         ],
     )
     refocused: list[doc.Line] = [
-        (doc.Name(verdict.id), *verification.refocused_cells(verdict)[:4], doc.Badge(verdict.verdict_autofocus))
+        (doc.Name(verdict.id), *verification.refocused_cells(verdict), doc.Badge(verdict.verdict_autofocus))
         for verdict in verdicts
         if verdict.verdict_autofocus
     ]

@@ -11,7 +11,8 @@ from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.row import Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.report import Piece, Style
-from bisar_budget.report.formats.verification import evidence
+from bisar_budget.report.answers.verify import evidence
+from bisar_budget.report.renderers.text import lines as text_lines
 from bisar_budget.report.words.heading import (
     document_words,
     doubtful_model,
@@ -170,7 +171,7 @@ def _after(mission: MissionFindings, style: Style) -> Iterator[str]:
     if mission.monte_carlo is not None:
         yield from ("", *probabilities(mission.monte_carlo))
     if mission.verdicts is not None:
-        yield from ("", "Images with each error at its limit", "", *evidence(mission.verdicts, style))
+        yield from ("", "Images with each error at its limit", "", *text_lines(evidence(mission.verdicts), style))
 
 
 _STATUS_WIDTH = 8  # columns of a status, the same in every table, for eyes and scripts

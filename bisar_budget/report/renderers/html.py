@@ -179,10 +179,7 @@ def _item(paragraphs: doc.Line) -> Markup:
 
 
 def _table(table: doc.TextTable) -> Markup:
-    heads = (
-        _cell("th", (head.text, f" [{head.unit}]") if head.unit else head.text, _head_style(head), "col")
-        for head in table.heads
-    )
+    heads = (_cell("th", doc.page_head(head), _head_style(head), "col") for head in table.heads)
     lines = [Markup("<caption>{}</caption>").format(_text(table.caption))]
     lines += [Markup("<thead><tr>{}</tr></thead>").format(Markup("").join(heads)), Markup("<tbody>")]
     styles = [head.style for head in table.heads]

@@ -1,21 +1,21 @@
 """Write a document for a terminal: aligned tables, wrapped sentences, and colours for verdicts and statuses."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
 from bisar_budget.faults import printable
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
-from bisar_budget.report.words.sentences import TEXT_WIDTH, aligned, wrapped
+from bisar_budget.report.words.sentences import TEXT_WIDTH, spaced, wrapped
 
 _MIN_NAME_WIDTH = 12  # of the names of facts
+_MIN_SENTENCE_WIDTH = 24  # characters of a last column that may be on a line of its own
 _VERDICT_SGR = {"optimistic": "1;31", "confirmed": "32", "conservative": "33"}  # of images; others are of `STATUS`
-_VERDICT_WORDS = {"not_evaluated": "not eval"}
 
 
 def text(document: doc.AnswerDocument, style: Style) -> str:
     """Write a document as text. Lines are at most 80 columns wide, and those of tables `style.table_width`."""
-    chapters = ("\n".join(_lines(chapter.blocks, style)) for chapter in document.chapters)
+    chapters = ("\n".join(lines(chapter.blocks, style)) for chapter in document.chapters)
     return "\n\n".join(chapters) + "\n"
 
 
@@ -45,7 +45,7 @@ def _sgr(status: str) -> str:
 
 
 # ---------------------------------------------------------------------- blocks
-def _lines(blocks: Iterable[doc.Block], style: Style) -> Iterator[str]:
+def lines(blocks: Iterable[doc.Block], style: Style) -> Iterator[str]:
     """Yield the lines of blocks, with an empty line between two blocks."""
     is_first = True
     for block in blocks:
@@ -61,7 +61,7 @@ def _block(block: doc.Block, style: Style) -> Iterator[str]:
         case doc.Opening():
             yield from _opening(block, style)
         case doc.Only(doc.TERMINAL, blocks):
-            yield from _lines(blocks, style)
+            yield from lines(blocks, style)
         case doc.Paragraph(words, paragraph_style):
             first, *more = wrapped(plain(words), "  ")
             is_verdict = paragraph_style.startswith("verdict ")
@@ -71,19 +71,26 @@ def _block(block: doc.Block, style: Style) -> Iterator[str]:
             width = max([_MIN_NAME_WIDTH, *(len(plain(name)) for name, _ in pairs)])
             for name, value in pairs:
                 yield from wrapped(f"{plain(name):<{width}} {plain(value)}", " " * (width + 1))
-        case doc.Items(items, is_numbered=is_numbered):
-            for number, paragraphs in enumerate(items, start=1):
-                start = f"{number}. " if is_numbered else ""
-                yield from wrapped(start + " ".join(map(plain, paragraphs)), "  ")
+        case doc.Items():
+            yield from _items(block)
         case doc.TextTable():
             yield from _table(block.on(doc.TERMINAL), style)
+        case doc.Group(_, [doc.Items() as items], heading) if heading:
+            yield plain(heading)
+            yield from _items(items, "  ")
         case doc.Group(_, blocks, heading):
             yield from [plain(heading)] if heading else []
-            yield from _lines(blocks, style)
+            yield from lines(blocks, style)
         case doc.Chapter(title, blocks):
             yield from wrapped(plain(title), "  ")
             yield ""
-            yield from _lines(blocks, style)
+            yield from lines(blocks, style)
+
+
+def _items(block: doc.Items, indent: str = "") -> Iterator[str]:
+    for number, paragraphs in enumerate(block.items, start=1):
+        start = f"{number}. " if block.is_numbered else ""
+        yield from wrapped(indent + start + " ".join(map(plain, paragraphs)), indent + "  ")
 
 
 def _opening(opening: doc.Opening, style: Style) -> Iterator[str]:
@@ -103,27 +110,43 @@ def _opening(opening: doc.Opening, style: Style) -> Iterator[str]:
 
 
 def _table(table: doc.TextTable, style: Style) -> Iterator[str]:
-    """Yield the lines of a table. Statuses have a colour; a missing value is a hyphen instead of a dash."""
+    """Yield the lines of a table. Statuses have a colour; a missing value is a hyphen instead of a dash.
+
+    A name that would make its line longer than the width of tables is written on a line above its values. A sentence
+    in the last column is written on lines of its own below them if it does not fit.
+    """
     heads = [[plain(head.text) for head in table.heads]]
     heads += [[head.unit for head in table.heads]] if any(head.unit for head in table.heads) else []
     cells = [["-" if cell == "–" else cell for cell in map(plain, row)] for row in table.rows]
     sides = "".join(">" if head.style == "number" else "<" for head in table.heads)
-    lines_of_rows = list(aligned([*heads, *cells], style.table_width, sides))
-    for lines in lines_of_rows[: len(heads)]:
-        yield from lines
-    for row, lines in zip(table.rows, lines_of_rows[len(heads) :], strict=True):
-        yield from _coloured(row, lines, style)
+    widths = [max((len(row[column]) for row in (*heads, *cells)), default=0) for column in range(len(sides))]
+    ends_with_sentence = sides.endswith("<") and widths[-1] > _MIN_SENTENCE_WIDTH
+    if ends_with_sentence:
+        widths[-1] = 0
+    room = max(style.table_width - sum(widths[1:]) - len(widths) + 1, *(len(head[0]) for head in heads))
+    widths[0] = max(len(row[0]) for row in (*heads, *cells) if len(row[0]) <= room)
+    for head in heads:
+        yield spaced(head, widths, sides).rstrip()
+    for line, row in zip(table.rows, cells, strict=True):
+        name = row[0]
+        if len(name) > widths[0]:
+            yield _coloured(line[:1], name, style)
+            row = ["", *row[1:]]
+        text = spaced(row, widths, sides).rstrip()
+        if ends_with_sentence and len(text) > style.table_width:
+            yield _coloured(line, spaced([*row[:-1], ""], widths, sides).rstrip(), style)
+            yield from wrapped(f"    {row[-1]}", "    ")
+        else:
+            yield _coloured(line, text, style)
 
 
-def _coloured(row: doc.Line, lines: Sequence[str], style: Style) -> Iterator[str]:
+def _coloured(row: doc.Line, text: str, style: Style) -> str:
+    """Colour the statuses of a row in its line `text`."""
     if not style.color:
-        yield from lines
-        return
-    *above, line = lines
+        return text
     for place, cell in enumerate(row):
         if isinstance(cell, doc.Badge):
             word = _badge_words(cell.status)
             start = "" if not place else " "
-            line = line.replace(f"{start}{word}", start + style.coloured(word, _sgr(cell.status)), 1)
-    yield from above
-    yield line
+            text = text.replace(f"{start}{word}", start + style.coloured(word, _sgr(cell.status)), 1)
+    return text

@@ -4,7 +4,7 @@ The same answer gives the same bytes.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 from importlib.util import find_spec
 from io import BytesIO
@@ -44,8 +44,8 @@ def workbook(document: doc.AnswerDocument, records: Records) -> bytes:
     book = Workbook()
     book.properties.creator = f"bisar-budget {document.version}"
     book.properties.created = book.properties.modified = _NO_DATE
-    book.remove(book.active)
-    texts = book.create_sheet(_TEXTS)
+    texts = book.worksheets[0]
+    texts.title = _TEXTS
     for line in [[document.title, plain(document.subject)], *_texts(document)]:
         _append(texts, line)
     _fit(texts)
@@ -105,13 +105,13 @@ def _numbers(book: "Workbook", records: Records) -> None:
     _fit(sheet)
 
 
-def _number_or_text(value: object) -> object:
+def _number_or_text(value: object) -> str | float | None:
     if value is None or isinstance(value, bool | int | float):
         return value
     return " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
 
-def _append(sheet: "Worksheet", cells: list[object] | list[str], *, is_head: bool = False) -> None:
+def _append(sheet: "Worksheet", cells: Sequence[str | float | None], *, is_head: bool = False) -> None:
     """Add a line to a sheet. A text that looks like a formula remains a text."""
     from openpyxl.styles import Font
 
@@ -129,9 +129,11 @@ def _append(sheet: "Worksheet", cells: list[object] | list[str], *, is_head: boo
 
 def _fit(sheet: "Worksheet") -> None:
     """Make each column as wide as its longest text, up to a limit."""
-    for column in sheet.columns:
+    from openpyxl.utils import get_column_letter
+
+    for number, column in enumerate(sheet.columns, start=1):
         longest = max((len(str(cell.value)) for cell in column if cell.value is not None), default=0)
-        sheet.column_dimensions[column[0].column_letter].width = min(longest, _WIDEST_COLUMN) + 2
+        sheet.column_dimensions[get_column_letter(number)].width = min(longest, _WIDEST_COLUMN) + 2
 
 
 def _undated(file: BytesIO) -> bytes:

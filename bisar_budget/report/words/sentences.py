@@ -275,19 +275,16 @@ def table(rows: Sequence[Sequence[str]], width: int = TEXT_WIDTH) -> list[str]:
     return [line for lines in aligned(rows, width) for line in lines]
 
 
-def aligned(rows: Sequence[Sequence[str]], width: int = TEXT_WIDTH, sides: str = "") -> Iterator[list[str]]:
-    """Yield the lines of each row of a table. Names and the last column are aligned left.
+def aligned(rows: Sequence[Sequence[str]], width: int = TEXT_WIDTH) -> Iterator[list[str]]:
+    """Yield the lines of each row of a table. Names and the last column are aligned left, numbers right.
 
-    `sides` has `<` or `>` for each column; without it, columns between the name and the last one are numbers, which
-    are aligned right. A name that would make its line longer than `width` characters is written on a line above its
-    numbers.
+    A name that would make its line longer than `width` characters is written on a line above its numbers.
     """
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     room = width - sum(widths[1:]) - len(widths) + 1
     first = max(len(row[0]) for row in rows if len(row[0]) <= max(room, len(rows[0][0])))  # the header is not broken
     for name, *cells in rows:
-        last = f"{cells[-1]:>{widths[-1]}}" if sides.endswith(">") else cells[-1]
-        numbers = f"{spaced(cells[:-1], widths[1:-1], sides[1:-1] or '>' * (len(cells) - 1))} {last}".rstrip()
+        numbers = f"{spaced(cells[:-1], widths[1:-1], '>' * (len(cells) - 1))} {cells[-1]}".rstrip()
         yield [f"{name:<{first}} {numbers}"] if len(name) <= first else [name, f"{'':<{first}} {numbers}"]
 
 

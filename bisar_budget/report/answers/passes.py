@@ -1,10 +1,10 @@
-"""Write the passes of a satellite as text, as JSON `passes/1`, as CSV, and as calendar events (RFC 5545)."""
+"""The answer of the command passes: the passes of a satellite, also as events of a calendar (RFC 5545)."""
 
 import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from datetime import UTC, date, datetime
+from datetime import UTC, datetime
 
 from bisar_budget import __version__
 from bisar_budget.design.passes import Passes, SatellitePass
@@ -13,26 +13,28 @@ from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.paths.instant import DAY_S, Instant
 from bisar_budget.report import Style
-from bisar_budget.report.formats.csv_table import csv_text
-from bisar_budget.report.formats.json_document import document_text, outside_item
-from bisar_budget.report.words.heading import overrides_words, title_lines
+from bisar_budget.report import document as doc
+from bisar_budget.report.answers import Records
+from bisar_budget.report.answers.words import mission_chapter, mission_document, opening
+from bisar_budget.report.drawing.sky_plot import sky_plot
+from bisar_budget.report.formats.json_document import outside_item
+from bisar_budget.report.words.heading import overrides_words
 from bisar_budget.report.words.identity import digest
 from bisar_budget.report.words.sentences import (
     percent,
     sentence,
-    spaced,
     use_words,
     waived_count,
     waiver_names,
-    wrapped,
 )
 from bisar_budget.units import format_quantity
 
 
 # ---------------------------------------------------------------- for programs
-def as_json(passes: Passes, style: Style) -> str:
-    """Write `passes/1`. Values are in SI and radians; a missing value is null."""
-    content = {
+def content(answers: Sequence[Passes]) -> dict[str, object]:
+    """Content of the JSON document `passes/1`, in SI units and radians; a missing value is null."""
+    (passes,) = answers
+    return {
         "file": passes.file,
         "name": passes.name,
         "model": passes.model,
@@ -54,7 +56,6 @@ def as_json(passes: Passes, style: Style) -> str:
         "summary": _summarized(passes),
         "passes": [_item(overpass) for overpass in passes.found],
     }
-    return document_text("bisar-budget/passes/1", content)
 
 
 def _summarized(passes: Passes) -> dict[str, int]:
@@ -110,46 +111,53 @@ def direction(overpass: SatellitePass) -> str:
     return "ascending" if overpass.is_ascending else "descending"
 
 
-def as_csv(passes: Passes, style: Style) -> str:
-    """Write the passes as CSV, one line each. Values are in SI and radians; a missing value is an empty cell."""
-    identity = [passes.file, passes.name, passes.platform]
-    outside = overrides_words(passes) or None
-    lines: list[list[object]] = [["file", "name", "platform", *_item(_NO_PASS), "overrides"]]
-    for overpass in passes.found:
-        values = _item(overpass) | {"waived_by": "; ".join(overpass.waived_by) or None}
-        lines.append([*identity, *values.values(), outside])
-    return csv_text(lines)
+def records(answers: Sequence[Passes]) -> Records:
+    """Table of the answers: one line for each pass. Values are in SI and radians."""
+    lines = [
+        {
+            "file": passes.file,
+            "name": passes.name,
+            "platform": passes.platform,
+            **_item(overpass),
+            "waived_by": "; ".join(overpass.waived_by) or None,
+            "overrides": overrides_words(passes) or None,
+        }
+        for passes in answers
+        for overpass in passes.found
+    ]
+    return Records(("file", "name", "platform", *_item(_NO_PASS), "overrides"), lines)
 
 
 _NOWHEN = Instant(0, 0.0)
 _NO_PASS = SatellitePass(0, _NOWHEN, _NOWHEN, False, False, _NOWHEN, 0.0, ())  # type: ignore[arg-type]
 
 
-# ---------------------------------------------------------------- for a terminal
-_HEADS = (
-    ("status", "", "<"),
-    ("#", "", ">"),
-    ("mid-time [UTC]", "", "<"),
-    ("above", "min", ">"),
-    ("elev", "deg", ">"),
-    ("from", "deg", ">"),
-    ("looks", "", "<"),
-    ("", "", "<"),
-    ("bist", "deg", ">"),
-    ("grad", "deg", ">"),
-    ("resolution", "m", ">"),
-    ("doubt", "", ">"),
-    ("use", "", ">"),
-)
-_WAIVERS = ("waived by", "", "<")  # column that is shown only if a pass is waived
+# ---------------------------------------------------------------- for people
+_HEADS = [
+    doc.Head("status"),
+    doc.Head("#", "number"),
+    doc.Head("mid-time [UTC]"),
+    doc.Head("above", "number", "min"),
+    doc.Head("elev", "number", "deg"),
+    doc.Head("from", "number", "deg"),
+    doc.Head("looks"),
+    doc.Head("flies"),
+    doc.Head("bist", "number", "deg"),
+    doc.Head("grad", "number", "deg"),
+    doc.Head("resolution", "number", "m"),
+    doc.Head("doubt", "number"),
+    doc.Head("use", "number"),
+]
+_WAIVERS = doc.Head("waived by")  # column that is shown only if a pass is waived
 
 
-def as_text(passes: Passes, style: Style) -> str:
-    """Write the passes as text for a terminal: verdict, table of passes and notes.
+def document(answers: Sequence[Passes], style: Style) -> doc.AnswerDocument:
+    """Text of each answer: verdict, table of passes, drawing of the sky, and notes that name the deciding rows.
 
-    The table is at most 100 columns wide, without the column of waivers. The notes name the deciding rows.
+    In a terminal, the table is at most 100 columns wide, without the column of waivers.
     """
-    return "\n".join(_lines(passes, style)) + "\n"
+    chapters = [mission_chapter(answer, number, _blocks(answer, number)) for number, answer in enumerate(answers, 1)]
+    return mission_document("Passes", answers, chapters)
 
 
 def verdict(passes: Passes) -> str:
@@ -202,35 +210,26 @@ def _seconds(instant: Instant) -> str:
     return rounded.as_text()[:19].replace("T", " ")
 
 
-def _lines(passes: Passes, style: Style) -> Iterator[str]:
-    sgr = "32" if passes.complying else STATUS["waived"].sgr if passes.accepted else "1;31"
-    yield from title_lines(passes, verdict(passes), sgr, style, remark=f"; {passes.model} model")
+def _blocks(passes: Passes, number: int) -> Iterator[doc.Block]:
+    status = "pass" if passes.complying else "waived" if passes.accepted else "fail"
+    yield opening(passes, verdict(passes), status, f"{passes.model} model")
     if passes.found:
-        yield from _table(passes.found, style)
-        yield ""
-    for text in _notes(passes):
-        yield from wrapped(text, "  ")
+        is_waived = any(overpass.waived_by for overpass in passes.found)
+        heads = [*_HEADS, _WAIVERS] if is_waived else _HEADS
+        rows = [_cells(overpass)[: len(heads)] for overpass in passes.found]
+        yield doc.TextTable("Passes", "Passes over the scene", heads, rows)
+        title = f"Passes over the scene of {passes.name}"
+        drawing = sky_plot(passes, title, verdict(passes))
+        yield doc.Figure(f"{number}-sky.svg", f"mission-{number}", title, "Sky of the scene", drawing)
+    if notes := list(_notes(passes)):
+        yield doc.Items([[note] for note in notes])
 
 
-def _table(overpasses: Sequence[SatellitePass], style: Style) -> Iterator[str]:
-    columns = (*_HEADS, _WAIVERS) if any(overpass.waived_by for overpass in overpasses) else _HEADS
-    cells = [_cells(overpass)[: len(columns)] for overpass in overpasses]
-    heads = [tuple(head[index] for head in columns) for index in (0, 1)]
-    widths = [max(len(row[column]) for row in (*heads, *cells)) for column in range(len(columns))]
-    widths[0] = 8  # as in every table
-    sides = "".join(head[2] for head in columns)
-    for head in heads:
-        yield spaced(head, widths, sides).rstrip()
-    for overpass, row in zip(overpasses, cells, strict=True):
-        line = spaced(row, widths, sides).rstrip()
-        yield style.coloured(line[:8], STATUS[overpass.status].sgr) + line[8:]
-
-
-def _cells(overpass: SatellitePass) -> tuple[str, ...]:
+def _cells(overpass: SatellitePass) -> doc.Line:
     state, minutes = overpass.state, overpass.stop.since(overpass.start) / 60
     sizes = (overpass.range_resolution, overpass.cross_range_resolution)
     return (
-        STATUS[overpass.status].text,
+        doc.Badge(overpass.status),
         str(overpass.number),
         _seconds(overpass.center) if overpass.center is not None else f"{_seconds(overpass.culmination)}*",
         f"{minutes:.1f}" if minutes < 1000 else f"{minutes:.0f}",
@@ -340,34 +339,38 @@ _UID_PERIOD_S = 1800.0  # a satellite passes at most once within it, and newer e
 _MAX_LINE_BYTES = 75  # without the end of the line
 
 
-def as_ics(passes: Passes, stamp: date) -> str:
-    """Write a calendar with an event for each pass (RFC 5545). `stamp` is the day (UTC) of its creation.
+def as_ics(answers: Sequence[Passes], style: Style) -> str:
+    """Write a calendar with an event for each pass (RFC 5545), created on the day of the check (UTC).
 
     Lines end with LF; the file must have CR LF instead. With newer orbital elements an event keeps its UID, as
     long as the culmination stays in the same half hour.
     """
     lines = ["BEGIN:VCALENDAR", "VERSION:2.0", f"PRODID:-//bisar-budget//passes {__version__}//EN"]
+    for passes in answers:
+        lines += _events(passes)
+    lines.append("END:VCALENDAR")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _events(passes: Passes) -> Iterator[str]:
+    """Yield the lines of an event for each pass."""
     seen: Counter[str] = Counter()
-    timestamp = _stamp(datetime(stamp.year, stamp.month, stamp.day, tzinfo=UTC))
+    timestamp = _stamp(datetime(passes.day.year, passes.day.month, passes.day.day, tzinfo=UTC))
     for overpass in passes.found:
         half_hours = math.floor((overpass.culmination.day * DAY_S + overpass.culmination.seconds) / _UID_PERIOD_S)
         start, stop = overpass.start, overpass.stop
         uid = digest(passes.name, passes.platform, str(half_hours))[:32]
         seen[uid] += 1
-        lines += [
-            "BEGIN:VEVENT",
-            f"UID:{uid}{f'-{seen[uid]}' if seen[uid] > 1 else ''}@bisar-budget",
-            f"DTSTAMP:{timestamp}",
-            f"DTSTART:{_stamp(Instant(start.day, math.floor(start.seconds)).as_datetime())}",
-            f"DTEND:{_stamp(Instant(stop.day, math.floor(stop.seconds) + 1.0).as_datetime())}",
-            *_folded(f"SUMMARY:{_escaped(_summary(overpass, passes))}"),
-            *_folded(f"DESCRIPTION:{_escaped(chr(10).join(_description(overpass, passes)))}"),
-            f"CATEGORIES:{_escaped(STATUS[overpass.status].words)}",
-            "TRANSP:TRANSPARENT",
-            "END:VEVENT",
-        ]
-    lines.append("END:VCALENDAR")
-    return "".join(f"{line}\n" for line in lines)
+        yield "BEGIN:VEVENT"
+        yield f"UID:{uid}{f'-{seen[uid]}' if seen[uid] > 1 else ''}@bisar-budget"
+        yield f"DTSTAMP:{timestamp}"
+        yield f"DTSTART:{_stamp(Instant(start.day, math.floor(start.seconds)).as_datetime())}"
+        yield f"DTEND:{_stamp(Instant(stop.day, math.floor(stop.seconds) + 1.0).as_datetime())}"
+        yield from _folded(f"SUMMARY:{_escaped(_summary(overpass, passes))}")
+        yield from _folded(f"DESCRIPTION:{_escaped(chr(10).join(_description(overpass, passes)))}")
+        yield f"CATEGORIES:{_escaped(STATUS[overpass.status].words)}"
+        yield "TRANSP:TRANSPARENT"
+        yield "END:VEVENT"
 
 
 def _stamp(moment: datetime) -> str:

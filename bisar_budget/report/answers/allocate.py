@@ -1,4 +1,4 @@
-"""Write the sheet of specifications as JSON `allocate/1`, CSV or terminal text, or as Markdown or HTML for a buyer.
+"""The answer of the command allocate: the sheet of specifications, and the offer that is compared with it.
 
 Sphinx-Needs and StrictDoc read the specifications as requirements derived from the requirements of the mission.
 """
@@ -15,15 +15,14 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
+from bisar_budget.report.answers import Records
+from bisar_budget.report.answers.words import mission_chapter, mission_document, opening
 from bisar_budget.report.drawing.share_bars import LEAST_WEIGHT_FRACTION, limiting, share_bars
-from bisar_budget.report.formats.csv_table import csv_text
-from bisar_budget.report.formats.json_document import document_text, outside_item
-from bisar_budget.report.formats.text_table import requirement_table
+from bisar_budget.report.formats.json_document import outside_item
 from bisar_budget.report.formats.traceability import identifier, needs_document
-from bisar_budget.report.words.heading import overrides_words, title_lines
 from bisar_budget.report.words.identity import Identity, distinct, identities
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
-from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, share_percent, table, wrapped
+from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, share_percent
 
 _LISTED_COUNT = 3  # parts of the catalogue that a table names
 _SHEET_COLUMNS = ("file", "key", "value", "ordered", "unit", "text", "declared", "weight", "parts")
@@ -33,12 +32,12 @@ Answer = tuple[SpecificationSheet, Offer | None]  # a sheet, and the offer that 
 
 
 # ---------------------------------------------------------------- for programs
-def as_json(answers: Sequence[Answer], style: Style) -> str:
-    """Write the sheets as a JSON document in the format `allocate/1`. Values are in SI; a missing value is null."""
-    return document_text("bisar-budget/allocate/1", {"missions": [_document(answer) for answer in answers]})
+def content(answers: Sequence[Answer]) -> dict[str, object]:
+    """Content of the JSON document `allocate/1`. Values are in SI; a missing value is null."""
+    return {"missions": [_item(answer) for answer in answers]}
 
 
-def _document(answer: Answer) -> dict[str, object]:
+def _item(answer: Answer) -> dict[str, object]:
     sheet, offer = answer
     return {
         "file": sheet.file,
@@ -92,8 +91,8 @@ def _offer(offer: Offer) -> dict[str, object]:
     }
 
 
-def as_csv(answers: Sequence[Answer], style: Style) -> str:
-    """Write the sheets as CSV, one line for each specification, in SI units.
+def records(answers: Sequence[Answer]) -> Records:
+    """Table of the answers: one line for each specification, in SI units.
 
     The last columns are the shares of the requirements that the specification uses.
     """
@@ -102,50 +101,50 @@ def as_csv(answers: Sequence[Answer], style: Style) -> str:
         for key in REQUIREMENT_NAMES
         if any(key in spec.shares for sheet, _ in answers for spec in sheet.specifications)
     ]
-    lines: list[list[object]] = [[*_SHEET_COLUMNS, *(f"share of {key}" for key in shares)]]
-    for sheet, _ in answers:
-        for spec in sheet.specifications:
-            sizes = (spec.value, spec.ordered, spec.unit, spec.text, spec.declared, spec.weight)
-            share_cells = [f"{spec.shares.get(key, 0.0):.6g}" for key in shares]
-            lines.append([printable(sheet.file), printable(spec.key), *sizes, " ".join(spec.parts), *share_cells])
-    return csv_text(lines)
+    lines = [
+        {
+            "file": sheet.file,
+            "key": spec.key,
+            "value": spec.value,
+            "ordered": spec.ordered,
+            "unit": spec.unit,
+            "text": spec.text,
+            "declared": spec.declared,
+            "weight": spec.weight,
+            "parts": list(spec.parts),
+            **{f"share of {key}": spec.shares.get(key, 0.0) for key in shares},
+        }
+        for sheet, _ in answers
+        for spec in sheet.specifications
+    ]
+    return Records((*_SHEET_COLUMNS, *(f"share of {key}" for key in shares)), lines)
 
 
-# ---------------------------------------------------------------- for a terminal
-def as_text(answers: Sequence[Answer], style: Style) -> str:
-    """Write each sheet as text for a terminal."""
-    return "\n\n".join("\n".join(_lines(answer, style)) for answer in answers) + "\n"
+# ---------------------------------------------------------------- for people
+def document(answers: Sequence[Answer], style: Style) -> doc.AnswerDocument:
+    """Text of each answer: the sheet of specifications, and the offer that is compared with it."""
+    sheets = [sheet for sheet, _ in answers]
+    chapters = [
+        mission_chapter(answer[0], number, _blocks(answer, f"mission-{number}"))
+        for number, answer in enumerate(answers, 1)
+    ]
+    return mission_document("Specification sheet", sheets, chapters)
 
 
-def _lines(answer: Answer, style: Style) -> Iterator[str]:
+def _blocks(answer: Answer, anchor: str) -> Iterator[doc.Block]:
     sheet, offer = answer
-    sgr = "32" if sheet.complies else "1;31"
-    yield from title_lines(sheet, _verdict(sheet), sgr, style, remark=f"; {_terms(sheet)}")
-    if sheet.broken:
-        yield from table([["row", "used", "may use", ""], *map(_broken_words, sheet.broken)], style.table_width)
-        yield ""
-        yield from wrapped(_way_out(sheet), "")
-        if offer is not None:
-            yield ""
-            yield from wrapped(_offered(offer), "  ")
-        return
-    heads = ["specification", "ordered", "declared", "largest share"]
-    yield from table([heads, *map(_line, sheet.specifications)], style.table_width)
-    yield ""
-    if sheet.findings is not None:
-        yield from requirement_table(sheet.findings, style)
-        yield ""
-    keeping = [f"Parts that meet {spec.key}: {_parts_words(spec)}." for spec in sheet.specifications if spec.parts]
-    for text in [*_remarks(sheet), *keeping]:
-        yield from wrapped(text, "  ")
+    yield opening(sheet, _verdict(sheet), "pass" if sheet.complies else "fail", _terms(sheet))
+    yield from _required(sheet)
+    yield from specified(sheet, anchor)
     if offer is not None:
-        yield ""
-        yield from wrapped(_offered(offer), "  ")
-        head = ["figure", "offered", "ordered", ""]
-        lines = [
-            [figure.key, figure.text or "-", figure.ordered or "free", _side(figure)] for figure in offer.figures
-        ]
-        yield from table([head, *lines], style.table_width)
+        yield doc.Paragraph(_offered(offer))
+        if not sheet.broken:
+            heads = doc.heads("figure", *doc.numbers("offered", "ordered"), "")
+            lines: list[doc.Line] = [
+                [doc.Name(figure.key), figure.text or "–", figure.ordered or "free", _side(figure)]
+                for figure in offer.figures
+            ]
+            yield doc.TextTable("Offer", "Offer against the sheet", heads, lines)
 
 
 def _verdict(sheet: SpecificationSheet) -> str:
@@ -167,10 +166,9 @@ def _terms(sheet: SpecificationSheet) -> str:
     return f"{sheet.model} model, {combination}, {percent(sheet.reserve)} of each limit in reserve"
 
 
-def _line(spec: Specification) -> list[str]:
+def _largest_share(spec: Specification) -> str:
     most = max(spec.shares, key=lambda key: spec.shares[key], default="")
-    share = f"{share_percent(spec.shares[most])} of {REQUIREMENT_NAMES[most]}" if most else "no limit"
-    return [spec.key, spec.text or "free", spec.declared_text or "-", share]
+    return f"{share_percent(spec.shares[most])} of {REQUIREMENT_NAMES[most]}" if most else "no limit"
 
 
 def _offered(offer: Offer) -> str:
@@ -233,55 +231,8 @@ def _side(figure: OfferedFigure) -> str:
     return "inside" if figure.is_inside else "OUTSIDE"
 
 
-# ---------------------------------------------------------------- for a board, and a supplier
-def as_markdown(answers: Sequence[Answer], style: Style) -> str:
-    """Write the sheets as Markdown, without drawings."""
-    from bisar_budget.report.renderers.markdown import markdown
-
-    return markdown(_sheets(answers), "")
-
-
-def as_html(answers: Sequence[Answer], style: Style) -> str:
-    """Write the sheets as one page of HTML."""
-    from bisar_budget.report.renderers.html import page
-
-    return page(_sheets(answers))
-
-
-def _sheets(answers: Sequence[Answer]) -> doc.AnswerDocument:
-    chapters = [_chapter(answer, f"sheet-{number}") for number, answer in enumerate(answers, 1)]
-    names = [printable(sheet.name) for sheet, _ in answers]
-    facts = doc.Facts([("Tool", f"bisar-budget {__version__}")])
-    margins = [
-        doc.Margins(chapter.anchor, name, "", printable(sheet.file))
-        for chapter, name, (sheet, _) in zip(chapters, names, answers, strict=True)
-    ]
-    subject = names[0] if len(names) == 1 else f"{len(names)} missions"
-    return doc.AnswerDocument(__version__, subject, facts, margins, chapters, title="Specification sheet")
-
-
-def _chapter(answer: Answer, anchor: str) -> doc.Chapter:
-    sheet, offer = answer
-    facts: list[tuple[doc.Text, doc.Text]] = [("File", doc.Name(printable(sheet.file))), ("Terms", _terms(sheet))]
-    if overrides := overrides_words(sheet):
-        facts.append(("Overrides", overrides))
-    blocks: list[doc.Block] = [
-        doc.Paragraph(_verdict(sheet), f"verdict {'pass' if sheet.complies else 'fail'}"),
-        doc.Facts(facts),
-    ]
-    blocks += [*_required(sheet), *specified(sheet, anchor)]
-    if offer is not None:
-        heads = doc.heads("Figure", *doc.numbers("Offered", "Ordered"), "")
-        lines: list[doc.Line] = [
-            [doc.Name(figure.key), figure.text or "–", figure.ordered or "free", _side(figure)]
-            for figure in offer.figures
-        ]
-        blocks += [doc.Paragraph(_offered(offer)), doc.TextTable("Offer", "Offer against the sheet", heads, lines)]
-    return doc.Chapter(printable(sheet.name), blocks, anchor, level=2, is_article=True)
-
-
 def _required(sheet: SpecificationSheet) -> Iterator[doc.Block]:
-    heads = doc.heads("Requirement", *doc.numbers("Allowed", "Reached", "Use"), "Status", "Decided by")
+    heads = doc.heads("requirement", *doc.numbers("allowed", "reached", "use"), "status", "decided by")
     if sheet.findings is not None and not sheet.broken:
         rows: list[doc.Line] = [
             [line.name, line.allowed, line.reached, line.use, doc.Badge(line.status), _decided_by(line)]
@@ -300,32 +251,43 @@ def specified(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:
     If there are no specifications, yield the rows in which the fixed errors leave no room, and the remedy.
     """
     if sheet.broken:
-        heads = doc.heads("Row", *doc.numbers("Used", "May use"), "")
+        heads = doc.heads("row", *doc.numbers("used", "may use"), "")
         rows: list[doc.Line] = [[doc.Name(name), *cells] for name, *cells in map(_broken_words, sheet.broken)]
         yield doc.TextTable("Rows without room", "Rows in which other errors leave no room", heads, rows)
         yield doc.Paragraph(_way_out(sheet))
         return
-    yield from _table(sheet)
+    yield _table(sheet)
     if limiting(sheet):
         yield doc.Figure(f"{anchor}-shares.svg", anchor, "Use of each limit", "Shares", share_bars(sheet))
     if texts := list(_remarks(sheet)):
         yield doc.Items([[text] for text in texts])
+    keeping = [f"Parts that meet {spec.key}: {_parts_words(spec)}." for spec in sheet.specifications if spec.parts]
+    if keeping:
+        yield doc.Only(doc.TERMINAL, [doc.Items([[text] for text in keeping])])
 
 
-def _table(sheet: SpecificationSheet) -> Iterator[doc.Block]:
+def _table(sheet: SpecificationSheet) -> doc.TextTable:
     keys = [key for key in REQUIREMENT_NAMES if any(key in spec.shares for spec in sheet.specifications)]
-    size_heads = doc.numbers("Ordered", "Found", "Declared", *(f"Share of {REQUIREMENT_NAMES[key]}" for key in keys))
-    heads = doc.heads(*doc.numbers("No."), "Specification", *size_heads, "Parts")
+    share_heads = (f"share of {REQUIREMENT_NAMES[key]}" for key in keys)
+    heads = [
+        doc.Head("specification"),
+        *doc.numbers("ordered"),
+        *doc.numbers("found", medium=doc.PAGE),
+        *doc.numbers("declared"),
+        *doc.numbers(*share_heads, medium=doc.PAGE),
+        doc.Head("largest share", medium=doc.TERMINAL),
+        doc.Head("parts", medium=doc.PAGE),
+    ]
     rows: list[doc.Line] = []
-    for number, spec in enumerate(sheet.specifications, 1):
+    for spec in sheet.specifications:
         shares = [
             share_percent(spec.shares[key]) if spec.shares.get(key, 0.0) > LEAST_WEIGHT_FRACTION else "–"
             for key in keys
         ]
         sizes = (spec.text or "free", spec.found_text or "–", spec.declared_text or "–")
-        rows.append([str(number), doc.Name(spec.key), *sizes, *shares, _parts_words(spec) or "–"])
+        rows.append([doc.Name(spec.key), *sizes, *shares, _largest_share(spec), _parts_words(spec) or "–"])
     caption = "Specifications, rounded down to two digits; shares refer to the usable part of each limit."
-    yield doc.TextTable("Specifications", caption, heads, rows)
+    return doc.TextTable("Specifications", caption, heads, rows)
 
 
 # ---------------------------------------------------------------- for tools that trace requirements

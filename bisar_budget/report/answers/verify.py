@@ -1,28 +1,28 @@
-"""Write the verdicts from images at the limits as text and as JSON `bisar-budget/verify/1`."""
+"""The answer of the command verify: verdicts from images at the limits of a mission."""
 
 import math
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.faults import printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.report import Style
-from bisar_budget.report.formats.json_document import document_text, outside_item, verdict_item
-from bisar_budget.report.words.heading import file_words, overrides_lines
-from bisar_budget.report.words.sentences import table, wrapped, wrapped_counts
+from bisar_budget.report import document as doc
+from bisar_budget.report.answers import Records
+from bisar_budget.report.answers.words import mission_chapter, mission_document, opening
+from bisar_budget.report.formats.json_document import outside_item, verdict_item
 from bisar_budget.units import format_limit, format_quantity
 
 _VERDICT_WORDS = {
     "optimistic": "optimistic",
     "confirmed": "confirmed",
     "conservative": "conservative",
-    "not_evaluated": "not eval",
+    "not_evaluated": "not evaluated",
 }
 _OTHER_MODEL_HEADS = {"published": "full", "full": "II", "strictest": "other"}
-_ANSI = {"optimistic": "1;31", "confirmed": "32", "conservative": "33", "not_evaluated": "35"}
 
 
-def as_json(missions: Sequence[VerifiedMission], style: Style) -> str:
-    """Write the verdicts as the JSON document `verify/1`, with an item for each mission."""
+# ---------------------------------------------------------------- for programs
+def content(answers: Sequence[VerifiedMission]) -> dict[str, object]:
+    """Content of the JSON document `verify/1`, with an item for each mission."""
     items = [
         {
             "file": mission.file,
@@ -32,54 +32,58 @@ def as_json(missions: Sequence[VerifiedMission], style: Style) -> str:
             "conditions": mission.conditions,
             "rows": [verdict_item(row) for row in mission.rows],
         }
-        for mission in missions
+        for mission in answers
     ]
-    return document_text("bisar-budget/verify/1", {"missions": items})
+    return {"missions": items}
 
 
-def as_text(missions: Sequence[VerifiedMission], style: Style) -> str:
-    """Write a table for each mission, with limit, budget, predicted and measured value, and verdict of each row."""
-    blocks = [_mission(mission, style) for mission in missions]
-    return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+def records(answers: Sequence[VerifiedMission]) -> Records:
+    """Table of the answers: one line for each limit, with the keys of a row of `verify/1`."""
+    lines = [
+        {"file": answer.file, "name": answer.name, **verdict_item(row)} for answer in answers for row in answer.rows
+    ]
+    return Records(("file", "name", *Verdict._fields), lines)
 
 
-def _mission(mission: VerifiedMission, style: Style) -> list[str]:
+# ---------------------------------------------------------------- for people
+def document(answers: Sequence[VerifiedMission], style: Style) -> doc.AnswerDocument:
+    """Text of each answer: limit, budget, predicted and measured value, and verdict of each row."""
+    chapters = [mission_chapter(answer, number, _blocks(answer)) for number, answer in enumerate(answers, 1)]
+    return mission_document("Images at the limits", answers, chapters)
+
+
+def _blocks(mission: VerifiedMission) -> Iterator[doc.Block]:
     verdicts = [row.verdict for row in mission.rows]
     counts = ", ".join(
         f"{verdicts.count(verdict)} {word}" for verdict, word in _VERDICT_WORDS.items() if verdict in verdicts
     )
     refuted = sum(row.verdict_autofocus == "optimistic" for row in mission.rows)
     counts += f"; {refuted} optimistic with autofocus" if refuted else ""  # these rows decide the exit code too
-    summary = f"{file_words(mission)}: {counts or 'no row has a limit here'}"
-    conditions = wrapped(f"Images: {mission.conditions}.", "  ") if mission.conditions else []
-    return [
-        *wrapped(printable(mission.name), "  "),
-        *overrides_lines(mission),
-        "",
-        *conditions,
-        "",
-        *evidence(mission.rows, style),
-        "",
-        *wrapped_counts(summary),
-    ]
+    yield opening(mission, counts or "no row has a limit here", mission.status)
+    if mission.conditions:
+        yield doc.Paragraph(f"Images: {mission.conditions}.")
+    yield from evidence(mission.rows)
 
 
-def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
-    """Make the table of verdicts, a second table of verdicts with autofocus, and remarks below them.
+def evidence(rows: Sequence[Verdict]) -> Iterator[doc.Block]:
+    """Yield the table of verdicts, a second table of verdicts with autofocus, and remarks below them.
 
     For a phase, the column `budget` is by the gating model, and the next column has the value by the other model.
     """
     other_head = next((_OTHER_MODEL_HEADS[row.model] for row in rows), "full")
-    heads = ("row", "limit", "budget", other_head, "exact", "image", "verdict")
-    lines = table([heads, *map(_cells, rows)], style.table_width)
-    refocused = [(printable(row.id), *refocused_cells(row)) for row in rows if row.verdict_autofocus]
+    heads = doc.heads("row", *doc.numbers("limit", "budget", other_head, "exact", "image"), "verdict")
+    yield doc.TextTable("Verdicts", "Verdicts of the images at the limits", heads, [_cells(row) for row in rows])
+    refocused: list[doc.Line] = [
+        [doc.Name(row.id), *refocused_cells(row), doc.Badge(row.verdict_autofocus)]
+        for row in rows
+        if row.verdict_autofocus
+    ]
     if refocused:
-        lines += ["", "At the limit with autofocus, refocused:", ""]
-        heads_refocused = ("row", "limit", "budget", "residual", "loss", "verdict")
-        lines += table([heads_refocused, *refocused], style.table_width)
-    lines = [_coloured(line, style) for line in lines]
-    remarks = [line for text in (*geometry_remarks(rows), *reasons_of(rows)) for line in wrapped(f"  {text}", "    ")]
-    return [*lines, "", *remarks] if remarks else lines
+        yield doc.Paragraph("At the limit with autofocus, refocused:")
+        heads = doc.heads("row", *doc.numbers("limit", "budget", "residual", "loss"), "verdict")
+        yield doc.TextTable("Verdicts with autofocus", "Verdicts at the limits with autofocus", heads, refocused)
+    if remarks := [*geometry_remarks(rows), *reasons_of(rows)]:
+        yield doc.Items([[remark] for remark in remarks])
 
 
 def reasons_of(rows: Sequence[Verdict]) -> list[str]:
@@ -131,10 +135,10 @@ def geometry_remarks(rows: Sequence[Verdict]) -> Iterator[str]:
         yield f"smear of the images: within {math.degrees(angle):.2g} deg of (31), farthest {row_id}"
 
 
-def _cells(row: Verdict) -> tuple[str, ...]:
+def _cells(row: Verdict) -> doc.Line:
     budget, published, full, exact, image = numbers(row)
     other_model = {"published": full, "full": published, "strictest": _phase(_smaller(row))}[row.model]
-    return printable(row.id), limit(row), budget, other_model, exact, image, _VERDICT_WORDS[row.verdict]
+    return [doc.Name(row.id), limit(row), budget, other_model, exact, image, doc.Badge(row.verdict)]
 
 
 def _smaller(row: Verdict) -> float | None:
@@ -178,14 +182,13 @@ def _budget(row: Verdict) -> str:
     return "-" if row.budget_rad is None else format_limit(row.budget_rad, "rad").removesuffix(" rad")
 
 
-def refocused_cells(row: Verdict) -> tuple[str, str, str, str, str]:
-    """Five table cells about the image after autofocus: limit, budget, residual phase, peak loss, and verdict."""
+def refocused_cells(row: Verdict) -> tuple[str, str, str, str]:
+    """Four table cells about the image after autofocus: limit, budget, residual phase and peak loss."""
     return (
         "-" if row.boundary_autofocus is None else format_limit(row.boundary_autofocus, row.unit),
         _budget(row),
         _phase(row.measured_residual_qpe_rad),
         _decibel(row.refocused_loss_db),
-        _VERDICT_WORDS[row.verdict_autofocus or "not_evaluated"],
     )
 
 
@@ -195,11 +198,3 @@ def _phase(value: float | None) -> str:
 
 def _decibel(value: float | None) -> str:
     return "-" if value is None else f"{value:.1f} dB" if abs(value) >= 1 else f"{value:.2f} dB"
-
-
-def _coloured(line: str, style: Style) -> str:
-    """Colour the verdict at the end of a line."""
-    for verdict, word in _VERDICT_WORDS.items():
-        if line.endswith(f" {word}"):
-            return line.removesuffix(word) + style.coloured(word, _ANSI[verdict])
-    return line
