@@ -145,6 +145,11 @@ def page_head(head: Head) -> Text:
     return (text, f" [{head.unit}]") if head.unit else text
 
 
+def page_cell(text: Text) -> Text:
+    """Text of a table cell on a page, where a missing value is a dash instead of a hyphen."""
+    return "–" if text == "-" else text
+
+
 def heads(*heads: Head | str) -> list[Head]:
     """Make a list of column heads. A plain string becomes the head of a column of text."""
     return [Head(head) if isinstance(head, str) else head for head in heads]

@@ -151,7 +151,7 @@ def document(answers: Sequence[Compared], style: Style) -> doc.AnswerDocument:
 
 
 def _blocks(mission: MissionChange, gate: Gate | None, all_rows: bool) -> Iterator[doc.Block]:
-    files = f"{printable(mission.before.file)} -> {file_words(mission.after)}"
+    files = f"{printable(mission.before.file)} → {file_words(mission.after)}"
     name = printable(mission.after.name)
     is_worse = (
         any(not refusal.is_allowed for refusal in _refusals(mission, gate))
@@ -222,7 +222,7 @@ class _ChangeInWords(NamedTuple):
     @property
     def words(self) -> str:
         """Description of the change: the text before, an arrow and the text after, or the reason."""
-        return f"{self.before} -> {self.after}" if self.before else self.after
+        return f"{self.before} → {self.after}" if self.before else self.after
 
 
 _TITLE_OF_LABEL = {
@@ -293,7 +293,7 @@ def _erosion(change: Change) -> str:
 
 def _statuses(change: Change) -> str:
     before, after = ("-" if row is None else STATUS[row.status].text for row in (change.before, change.after))
-    return after if before == after else f"{before} -> {after}"
+    return after if before == after else f"{before} → {after}"
 
 
 def _summary(mission: MissionChange, gate: Gate | None, all_rows: bool) -> str:

@@ -191,7 +191,7 @@ def _balance(sensitivity: Sensitivity) -> Iterator[doc.Block]:
             for platform_shares in (error.shares_before, error.shares_after)
         ]
         changes = (_change_words(error.transmitter), _change_words(error.receiver))
-        rows.append([doc.Name(error.key), " -> ".join(shares), *changes])
+        rows.append([doc.Name(error.key), " → ".join(shares), *changes])
     heads = doc.heads("doubled", *doc.numbers("shares t/r", "transmitter", "receiver"))
     yield doc.TextTable("Doubled errors", "Cost of doubling an error", heads, rows)
     remarks = ["For each platform the worst utilization of its other errors, before and after; shares in percent."]
@@ -207,5 +207,5 @@ def _change_words(change: tuple[str, float, float] | None) -> str:
     return (
         percent(before)
         if abs(after - before) <= MIN_SHOWN_CHANGE_FRACTION * before
-        else f"{percent(before)} -> {percent(after)}"
+        else f"{percent(before)} → {percent(after)}"
     )

@@ -185,7 +185,7 @@ def _table(table: doc.TextTable) -> Markup:
     styles = [head.style for head in table.heads]
     for first, *values in table.rows:
         cells = [_cell("th", first, styles[0], "row")]
-        cells += [_cell("td", cell, style) for cell, style in zip(values, styles[1:], strict=True)]
+        cells += [_cell("td", doc.page_cell(cell), style) for cell, style in zip(values, styles[1:], strict=True)]
         lines.append(Markup("<tr>{}</tr>").format(Markup("").join(cells)))
     element = _element("table", table.style, Markup("\n").join(["", *lines, Markup("</tbody>\n")]))
     return _scroll(table.label, element) if table.label else element

@@ -143,7 +143,7 @@ def _facts(pairs: Iterable[tuple[doc.Text, doc.Text]]) -> Iterator[str]:
 def _table(table: doc.TextTable) -> str:
     heads = [_text(doc.page_head(head)) for head in table.heads]
     rules = ["---:" if head.style == "number" else "---" for head in table.heads]
-    rows = [[_text(cell, badge="{}") for cell in row] for row in table.rows]
+    rows = [[_text(doc.page_cell(cell), badge="{}") for cell in row] for row in table.rows]
     return "\n".join(map(markdown_row, (heads, rules, *rows)))
 
 

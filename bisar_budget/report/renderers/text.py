@@ -21,7 +21,10 @@ def text(document: doc.AnswerDocument, style: Style) -> str:
 
 # ---------------------------------------------------------------------- parts of a line
 def plain(line: doc.Text) -> str:
-    """Write a text without its marks. Bars and colour keys, which repeat numbers, are left out."""
+    """Write a text without its marks, in letters that every terminal has.
+
+    Bars and colour keys, which repeat numbers, are left out.
+    """
     match line:
         case tuple():
             return "".join(map(plain, line))
@@ -33,7 +36,7 @@ def plain(line: doc.Text) -> str:
             return ""
         case doc.Name(words) | doc.Code(words):
             return printable(words)
-    return printable(line)
+    return printable(line).replace(" → ", " -> ")
 
 
 def _badge_words(status: str) -> str:
@@ -94,12 +97,12 @@ def _items(block: doc.Items, indent: str = "") -> Iterator[str]:
 
 
 def _opening(opening: doc.Opening, style: Style) -> Iterator[str]:
-    first, *continuation = wrapped(printable(opening.verdict), "  ")
+    first, *continuation = wrapped(plain(opening.verdict), "  ")
     yield style.coloured(first, STATUS[opening.status].sgr)
     yield from continuation
     terms = f"; {opening.terms}" if opening.terms else ""
     for words in (*opening.more, f"{opening.file}, {opening.name}{terms}"):
-        yield from wrapped(printable(words), "  ")
+        yield from wrapped(plain(words), "  ")
     line = f"Overrides: {'; '.join(opening.overrides)}"
     if len(line) <= TEXT_WIDTH or len(opening.overrides) < 2:
         yield from wrapped(line, "  ") if opening.overrides else []
