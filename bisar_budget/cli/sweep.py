@@ -14,6 +14,7 @@ from bisar_budget.cli.options import (
     MODEL,
     SET,
     day_and_outside,
+    format_option,
     output_option,
     plot_option,
     scheduler_options,
@@ -22,6 +23,7 @@ from bisar_budget.cli.streams import (
     BROKEN_EXIT_CODE,
     PICTURE_SUFFIXES,
     complain,
+    deliver_answer,
     deliver_parts,
     fail,
     load_all,
@@ -31,11 +33,13 @@ from bisar_budget.cli.streams import (
     write_file,
 )
 from bisar_budget.faults import printable
+from bisar_budget.report.answers import ANSWERS, format_of_file, suffixes
 
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
     from bisar_budget.front.sweeps import SweepResult
 
+_TABLE_SUFFIXES = (".csv", ".parquet", ".nc")
 MAX_UNFORCED_CASES = 100_000_000  # more need --force, since the table has tens of gigabytes
 
 
@@ -68,7 +72,13 @@ MAX_UNFORCED_CASES = 100_000_000  # more need --force, since the table has tens 
     metavar="ROW.FIELD",
     help="A column more, such as receiver.velocity.x.allowable. Repeatable.",
 )
-@output_option("Write to FILE: .csv, .parquet or .nc (NetCDF).")
+@format_option(
+    ANSWERS["sweep"].formats,
+    "Format of the table (default: that of the suffix of -o, else csv); xlsx needs -o.",
+    default=None,
+    show_default=False,
+)
+@output_option("Write to FILE: .csv, .parquet, .nc (NetCDF), or a format of --format.")
 @plot_option("Draw one key as curves of utilization, two as a map: .svg, .png or .pdf.")
 @click.option("--plot-column", metavar="NAME", help="Draw this column instead of utilization and status.")
 @click.option("--polar", "is_polar", is_flag=True, help="Draw the map over an azimuth as seen from above.")
@@ -90,6 +100,7 @@ def sweep(
     cases_file: str | None,
     sample: str | None,
     columns: Sequence[str],
+    format_name: str | None,
     output: str | None,
     plot: str | None,
     plot_column: str | None,
@@ -110,7 +121,10 @@ def sweep(
     reason. CSV goes to standard output without -o and --plot. Exit code: 0 if any case is judged, 1 if none is, 2 for
     wrong usage or an unusable mission file.
     """
-    suffix_of(None if output == "-" else output, (".csv", ".parquet", ".nc"))
+    if format_name is None and output not in (None, "-"):
+        suffix_of(output, tuple(dict.fromkeys((*_TABLE_SUFFIXES, *suffixes("sweep")))))
+        format_name = format_of_file("sweep", str(output))
+    is_table = format_name in (None, "csv")
     if plot == "-":
         raise click.UsageError("--plot needs the name of a file.")
     suffix_of(plot, PICTURE_SUFFIXES)
@@ -136,8 +150,10 @@ def sweep(
         judged_on, from_outside = day_and_outside(today)
         is_kept = scheduler is not None or is_resumed
         if is_kept:
-            if output is None or output == "-":
-                raise click.UsageError("--scheduler and --resume need -o FILE: parts are kept in FILE.parts.")
+            if output is None or output == "-" or not is_table:
+                raise click.UsageError(
+                    "--scheduler and --resume need -o FILE.csv, .parquet or .nc: parts are kept in FILE.parts."
+                )
             if scheduler is None:
                 hold_to_tables()
         if plot_column is not None and "." in plot_column and plot_column not in columns:
@@ -148,7 +164,15 @@ def sweep(
             )
             run.workers, run.beside, run.is_resumed = workers, output if is_kept else None, is_resumed
             _foresee(run, force)
-            _write(run, output, plot, plot_column, is_polar)
+            if is_table:
+                _write(run, output, plot, plot_column, is_polar)
+            else:
+                deliver_answer("sweep", run.answers, format_name, output)
+                if plot is not None:
+                    write_file(
+                        plot, run.plot(plot_column, is_polar=is_polar).of(suffix_of(plot, PICTURE_SUFFIXES)[1:])
+                    )
+                complain(f"{printable(run.mission.name)}: {run.so_far}")
         sys.exit(BROKEN_EXIT_CODE if run.is_unjudged else 0)
     except TableError as error:
         for line in error.lines:

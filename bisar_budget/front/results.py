@@ -278,33 +278,19 @@ _NESTED = ("displacement_m", "notes")  # fields of a row that fit in no cell of 
 
 
 # ---------------------------------------------------------------------- answers to other questions
-@dataclass(frozen=True, repr=False, eq=False)
-class _Answer:
-    """Base class of results, which wrap the findings `found` and have all attributes of `found`.
-
-    `COMMAND` is the command of the same answer. A notebook shows a result as `_repr_html_` of its class writes it.
-    """
+class AnswerResult:
+    """Base class of results: an answer of the command `COMMAND` that converts to each of its formats."""
 
     COMMAND: ClassVar[str] = ""
-    found: Any
-
-    def __getattr__(self, name: str) -> Any:
-        """Return the attribute of `found` for a name that the result itself does not have."""
-        if name.startswith("_") or name == "found":
-            raise AttributeError(name)
-        return getattr(self.found, name)
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *dir(self.found)} - set(dir(tuple)))
 
     @property
-    def _answers(self) -> Sequence[object]:
+    def answers(self) -> Sequence[object]:
         """The answer in the form that the module of `report.answers` takes."""
-        return [self.found]
+        raise NotImplementedError
 
     def to_dict(self) -> JsonDocument:
         """Return, as a dictionary, the document that the command of the same name writes with `--format json`."""
-        document: JsonDocument = json.loads(written(self.COMMAND, "json", self._answers, Style()))
+        document: JsonDocument = json.loads(written(self.COMMAND, "json", self.answers, Style()))
         return document
 
     def to_dataframe(self, library: str | None = None) -> DataFrame:
@@ -317,7 +303,7 @@ class _Answer:
         MissingPackageError
             The library is not installed, or neither of the two is.
         """
-        records = records_of(self.COMMAND, self._answers)
+        records = records_of(self.COMMAND, self.answers)
         return frame_of({name: records.column(name) for name in records.columns}, library)
 
     def report(self, path: str | os.PathLike[str]) -> None:
@@ -336,10 +322,31 @@ class _Answer:
         form = format_of_file(self.COMMAND, name)
         if form is None:
             raise ValueError(f"{name}: the suffix must be one of {', '.join(suffixes(self.COMMAND))}")
-        for file, data in files(self.COMMAND, form, self._answers, Style(), name).items():
+        for file, data in files(self.COMMAND, form, self.answers, Style(), name).items():
             if folder := os.path.dirname(file):
                 os.makedirs(folder, exist_ok=True)
             write_file(file, data if isinstance(data, bytes) else data.encode())
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class _Found(AnswerResult):
+    """Base class of results that wrap the findings `found` and have all attributes of `found`."""
+
+    found: Any
+
+    def __getattr__(self, name: str) -> Any:
+        """Return the attribute of `found` for a name that the result itself does not have."""
+        if name.startswith("_") or name == "found":
+            raise AttributeError(name)
+        return getattr(self.found, name)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *dir(self.found)} - set(dir(tuple)))
+
+    @property
+    def answers(self) -> Sequence[object]:
+        """The findings, as the only answer."""
+        return [self.found]
 
 
 def _waived(waivers: Sequence[Sequence[str]]) -> str:
@@ -351,7 +358,7 @@ def _waived(waivers: Sequence[Sequence[str]]) -> str:
     return f", {waived_count(len(waivers), ids)}" if waivers else ""
 
 
-class SolveResult(_Answer):
+class SolveResult(_Found):
     """Result of `solve`: the values at which compliance begins or ends.
 
     For a number, the result has the attributes `value` in SI, `crossings`, `status` and `nearest`. For a key that
@@ -395,7 +402,7 @@ class SolveResult(_Answer):
         )
 
 
-class SensitivityResult(_Answer):
+class SensitivityResult(_Found):
     """Result of `sensitivity`: `slopes` has the effect of each number on the worst utilization, largest first."""
 
     COMMAND: ClassVar[str] = "sensitivity"
@@ -418,7 +425,7 @@ class SensitivityResult(_Answer):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class AllocateResult(_Answer):
+class AllocateResult(_Found):
     """Result of `allocate`: specifications that together meet every requirement.
 
     The attributes `specifications`, `complies` and `requirements` are those of `found`. If `allocate` was given the
@@ -435,7 +442,8 @@ class AllocateResult(_Answer):
         return f"<allocate of {self.found.name!r}: {len(self.found.specifications)} specifications, {verdict_words}>"
 
     @property
-    def _answers(self) -> Sequence[object]:
+    def answers(self) -> Sequence[object]:
+        """The sheet and the offer, as the only answer."""
         return [(self.found, self.offer)]
 
     def _repr_html_(self) -> str:
@@ -446,7 +454,7 @@ class AllocateResult(_Answer):
         )
 
 
-class VerifyResult(_Answer):
+class VerifyResult(_Found):
     """Result of `verify`: `rows` has the verdict of images on each limit, and `status` summarizes the verdicts."""
 
     COMMAND: ClassVar[str] = "verify"
@@ -467,7 +475,7 @@ class VerifyResult(_Answer):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class PassesResult(_Answer):
+class PassesResult(_Found):
     """Result of `passes`: a sequence of the passes of a satellite, each with the verdict of the mission in it.
 
     `mission` and `model` are the arguments of the function `passes`.
@@ -518,7 +526,7 @@ class PassesResult(_Answer):
         return self.plot()._repr_html_()
 
 
-class MonteCarloResult(_Answer):
+class MonteCarloResult(_Found):
     """Result of `monte_carlo`: probabilities that each requirement, and all requirements together, are met.
 
     `probability` is that of all requirements together, and `requirements` has an entry for each requirement. Every

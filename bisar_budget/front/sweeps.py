@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property, partial
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -20,9 +20,10 @@ from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import complying
 from bisar_budget.front import progress
 from bisar_budget.front.checks import gathered
-from bisar_budget.front.results import DataFrame, MissingPackageError, Picture, frame_of
+from bisar_budget.front.results import AnswerResult, DataFrame, MissingPackageError, Picture, frame_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError
+from bisar_budget.report.answers.sweep import MAX_ANSWER_CASES, SweptCases, status_of
 from bisar_budget.report.drawing.trades import Gathered, check_plot, uses_of_rows
 from bisar_budget.report.tables import Described, dataset
 from bisar_budget.report.words.sentences import waived_count
@@ -40,7 +41,7 @@ _MAX_SHOWN_CASES = 10  # largest number of cases that a notebook shows, if there
 
 
 @dataclass(repr=False, eq=False)
-class SweepResult:
+class SweepResult(AnswerResult):
     """Result of `sweep`: a table with the results of checking a mission for many sets of values.
 
     Each case is `mission` with one set of the values in `cases`, and is a line of the table. Cases are checked when
@@ -51,6 +52,7 @@ class SweepResult:
     that was interrupted continues with the stored parts.
     """
 
+    COMMAND: ClassVar[str] = "sweep"
     mission: Mission
     cases: Cases
     more: tuple[str, ...]
@@ -289,13 +291,34 @@ class SweepResult:
                 columns[column.name].append(array.from_delayed(values[column.name], (stop - start,), kind))
         return {name: array.concatenate(chunk_arrays) for name, chunk_arrays in columns.items()}
 
-    def plot(self, column: str | None = None) -> Picture:
+    @property
+    def answers(self) -> list[SweptCases]:
+        """The checked cases, for the formats that have all of them in memory.
+
+        Raises
+        ------
+        QuestionError
+            There are more than 40 000 cases.
+        """
+        if self.cases.count > MAX_ANSWER_CASES:
+            accepted = f"up to {MAX_ANSWER_CASES}; CSV, Parquet and NetCDF files take more"
+            raise QuestionError(f"{self.cases.count} cases are too many for a document; accepted: {accepted}")
+        try:
+            drawing = self.plot().of("svg").decode()
+        except QuestionError:  # the cases have no axes
+            drawing = ""
+        swept = SweptCases(self.mission, self._table, self.columns, self.summary, "", self.overrides, drawing)
+        return [swept._replace(status=status_of(self.statuses))]
+
+    def plot(self, column: str | None = None, *, is_polar: bool = False) -> Picture:
         """Draw curves of utilization over one key, or a map of the complying cases over two keys.
 
         Parameters
         ----------
         column : str, optional
             Name of a column of numbers to draw instead.
+        is_polar : bool
+            Whether to draw a map over an azimuth as seen from above.
 
         Raises
         ------
@@ -304,13 +327,14 @@ class SweepResult:
         """
         from bisar_budget.report.drawing.figure import drawing_file
 
-        check_plot(self.cases, is_polar=False)
+        check_plot(self.cases, is_polar=is_polar)
         table = self._table
         gathered_cases = Gathered(table, column=column)
         for block in table.swept.parts:
             gathered_cases.add(block)
         return Picture(
-            f"{self._keys(' and ')}, {self.mission.name}", partial(drawing_file, self.drawing(gathered_cases))
+            f"{self._keys(' and ')}, {self.mission.name}",
+            partial(drawing_file, self.drawing(gathered_cases, is_polar=is_polar)),
         )
 
     def _repr_html_(self) -> str:

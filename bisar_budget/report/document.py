@@ -10,6 +10,7 @@ from itertools import compress
 
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report.explain.notation import WorkedEquation
+from bisar_budget.report.words.sentences import sentence
 
 
 # ---------------------------------------------------------------------- text of a line
@@ -140,8 +141,8 @@ class Head:
 
 
 def page_head(head: Head) -> Text:
-    """Text of a column head on a page, which begins with a capital letter and has the unit behind it."""
-    text = head.text[:1].upper() + head.text[1:] if isinstance(head.text, str) else head.text
+    """Text of a column head on a page, which begins with a capital letter, unless it is a key, and has its unit."""
+    text = sentence(head.text) if isinstance(head.text, str) else head.text
     return (text, f" [{head.unit}]") if head.unit else text
 
 

@@ -1,12 +1,13 @@
 """Write the answer of any command in any format. The table of answers names the module of each.
 
-The module of an answer has three functions, each of which takes the sequence of answers, one for each mission:
+The module of an answer has three functions, each of which takes the sequence of answers, one for each mission. The
+answers of `passes`, `sweep` and `diff` are about one run, so that their sequence has one entry.
 
 - `content(answers)` returns the content of the JSON document, without its first keys `format` and `version`;
 - `records(answers)` returns the table of numbers for CSV, data frames and workbooks, in SI units and radians;
 - `document(answers, style)` returns the text of the answer, for a terminal, Markdown, HTML and workbooks.
 
-A format that only one answer has is a function `as_NAME(answers, style)` of its module, such as `as_sdoc`.
+A format that an answer writes in its own way is a function of its module, such as `as_sdoc(answers, style)`.
 """
 
 import os
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class AnswerForm(NamedTuple):
-    """The answer of a command: the module in this package that describes it, and formats that only it has."""
+    """The answer of a command: the module in this package that describes it, and formats that the module writes."""
 
     command: str
     module: str
@@ -30,7 +31,7 @@ class AnswerForm(NamedTuple):
     @property
     def formats(self) -> tuple[str, ...]:
         """Names of all formats of the answer."""
-        return (*COMMON_FORMATS, *self.own_formats)
+        return tuple(dict.fromkeys((*COMMON_FORMATS, *self.own_formats)))
 
 
 COMMON_FORMATS = ("text", "json", "csv", "markdown", "html", "xlsx")
@@ -43,6 +44,7 @@ ANSWERS = {
         AnswerForm("passes", "passes", ("ics",)),
         AnswerForm("verify", "verify"),
         AnswerForm("diff", "diff"),
+        AnswerForm("sweep", "sweep", ("csv",)),
     )
 }
 _SUFFIXES = {
