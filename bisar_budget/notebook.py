@@ -10,22 +10,23 @@ _NOTEBOOK_STYLE = """<style>
 .bisar-budget td:not(:last-child) { white-space: nowrap }
 .bisar-budget thead th { border-bottom: 1px solid currentColor; font-weight: 600 }
 .bisar-budget td.number { text-align: right; font-variant-numeric: tabular-nums }
+.bisar-budget { --fail: #c0272d; --doubt: #8a5a00; --pass: #1a7f37; --mission: #57606a }
 .bisar-budget .status { display: inline-block; padding: 0 0.5em; border-radius: 0.3em; color: #fff; font-weight: 600 }
+.bisar-budget .status { background: var(--tone, var(--mission)) }
+.bisar-budget .verdict { font-weight: 600; border-left: 0.3em solid var(--tone, var(--mission)); padding-left: 0.5em }
+.bisar-budget dl { margin: 0.4em 0 }
+.bisar-budget dl div { display: flex; gap: 1em }
+.bisar-budget dt { min-width: 7em; opacity: 0.7; font-weight: 400 }
+.bisar-budget dd { margin: 0 }
+.bisar-budget caption { text-align: left; opacity: 0.7 }
+.bisar-budget figure { margin: 0.4em 0 }
+.bisar-budget svg.use { width: 8em; height: 0.6em; margin-left: 0.6em }
+.bisar-budget svg .track { fill: currentColor; opacity: 0.15 }
+.bisar-budget svg .fill, .bisar-budget svg .break { fill: var(--tone, var(--mission)) }
+.bisar-budget svg .limit { stroke: currentColor }
 .bisar-budget .muted { opacity: 0.7 }
 .bisar-budget svg, .bisar-budget img { max-width: 100%; height: auto }
 </style>"""
-# White text on each colour has a contrast of at least 4.5, on light and on dark pages.
-_COLOURS = {
-    "pass": "#1a7f37",
-    "pass_with_autofocus": "#1a7f37",
-    "waived": "#8a5a00",
-    "info": "#57606a",
-    "not_declared": "#57606a",
-    "warn": "#8a5a00",
-    "not_evaluated": "#8250df",
-    "fail": "#c0272d",
-    "error": "#c0272d",
-}
 
 
 def page(*elements: str) -> str:
@@ -33,28 +34,14 @@ def page(*elements: str) -> str:
     return f'{_NOTEBOOK_STYLE}<div class="bisar-budget">{"".join(elements)}</div>'
 
 
-def heading(status: str, title: str, remark: str = "") -> str:
-    """HTML of a heading: the verdict `status`, the title of the result, and a remark in paler text."""
-    texts = f' <span class="muted">{escape(remark)}</span>' if remark else ""
-    return f"<p>{badge(status)} <strong>{escape(title)}</strong>{texts}</p>"
-
-
-def badge(status: str) -> str:
-    """HTML of a status on a background in the colour of the status."""
-    colour = _COLOURS.get(status, "#57606a")
-    return f'<span class="status" style="background: {colour}">{escape(status.replace("_", " "))}</span>'
-
-
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """HTML table; the values of a column `status` are badges, and numbers are aligned to the right."""
+    """HTML table; numbers are aligned to the right."""
     head = "".join(f"<th>{escape(name)}</th>" for name in columns)
-    body = "".join(f"<tr>{''.join(map(_cell, columns, row))}</tr>" for row in rows)
+    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
-def _cell(column: str, value: object) -> str:
-    if column == "status" and isinstance(value, str):
-        return f"<td>{badge(value)}</td>"
+def _cell(value: object) -> str:
     if isinstance(value, int | float):
         return f'<td class="number">{value:.4g}</td>'
     return f"<td>{'' if value is None else escape(str(value))}</td>"

@@ -19,15 +19,14 @@ from bisar_budget.findings.images import VerifiedMission
 from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.findings.monte_carlo import MonteCarlo
 from bisar_budget.findings.requirement import JudgedRequirement
-from bisar_budget.findings.row import Row, unknown_id, worst_first
+from bisar_budget.findings.row import Row, unknown_id
 from bisar_budget.findings.specification import SpecificationSheet
 from bisar_budget.findings.status import exit_code
 from bisar_budget.json_types import JsonDocument
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import FORMATS, Style, content, format_of, pictures, render
-from bisar_budget.report.answers import files, format_of_file, records_of, suffixes, written
-from bisar_budget.report.words.requirements import declared_words, requirement_lines, verdict
-from bisar_budget.report.words.sentences import allowable_words, matters, row_size, shown_use, use_words, waived_count
+from bisar_budget.report.answers import files, format_of_file, module_of, records_of, suffixes, written
+from bisar_budget.report.words.sentences import waived_count
 from bisar_budget.resources import special_file
 
 if TYPE_CHECKING:
@@ -37,10 +36,6 @@ if TYPE_CHECKING:
     from bisar_budget.design.sensitivity import Sensitivity
     from bisar_budget.design.solve import Solution
     from bisar_budget.simulator.point import PointImages
-
-_COMPLIES = ("fail", "pass")
-_HEADINGS = {"none": "fail", "waived": "waived"}  # of a solution, by its status
-_MAX_SHOWN_ROWS = 12  # largest number of rows of a result that a notebook shows
 
 
 DataFrame = Any
@@ -242,36 +237,10 @@ class CheckResult(Mapping[str, Row]):
         return Report(version=__version__, missions=(self.findings,))
 
     def _repr_html_(self) -> str:
-        findings = self.findings
-        required = [
-            (
-                line.name,
-                line.allowed,
-                line.reached,
-                line.use,
-                line.status,
-                ", ".join(filter(None, (line.decided_by, line.remark))),
-            )
-            for line in requirement_lines(findings)
-        ]
-        rows = [row for row in worst_first(findings.rows) if matters(row) or findings.is_empty]
-        shown = [
-            (
-                row.id,
-                row_size(row.declared, row, findings),
-                allowable_words(row, findings),
-                use_words(shown_use(row)),
-                row.status,
-            )
-            for row in rows[:_MAX_SHOWN_ROWS]
-        ]
-        hidden_count = len(findings.rows) - len(shown)
-        return notebook.page(
-            notebook.heading(findings.status, findings.name, verdict(findings)),
-            notebook.table(("requirement", "allowed", "reached", "use", "status", "decided by"), required),
-            notebook.table(("row", "declared", "allowable", "use", "status"), shown),
-            notebook.note(f"{declared_words(findings.kinds)} {hidden_count} rows more: to_dataframe()."),
-        )
+        from bisar_budget.report.answers.check import brief
+        from bisar_budget.report.renderers.notebook import fragment
+
+        return fragment(brief(self.findings))
 
 
 _NESTED = ("displacement_m", "notes")  # fields of a row that fit in no cell of a table
@@ -287,6 +256,11 @@ class AnswerResult:
     def answers(self) -> Sequence[object]:
         """The answer in the form that the module of `report.answers` takes."""
         raise NotImplementedError
+
+    def _repr_html_(self) -> str:
+        from bisar_budget.report.renderers.notebook import fragment
+
+        return fragment(module_of(self.COMMAND).document(self.answers, Style()))
 
     def to_dict(self) -> JsonDocument:
         """Return, as a dictionary, the document that the command of the same name writes with `--format json`."""
@@ -382,25 +356,6 @@ class SolveResult(_Found):
             return f"{'every' if self.status == 'all' else 'no'} value of the range complies{waived_words}"
         return f"{self.value:.6g} {self.unit}{waived_words}"
 
-    def _repr_html_(self) -> str:
-        answer, rows = self.found, list[tuple[object, ...]]()
-        if (parts := getattr(answer, "parts", None)) is not None:
-            columns = ("part", "status", "worst row", "use")
-            for part in parts:
-                standing = part.standing
-                worst = standing.row or part.reason
-                rows.append((part.id, standing.status, worst, use_words(standing.utilization)))
-        else:
-            columns = (f"complies at [{self.unit}]", "worst row", "use", "breaks beyond by")
-            for crossing in self.crossings:
-                inside, outside = crossing.inside, crossing.outside
-                rows.append((inside.value, inside.row or "", use_words(inside.utilization), outside.row or ""))
-        title = f"{answer.key} of {answer.name}"
-        return notebook.page(
-            notebook.heading(_HEADINGS.get(answer.status, "pass"), title, f"{answer.status}: {self._summary}"),
-            notebook.table(columns, rows),
-        )
-
 
 class SensitivityResult(_Found):
     """Result of `sensitivity`: `slopes` has the effect of each number on the worst utilization, largest first."""
@@ -419,9 +374,6 @@ class SensitivityResult(_Found):
         from bisar_budget.report.drawing.tornado import tornado
 
         return Picture(f"sensitivity of {self.found.name}", partial(drawing_file, tornado(self.found)))
-
-    def _repr_html_(self) -> str:
-        return self.plot()._repr_html_()
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -446,13 +398,6 @@ class AllocateResult(_Found):
         """The sheet and the offer, as the only answer."""
         return [(self.found, self.offer)]
 
-    def _repr_html_(self) -> str:
-        rows = [(each.key, each.text or "no limit") for each in self.found.specifications]
-        return notebook.page(
-            notebook.heading(_COMPLIES[self.found.complies], f"Specifications of {self.found.name}"),
-            notebook.table(("key", "order at most"), rows),
-        )
-
 
 class VerifyResult(_Found):
     """Result of `verify`: `rows` has the verdict of images on each limit, and `status` summarizes the verdicts."""
@@ -465,13 +410,6 @@ class VerifyResult(_Found):
         counts = Counter(row.verdict for row in self.found.rows)
         verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
         return f"<verify of {self.found.name!r}: {verdicts}>"
-
-    def _repr_html_(self) -> str:
-        rows = [(row.id, row.boundary_error, row.unit, row.verdict) for row in self.found.rows]
-        return notebook.page(
-            notebook.heading(self.found.status, f"Images at the limits of {self.found.name}"),
-            notebook.table(("row", "limit", "unit", "verdict"), rows),
-        )
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -522,9 +460,6 @@ class PassesResult(_Found):
         title = f"Passes over the scene of {self.found.name}"
         return Picture(title, partial(drawing_file, sky_plot(self.found, title, verdict(self.found))))
 
-    def _repr_html_(self) -> str:
-        return self.plot()._repr_html_()
-
 
 class MonteCarloResult(_Found):
     """Result of `monte_carlo`: probabilities that each requirement, and all requirements together, are met.
@@ -533,6 +468,7 @@ class MonteCarloResult(_Found):
     probability has a confidence interval.
     """
 
+    COMMAND: ClassVar[str] = "monte_carlo"
     found: MonteCarlo
 
     def __repr__(self) -> str:
@@ -542,23 +478,6 @@ class MonteCarloResult(_Found):
             return f"<monte_carlo: {answer.draws} draws, no requirement to hold>"
         interval = f"{answer.probability_low:.4g} to {answer.probability_high:.4g}"
         return f"<monte_carlo: {answer.draws} draws, all hold in {answer.probability:.4g} ({interval})>"
-
-    def to_dict(self) -> JsonDocument:
-        """Return, as a dictionary, the Monte Carlo results as `check --monte-carlo --format json` writes them."""
-        from bisar_budget.report.formats.json_document import monte_carlo_item
-
-        document: JsonDocument = json.loads(json.dumps(monte_carlo_item(self.found)))
-        return document
-
-    def _repr_html_(self) -> str:
-        rows = [
-            (each.id, each.probability, each.probability_low, each.probability_high)
-            for each in self.found.requirements
-        ]
-        return notebook.page(
-            notebook.table(("requirement", "holds in", "from", "to"), rows),
-            notebook.note(f"{self.found.draws} draws, intervals of {100 * self.found.confidence:g} %"),
-        )
 
 
 class SimulateResult:

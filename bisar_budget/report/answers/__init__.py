@@ -45,6 +45,7 @@ ANSWERS = {
         AnswerForm("verify", "verify"),
         AnswerForm("diff", "diff"),
         AnswerForm("sweep", "sweep", ("csv",)),
+        AnswerForm("monte_carlo", "monte_carlo"),
     )
 }
 _SUFFIXES = {

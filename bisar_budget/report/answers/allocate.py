@@ -16,12 +16,11 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
-from bisar_budget.report.answers.words import mission_chapter, mission_document, opening
+from bisar_budget.report.answers.words import mission_chapter, mission_document, opening, requirement_table
 from bisar_budget.report.drawing.share_bars import LEAST_WEIGHT_FRACTION, limiting, share_bars
 from bisar_budget.report.formats.json_document import outside_item
 from bisar_budget.report.formats.traceability import identifier, needs_document
 from bisar_budget.report.words.identity import Identity, distinct, identities
-from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
 from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, share_percent
 
 _LISTED_COUNT = 3  # parts of the catalogue that a table names
@@ -134,8 +133,9 @@ def document(answers: Sequence[Answer], style: Style) -> doc.AnswerDocument:
 def _blocks(answer: Answer, anchor: str) -> Iterator[doc.Block]:
     sheet, offer = answer
     yield opening(sheet, _verdict(sheet), "pass" if sheet.complies else "fail", _terms(sheet))
-    yield from _required(sheet)
     yield from specified(sheet, anchor)
+    if sheet.findings is not None and not sheet.broken:
+        yield requirement_table(sheet.findings)
     if offer is not None:
         yield doc.Paragraph(_offered(offer))
         if not sheet.broken:
@@ -229,20 +229,6 @@ def _side(figure: OfferedFigure) -> str:
     if figure.is_inside is None:
         return figure.remark
     return "inside" if figure.is_inside else "OUTSIDE"
-
-
-def _required(sheet: SpecificationSheet) -> Iterator[doc.Block]:
-    heads = doc.heads("requirement", *doc.numbers("allowed", "reached", "use"), "status", "decided by")
-    if sheet.findings is not None and not sheet.broken:
-        rows: list[doc.Line] = [
-            [line.name, line.allowed, line.reached, line.use, doc.Badge(line.status), _decided_by(line)]
-            for line in requirement_lines(sheet.findings)
-        ]
-        yield doc.TextTable("Requirements", "Requirements with the ordered sizes", heads, rows)
-
-
-def _decided_by(line: RequirementLine) -> doc.Text:
-    return (doc.Name(line.decided_by), f", {line.remark}") if line.remark else doc.Name(line.decided_by)
 
 
 def specified(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:

@@ -2,13 +2,18 @@
 
 from collections.abc import Mapping
 
-from bisar_budget.findings.mission import Report
+from bisar_budget.findings.mission import MissionFindings, Report
+from bisar_budget.findings.row import worst_first
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
+from bisar_budget.report.answers.words import mission_chapter, mission_document, opening, requirement_table
 from bisar_budget.report.compliance.summary import compliance
 from bisar_budget.report.formats.csv_table import CSV_COLUMNS, lines_of
 from bisar_budget.report.renderers import html, markdown, xlsx
+from bisar_budget.report.words.heading import rule_words
+from bisar_budget.report.words.requirements import declared_words, verdict
+from bisar_budget.report.words.sentences import allowable_words, matters, row_size, shown_use, use_words
 
 
 def document(report: Report, style: Style) -> doc.AnswerDocument:
@@ -40,3 +45,35 @@ def pictures(report: Report, style: Style) -> Mapping[str, bytes]:
 def as_xlsx(report: Report, style: Style) -> bytes:
     """Write the compliance report as a workbook; its last sheet has the lines of CSV."""
     return xlsx.workbook(document(report, style), records(report))
+
+
+_MAX_BRIEF_ROWS = 12  # largest number of rows of a notebook
+
+
+def brief(findings: MissionFindings) -> doc.AnswerDocument:
+    """Shorter text of the answer for a notebook: the table of requirements, and the rows that matter most."""
+    rows = [row for row in worst_first(findings.rows) if matters(row) or findings.is_empty]
+    blocks: list[doc.Block] = [
+        opening(findings, verdict(findings), findings.status, rule_words(findings)),
+        requirement_table(findings),
+        doc.TextTable(
+            "Rows",
+            "Rows, worst first",
+            doc.heads("row", *doc.numbers("declared", "allowable", "use"), "status"),
+            [
+                [
+                    doc.Name(row.id),
+                    row_size(row.declared, row, findings),
+                    allowable_words(row, findings),
+                    use_words(shown_use(row)),
+                    doc.Badge(row.status),
+                ]
+                for row in rows[:_MAX_BRIEF_ROWS]
+            ],
+        ),
+        doc.Paragraph(
+            f"{declared_words(findings.kinds)} {len(findings.rows) - len(rows[:_MAX_BRIEF_ROWS])} rows more: "
+            "to_dataframe()."
+        ),
+    ]
+    return mission_document("Check", [findings], [mission_chapter(findings, 1, blocks)])

@@ -1,11 +1,13 @@
-"""Parts that the documents of all answers share: the opening, the chapter of a mission, and the whole document."""
+"""Parts that the documents of all answers share: the opening, the chapter of a mission, the table of requirements."""
 
 from collections.abc import Iterable, Sequence
 
 from bisar_budget import __version__
 from bisar_budget.faults import printable
+from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.report import document as doc
 from bisar_budget.report.words.heading import AboutMission, file_words, other_overrides
+from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
 
 
 def opening(
@@ -33,3 +35,19 @@ def mission_document(
     subject = names[0] if len(names) == 1 else f"{len(names)} missions"
     facts = doc.Facts([("Tool", f"bisar-budget {__version__}")])
     return doc.AnswerDocument(__version__, subject, facts, margins, chapters, title=title)
+
+
+def requirement_table(findings: MissionFindings) -> doc.TextTable:
+    """Make the table of requirements of a mission."""
+    heads = doc.heads("requirement", *doc.numbers("allowed", "reached", "use"), "status", "decided by")
+    rows: list[doc.Line] = [
+        [line.name, line.allowed, line.reached, line.use, doc.Badge(line.status), _decided_by(line)]
+        for line in requirement_lines(findings)
+    ]
+    return doc.TextTable("Requirements", "Requirements and their verdicts", heads, rows)
+
+
+def _decided_by(line: RequirementLine) -> doc.Text:
+    if not line.remark:
+        return doc.Name(line.decided_by)
+    return (doc.Name(line.decided_by), ", " if line.decided_by else "", line.remark)

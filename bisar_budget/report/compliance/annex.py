@@ -16,19 +16,18 @@ from bisar_budget.error_kinds import SourceKind
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.images import ImageEvidence, PointImage
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.monte_carlo import MonteCarlo
 from bisar_budget.findings.specification import SpecificationSheet
 from bisar_budget.findings.status import STATUS, complying
 from bisar_budget.findings.trade import Axis, Trade, TradeStudy
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import verify as verification
 from bisar_budget.report.answers.allocate import specified
+from bisar_budget.report.answers.monte_carlo import draws
 from bisar_budget.report.compliance.rows import (
     Page,
     all_contributions,
     all_remarks,
     grouped,
-    limit_words,
     matrix_table,
     undeclared_table,
 )
@@ -42,9 +41,7 @@ from bisar_budget.report.drawing.evidence_drawings import (
 from bisar_budget.report.drawing.trade_drawing import trade_drawing
 from bisar_budget.report.drawing.trades import per_word, stretches
 from bisar_budget.report.explain.explanation import chain, collection_chain
-from bisar_budget.report.words.requirements import probability_words
 from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, sentence, waived_count
-from bisar_budget.units import format_quantity
 
 _MAX_LISTED_LINES = 20  # of the table of a sweep
 _MAX_LISTED_WORDS = 6  # words of an axis that a sentence lists
@@ -61,7 +58,9 @@ def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
     if findings.verdicts is not None:
         sections.append(doc.Chapter("Image evidence", list(_evidence(page)), f"{page.anchor}-evidence"))
     if findings.monte_carlo is not None:
-        sections.append(doc.Chapter("Monte Carlo", list(_draws(page, findings.monte_carlo)), f"{page.anchor}-draws"))
+        sections.append(
+            doc.Chapter("Monte Carlo", list(draws(findings.monte_carlo, page.name)), f"{page.anchor}-draws")
+        )
     if page.is_full:
         title = "Formulas with their numbers"
         sections += [
@@ -310,43 +309,6 @@ def _page_size(image: PointImage) -> tuple[int, int]:
 
 
 # ---------------------------------------------------------------------- draws
-def _draws(page: Page, drawn: MonteCarlo) -> Iterator[doc.Block]:
-    """Yield the table of Monte Carlo results and remarks about it.
-
-    The table has the probability of meeting each requirement, and combined sums for comparison.
-    """
-    lines: list[doc.Line] = []
-    for requirement in drawn.requirements:
-        sizes = (
-            "–" if size is None else format_quantity(size, requirement.unit)
-            for size in (requirement.sum, requirement.rss, requirement.sigma)
-        )
-        probability = probability_words(
-            requirement.probability, requirement.probability_low, requirement.probability_high
-        )
-        lines.append(
-            (doc.Name(requirement.id), limit_words(requirement.limit, requirement.unit), *sizes, probability)
-        )
-    if drawn.probability is not None and len(drawn.requirements) > 1:
-        ends = (drawn.probability_low or 0.0, drawn.probability_high or 1.0)
-        lines.append((doc.Name("all at once"), *("–",) * 4, probability_words(drawn.probability, *ends)))
-    if lines:
-        yield doc.TextTable(
-            f"Monte Carlo of {page.name}",
-            f"Probability that each requirement holds: {drawn.draws:,} draws, seed {drawn.seed}, {drawn.model} "
-            f"model; intervals of {100 * drawn.confidence:.0f} %. For comparison: worst-case sum, root-sum-square, "
-            "standard deviation.",
-            doc.heads(doc.Head("Requirement", "id"), *doc.numbers("Limit", "Sum", "Rss", "Sigma"), "Over the draws"),
-            lines,
-        )
-    remarks = [f"{requirement.id}: {text}" for requirement in drawn.requirements for text in requirement.warnings]
-    remarks += drawn.notes
-    if drawn.probability is None:
-        remarks.append("no requirement limits a declared error")
-    if remarks:
-        yield doc.Items([[f"{sentence(text)}."] for text in remarks])
-
-
 # ---------------------------------------------------------------------- all rows
 def _rows(page: Page) -> Iterator[doc.Block]:
     """Yield the rows and contributions that the summary leaves out, and the remarks of all rows."""

@@ -43,7 +43,7 @@ def page(document: doc.AnswerDocument) -> str:
     return _page().render(
         document=document,
         facts=_block(document.facts),
-        main=_blocks(document.chapters),
+        main=blocks_as_html(document.chapters),
         inner=lambda chapter: [
             block for block in chapter.blocks if isinstance(block, doc.Chapter) and block.is_listed
         ],
@@ -90,7 +90,8 @@ def _fill(width: float) -> str:
 
 
 # ---------------------------------------------------------------------- blocks
-def _blocks(blocks: Iterable[doc.Block]) -> Markup:
+def blocks_as_html(blocks: Iterable[doc.Block]) -> Markup:
+    """Write blocks one after another, for a page or a notebook."""
     return Markup("").join(map(_block, blocks))
 
 
@@ -104,9 +105,9 @@ def _block(block: doc.Block) -> Markup:
         case doc.Items(items, style, is_numbered):
             return _element("ol" if is_numbered else "ul", style, Markup("\n").join(["", *map(_item, items), ""]))
         case doc.Opening():
-            return _blocks(block.page_blocks())
+            return blocks_as_html(block.page_blocks())
         case doc.Only(medium, blocks):
-            return _blocks(blocks if medium == doc.PAGE else ())
+            return blocks_as_html(blocks if medium == doc.PAGE else ())
         case doc.TextTable():
             return _table(block.on(doc.PAGE))
         case doc.Stack():
@@ -128,7 +129,7 @@ def _block(block: doc.Block) -> Markup:
             return _scroll(label, Markup("").join(_step(title, equations, style) for title, equations in steps))
         case doc.Group(style, blocks, heading):
             head = Markup("<h4>{}</h4>\n").format(_text(heading)) if heading else ""
-            return _element("div", style, Markup("\n{}{}").format(head, _blocks(blocks)))
+            return _element("div", style, Markup("\n{}{}").format(head, blocks_as_html(blocks)))
         case doc.Chapter():
             return _chapter(block)
     raise TypeError(block)
@@ -147,7 +148,7 @@ def _scroll(label: str, content: Markup) -> Markup:
 
 def _chapter(chapter: doc.Chapter) -> Markup:
     level = f"h{chapter.level}"
-    title, content = _text(chapter.title), _blocks(chapter.blocks)
+    title, content = _text(chapter.title), blocks_as_html(chapter.blocks)
     if not chapter.anchor:
         return Markup("<{0}>{1}</{0}>\n{2}").format(level, title, content)
     return Markup(
