@@ -58,5 +58,5 @@ nitpicky = True
 # Types in docstrings are words of NumPy, or names that have no page here.
 nitpick_ignore_regex = [
     ("py:class", ".*"),
-    ("py:exc", "MissingPackageError|MissingTablesError|MissionError|QuestionError|SimulationError|TableError"),
+    ("py:exc", "MissingPackageError|MissingExtraError|MissionError|QuestionError|SimulationError|TableError"),
 ]

@@ -48,12 +48,13 @@ from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.tree import MAX_BYTES
-from bisar_budget.report import FORMATS, Style, pictures, render
-from bisar_budget.report.change import difference
+from bisar_budget.report import Style, pictures, render
+from bisar_budget.report.answers import COMMON_FORMATS, written
+from bisar_budget.report.answers.diff import Compared
 from bisar_budget.report.change.comparison import ChangeSet, Gate, compare
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.settings import SettingsError, project_settings
-from tests.conftest import ROOT, TODAY
+from tests.conftest import ROOT, TEXT_FORMATS, TODAY
 from tests.formats.flown import SAMPLES
 from tests.fuzz import RAW, RUN, case, original, strict_settings
 from tests.fuzz_commands import MISSION, questions
@@ -71,11 +72,6 @@ LARGEST = 16 * MAX_BYTES  # of a report of one file
 _WORD = re.compile(r"\w+")  # what a file says, a report may: `nan` and `inf` as Python writes them
 LARGEST_PROCESS = 8 << 30  # bytes of address space; a case that is right takes some 100 MB of memory
 _GATE = Gate(0.1, ("receiver.*",))
-_DIFFERENCES: dict[str, Callable[..., str]] = {
-    "text": partial(difference.as_text, gate=_GATE, all_rows=True),
-    "markdown": partial(difference.as_markdown, gate=_GATE, all_rows=True),
-    "json": partial(difference.as_json, gate=_GATE),
-}
 _TABLES = ("csv", "parquet", "nc")
 _VARY = ("--vary", "collection.aperture_time=1:6s:300")
 # Twelve parts, no array holds their column: they take a while.
@@ -179,7 +175,7 @@ def _file(
     color, verbosity, detail = random.random() < 0.2, random.choice((-1, 0, 1)), random.choice(("summary", "full"))
     style = Style(color=color, verbosity=verbosity, all_rows=random.random() < 0.3, detail=detail, assets="x.assets")
     report = Report(version="0", missions=(found,), day=TODAY)
-    for name in FORMATS:
+    for name in TEXT_FORMATS:
         stage.append(name)
         text = harmless(render(name, report, style), name)
         tried["reports"] += 1
@@ -191,9 +187,10 @@ def _file(
         return before
     earlier = found if before is None else before
     own = hostile.data + (earlier.mission.data or b"")
-    for name, write in _DIFFERENCES.items():
+    for name in COMMON_FORMATS[:-1]:  # those that are text
         stage.append(f"diff {name}")
-        text = harmless(write(ChangeSet((compare(earlier, found),))), name)
+        compared = Compared(ChangeSet((compare(earlier, found),)), _GATE, all_rows=True)
+        text = harmless(str(written("diff", name, [compared], Style())), name)
         missed += [f"seed {seed}: diff {name}: {what}" for what in _wrong(text, name, own)]
         tried["comparisons"] += 1
     for row in random.sample(found.rows, 2):
@@ -240,7 +237,7 @@ def _processes(seed: int, path: Path, tried: Counter[str]) -> Iterator[str]:
     other = path.with_name("other.yaml")
     other.write_text(original(Random(seed)), encoding="utf-8")
     name = str(path)
-    format_name = Random(seed).choice(list(FORMATS))
+    format_name = Random(seed).choice(TEXT_FORMATS)
     check = ["check", "--date", TODAY.isoformat(), "--strict"]
     for arguments, expected in (
         ([*check, "--format", format_name, name], codes),

@@ -28,7 +28,10 @@ from bisar_budget.cli import cli
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.report import FORMATS
 from tests.yaml_text import yaml_text
+
+TEXT_FORMATS = tuple(name for name, entry in FORMATS.items() if not entry.is_binary)
 
 # Shared machines: how long an example takes says nothing. `-m thorough` loads the second profile (see `examples`).
 _DEFAULT_EXAMPLES, _THOROUGH_EXAMPLES = 20, 100

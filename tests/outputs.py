@@ -19,8 +19,7 @@ from pathlib import Path
 from click.testing import CliRunner
 
 from bisar_budget.cli import cli
-from bisar_budget.report import FORMATS
-from tests.conftest import ROOT
+from tests.conftest import ROOT, TEXT_FORMATS
 from tests.families import FAMILIES, mission_text
 
 RANDOM = 3  # missions of each family
@@ -56,7 +55,7 @@ def write(folder: Path, studies: bool, images: bool) -> int:
 
     for name in (names := missions()):
         file = f"{name}.yaml"
-        for format_name in FORMATS:
+        for format_name in TEXT_FORMATS:
             run(f"{name}.{format_name}.out", "check", file, "--format", format_name)
         for option in ("--quiet", "--all", "--verbose", "--color=always", "--strict", "--model=full",
                        "--model=published", "--model=strictest", "--detail=full --format=html"):  # fmt: skip
@@ -82,7 +81,7 @@ def write(folder: Path, studies: bool, images: bool) -> int:
             run(f"{name}.check-verify.out", "check", file, "--verify", f"--report={name}-v.md")
             run(f"{name}.simulate.out", "simulate", file)
     files = [f"{name}.yaml" for name in names]
-    for format_name in FORMATS:
+    for format_name in TEXT_FORMATS:
         run(f"all.{format_name}.out", "check", *files, "--format", format_name)
     for before, after in pairwise(files):
         run(f"{before}-{after}.diff.out", "diff", before, after)

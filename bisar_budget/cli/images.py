@@ -150,7 +150,7 @@ def simulate(
 
 def _export(mission: str, loaded: "Mission", output: str, standing: "Targets") -> None:
     """Write the simulated phase history to the CPHD file `output`, and a summary of it to standard output."""
-    from bisar_budget.formats.containers import MissingExtraError
+    from bisar_budget.extras import MissingExtraError
     from bisar_budget.formats.exporting import export_phase_history
     from bisar_budget.front.imaging import SimulationError
 

@@ -72,9 +72,10 @@ def import_file(file: str, output: str | None, channel: str | None, force: bool)
     the file declares. Data without a key in the mission are written as comments. Needs the extra `formats`.
     """
     from bisar_budget.constants import SPEED_OF_LIGHT_MPS
+    from bisar_budget.extras import MissingExtraError
     from bisar_budget.faults import MissionError
     from bisar_budget.formats.collected import mission_text
-    from bisar_budget.formats.containers import FormatError, MissingExtraError
+    from bisar_budget.formats.containers import FormatError
     from bisar_budget.formats.importing import import_collection
     from bisar_budget.mission.load import parse_mission
     from bisar_budget.units import format_quantity

@@ -283,9 +283,18 @@ def deliver_answer(command: str, answers: "Sequence[object]", format_name: str |
 
 
 def _format_of_output(command: str, output: str | None) -> str:
-    from bisar_budget.report.answers import format_of_file
+    """Format of the suffix of an output file; text without a suffix, and for standard output.
 
-    return (format_of_file(command, output) if output is not None else None) or "text"
+    Raises `click.UsageError` if the suffix belongs to no format of the command.
+    """
+    from bisar_budget.report.answers import format_of_file, suffixes
+
+    if output is None or output == "-" or not os.path.splitext(output)[1]:
+        return "text"
+    format_name = format_of_file(command, output)
+    if format_name is None:
+        raise click.UsageError(f"{output}: the suffix must be one of {', '.join(suffixes(command))}")
+    return format_name
 
 
 def write_file(path: str, content: str | bytes) -> None:

@@ -135,12 +135,12 @@ def sweep(
     if cases_file is not None and sample is not None:
         raise click.UsageError("--sample draws from the ranges of --vary; --cases has cases of its own.")
     spare([mission, *([cases_file] if cases_file else [])], [output, plot])
+    from bisar_budget.extras import MissingExtraError
     from bisar_budget.front import questions
     from bisar_budget.front.missions import cases_of, cases_of_texts
     from bisar_budget.front.progress import hold_to_tables, workers_of
     from bisar_budget.mission.quantities import QuestionError, TableError
     from bisar_budget.report.drawing.trades import check_plot
-    from bisar_budget.report.tables import MissingTablesError
 
     (loaded,) = load_all([mission], model, changes)
     try:
@@ -178,7 +178,7 @@ def sweep(
         for line in error.lines:
             complain(line)
         sys.exit(2)
-    except (QuestionError, MissingTablesError) as error:
+    except (QuestionError, MissingExtraError) as error:
         fail(f"{mission}: {error}")
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from bisar_budget.arrays import Records
-from bisar_budget.extras import install_command
+from bisar_budget.extras import MissingExtraError, install_command
 from bisar_budget.faults import printable, shown
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.earth import Floats
@@ -35,11 +35,8 @@ class FormatError(Exception):
         super().__init__(f"{printable(file)}: {problem}")
 
 
-class MissingExtraError(Exception):
-    """The optional dependencies `bisar-budget[formats]` (lxml, sarkit) are not installed."""
-
-    def __init__(self) -> None:
-        super().__init__(f"bisar-budget reads and writes radar formats with sarkit: {install_command('formats')}")
+def _missing() -> MissingExtraError:
+    return MissingExtraError(f"bisar-budget reads and writes radar formats with sarkit: {install_command('formats')}")
 
 
 def check_extra() -> None:
@@ -48,7 +45,7 @@ def check_extra() -> None:
         for module in ("lxml.etree", "sarkit", "sarkit.cphd"):
             import_module(module)
     except ImportError:
-        raise MissingExtraError from None
+        raise _missing() from None
 
 
 class Element:
@@ -192,7 +189,7 @@ def parse(file: str, data: bytes, start: int = 0) -> Element:
     try:
         from lxml import etree
     except ImportError:
-        raise MissingExtraError from None
+        raise _missing() from None
     for word in (b"<!DOCTYPE", b"<!ENTITY"):  # before a parser sees them
         position = data.find(word)
         if position >= 0:
@@ -345,7 +342,7 @@ def _nitf(file: str, stream: BinaryIO) -> Container:
     try:
         jbpy = import_module("jbpy")
     except ImportError:
-        raise MissingExtraError from None
+        raise _missing() from None
     size = os.fstat(stream.fileno()).st_size
     stream.seek(0)
     try:

@@ -249,7 +249,7 @@ class SweepResult(AnswerResult):
 
         Raises
         ------
-        MissingTablesError
+        MissingExtraError
             xarray is not installed.
         MissingPackageError
             `chunks` is given, and Dask is not installed.
@@ -301,13 +301,15 @@ class SweepResult(AnswerResult):
             There are more than 40 000 cases.
         """
         if self.cases.count > MAX_ANSWER_CASES:
-            accepted = f"up to {MAX_ANSWER_CASES}; CSV, Parquet and NetCDF files take more"
+            accepted = f"up to {MAX_ANSWER_CASES}, or more in a file of CSV, Parquet or NetCDF"
             raise QuestionError(f"{self.cases.count} cases are too many for a document; accepted: {accepted}")
         try:
             drawing = self.plot().of("svg").decode()
         except QuestionError:  # the cases have no axes
             drawing = ""
-        swept = SweptCases(self.mission, self._table, self.columns, self.summary, "", self.overrides, drawing)
+        swept = SweptCases(
+            self.mission, self._table, self._parts[1], self.columns, self.summary, "", self.overrides, drawing
+        )
         return [swept._replace(status=status_of(self.statuses))]
 
     def plot(self, column: str | None = None, *, is_polar: bool = False) -> Picture:

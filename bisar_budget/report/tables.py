@@ -14,7 +14,7 @@ import numpy as np
 
 from bisar_budget.design.cases import Cases, Values, in_unit
 from bisar_budget.design.table import Column, Part, Swept
-from bisar_budget.extras import install_command
+from bisar_budget.extras import MissingExtraError, install_command
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
@@ -292,10 +292,6 @@ def slabs(start: int, stop: int, shape: tuple[int, ...]) -> Iterator[tuple[slice
     yield from ((slice(last, last + 1), *slab) for slab in slabs(0, end, shape[1:]))
 
 
-class MissingTablesError(Exception):
-    """The extra `tables` is not installed."""
-
-
 class TableFormat(NamedTuple):
     """A table format: a function that writes it part by part, and the library that it needs from the extra `tables`.
 
@@ -319,7 +315,7 @@ def writer_of(suffix: str) -> TableFormat:
 
     Raises
     ------
-    MissingTablesError
+    MissingExtraError
         The library of the format is not installed. The message names the command that installs it.
     """
     table_format = TABLES[suffix]
@@ -328,7 +324,7 @@ def writer_of(suffix: str) -> TableFormat:
         try:
             import_module(table_format.library)
         except ImportError:
-            raise MissingTablesError(_missing(table_format.name, table_format.library)) from None
+            raise MissingExtraError(_missing(table_format.name, table_format.library)) from None
     return table_format
 
 
@@ -354,13 +350,13 @@ def dataset(described: Described, values_by_column: "Mapping[str, Values | DaskA
 
     Raises
     ------
-    MissingTablesError
+    MissingExtraError
         xarray is not installed.
     """
     try:
         from xarray import Dataset
     except ImportError:
-        raise MissingTablesError(_missing("a dataset", "xarray")) from None
+        raise MissingExtraError(_missing("a dataset", "xarray")) from None
     cases, varied = described.cases, described.swept.varied
     attributes = {
         column.name: {"long_name": column.words, **({} if column.is_text else {"units": column.unit or "1"})}

@@ -383,7 +383,7 @@ class TestPlot:
         (["--squint", "90 deg"], "--squint 90 deg: must be less than 90 deg"),
         (["--platform", "receiver"], "--platform receiver: has no orbit; accepted: transmitter"),
         (["--plot", "p.gif"], "the suffix must be one of .svg, .png, .pdf"),
-        (["-o", "p.docx"], "the suffix must be one of .txt, .json, .csv, .ics"),
+        (["-o", "p.docx"], "the suffix must be one of .txt, .json, .csv, "),
         (["--set", "platforms.transmitter.orbit.tle=nowhere.tle"], "nowhere.tle cannot be read"),
         (["--set", "radar.bandwidth=0 Hz"], "must be greater than 0 Hz"),
         (["--date", "yesterday"], "--date"),

@@ -146,7 +146,7 @@ def test_a_sample(run) -> None:
         (("--vary", f"{TIME}=6:1s:6"), "the range is reversed"),
         (("--vary", "collection.aperture_tim=1:6s:6"), "Did you mean 'collection.aperture_time'?"),
         (("--vary", f"{TIME}=1s", "--column", "receiver.velocity.x.nothing"), "--column receiver.velocity.x.nothing"),
-        (("--vary", f"{TIME}=1s", "-o", "t.xlsx"), "the suffix must be one of .csv, .parquet, .nc"),
+        (("--vary", f"{TIME}=1s", "-o", "t.docx"), "the suffix must be one of .csv, .parquet, .nc"),
         (("--vary", f"{TIME}=1:2s:3", "--plot", "t.jpg"), "the suffix must be one of .svg, .png, .pdf"),
         (("--vary", f"{TIME}=1:2s:3", "--plot", "-"), "--plot needs the name of a file"),
         (("--vary", f"{TIME}=1:2s:3", "--polar"), "--plot says to which file"),

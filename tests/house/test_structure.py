@@ -214,7 +214,7 @@ from bisar_budget.report import FORMATS, Style, render
 from bisar_budget.findings.mission import Report
 from datetime import date
 found = check_mission(load_mission({str(mission)!r}), date(2026, 1, 1))
-for name in [one.name for one in FORMATS.values() if one.is_illustrated == {is_for_people}]:
+for name in [one.name for one in FORMATS.values() if one.is_illustrated == {is_for_people} and not one.is_binary]:
     render(name, Report(version="", missions=(found,)), Style())
 """
     loaded = loaded_after(code)

@@ -276,7 +276,7 @@ class TestCommand:
             text = mission_text(other_errors=[{"name": name, "quadratic_phase_error": size}])
             (tmp_path / file).write_text(text)
         text = run("diff", tmp_path / "old.yaml", tmp_path / "new.yaml", "--format", "markdown").stdout
-        assert r"- input other_errors\[0\].quadratic_phase_error: 0.1 rad → 0.2 rad" in text.splitlines()
+        assert r"- other_errors\[0\].quadratic_phase_error: 0.1 rad → 0.2 rad" in text.splitlines()
         rows = [line for line in text.splitlines() if line.startswith("|")]
         assert len(rows) == 3
         assert {line.count("|") for line in rows} == {8}

@@ -21,7 +21,7 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import FORMATS, Style, format_of, render
 from bisar_budget.report.formats.annotations import step_summary
 from bisar_budget.report.words import sentences
-from tests.conftest import COMPLIES, ROOT, TODAY, findings, mission_text
+from tests.conftest import COMPLIES, ROOT, TEXT_FORMATS, TODAY, findings, mission_text
 from tests.page import read_page
 
 GATE = ("junit", "sarif", "github", "needs")
@@ -521,7 +521,7 @@ def test_markdown_of_any_text_has_no_markup_and_stays_in_its_cell(text: str) -> 
         assert last.text.strip() in (shown.strip(), (shown + shown).strip())
 
 
-@pytest.mark.parametrize("format_name", FORMATS)
+@pytest.mark.parametrize("format_name", TEXT_FORMATS)
 class TestEveryFormat:
     def test_is_the_same_twice_and_prints_no_control(self, format_name: str) -> None:
         text = render(format_name, report(), Style())

@@ -12,9 +12,9 @@ import pytest
 from bisar_budget.faults import Fault
 from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.findings.row import worst_first
-from bisar_budget.report import FORMATS, Style, render
+from bisar_budget.report import Style, render
 from bisar_budget.report.words.sentences import percent, spreadsheet_text
-from tests.conftest import ROOT, findings
+from tests.conftest import ROOT, TEXT_FORMATS, findings
 
 ROW_KEYS = [
     "id", "metric", "unit", "declared", "allowable", "allowable_published", "allowable_full", "qpe_published_rad",
@@ -231,7 +231,7 @@ def test_percent_near_100_shows_the_side_it_is_on(ratio: float, text: str) -> No
 
 
 def test_every_format_ends_with_one_newline() -> None:
-    for name in FORMATS:
+    for name in TEXT_FORMATS:
         text = render(name, report(), Style())
         assert text.endswith("\n")
         assert not text.endswith("\n\n")

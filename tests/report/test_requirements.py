@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 import pytest
 
 from bisar_budget.findings.mission import MissionFindings, Report
-from bisar_budget.report import FORMATS, Style, render
+from bisar_budget.report import Style, render
 from bisar_budget.report.words.requirements import declared_words, kind_names
-from tests.conftest import COMPLIES, ROOT, findings
+from tests.conftest import COMPLIES, ROOT, TEXT_FORMATS, findings
 from tests.page import read_page
 
 # An ISLR and nothing that spreads; the cubic phase has its own judge. One requirement is not judged, no row fails.
@@ -42,7 +42,7 @@ def text_of(found: MissionFindings, **style: object) -> str:
     return " ".join(said("text", found, **style).split())
 
 
-@pytest.mark.parametrize("format_name", FORMATS)
+@pytest.mark.parametrize("format_name", TEXT_FORMATS)
 @pytest.mark.parametrize("changes", [UNJUDGED, WAIVED], ids=["unjudged", "waived"])
 def test_a_requirement_without_a_row_that_fails_is_named_with_its_status(format_name: str, changes: dict) -> None:
     found = findings(**changes)
@@ -225,7 +225,7 @@ def test_the_first_table_of_a_page_is_that_of_requirements(format_name: str) -> 
     assert re.search("1 of 17 kinds of error", text)
 
 
-@pytest.mark.parametrize("format_name", FORMATS)
+@pytest.mark.parametrize("format_name", TEXT_FORMATS)
 def test_a_file_name_keeps_its_letters(format_name: str) -> None:
     """A sentence that began with the name of a file or a row got a capital letter."""
     found = findings(**COMPLIES)._replace(file="läufe/Über_uns.yaml")

@@ -15,12 +15,13 @@ from hypothesis import strategies as st
 import bisar_budget as bb
 from bisar_budget.design.cases import Cases, grid, grid_of, table
 from bisar_budget.design.table import Column, Part, Swept, Values
+from bisar_budget.extras import MissingExtraError
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.report import tables
-from bisar_budget.report.tables import TABLES, Described, MissingTablesError, slabs, writer_of
+from bisar_budget.report.tables import TABLES, Described, slabs, writer_of
 from tests.conftest import ROOT
 
 FILE = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
@@ -231,7 +232,7 @@ class TestDatasets:
 
     def test_without_xarray(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "xarray", None)
-        with pytest.raises(MissingTablesError, match=r"needs xarray.*pip install netCDF4 pyarrow xarray"):
+        with pytest.raises(MissingExtraError, match=r"needs xarray.*pip install netCDF4 pyarrow xarray"):
             bb.sweep(MISSION, GRID, date=DAY).to_xarray()
 
 
@@ -251,6 +252,6 @@ def test_a_library_that_is_missing(suffix: str, monkeypatch: pytest.MonkeyPatch)
         raise ImportError(name)
 
     monkeypatch.setattr(tables, "import_module", missing)
-    with pytest.raises(MissingTablesError, match=r"pip install netCDF4 pyarrow xarray") as error:
+    with pytest.raises(MissingExtraError, match=r"pip install netCDF4 pyarrow xarray") as error:
         writer_of(suffix)
     assert TABLES[suffix].library in str(error.value)

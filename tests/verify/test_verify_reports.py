@@ -6,7 +6,6 @@ import math
 import re
 
 import pytest
-from bisar_budget.report.formats.verification import evidence, numbers
 from click.testing import CliRunner
 
 from bisar_budget.budget.verdicts import with_verdicts
@@ -14,7 +13,9 @@ from bisar_budget.cli import cli
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.status import exit_code
 from bisar_budget.report import Style
-from bisar_budget.report.formats import verification
+from bisar_budget.report.answers import verify as verification
+from bisar_budget.report.answers.verify import evidence, numbers
+from bisar_budget.report.renderers.text import lines as text_lines
 from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import TODAY, findings, mission_text
 from tests.conftest import row as row_of
@@ -395,7 +396,7 @@ def test_a_remark_of_many_rows_is_said_once() -> None:
         )
         for name, said in (("attitude", SAID), ("gyro_bias", SAID), ("accelerometer_bias", "another"))
     ]
-    lines = " ".join("\n".join(evidence(rows, Style())).split())
+    lines = " ".join("\n".join(text_lines(evidence(rows), Style())).split())
     assert lines.count(SAID) == 1
     assert f"receiver.imu.attitude, receiver.imu.gyro_bias: {SAID}" in lines
     assert "receiver.imu.accelerometer_bias: another" in lines

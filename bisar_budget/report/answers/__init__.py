@@ -13,7 +13,7 @@ A format that an answer writes in its own way is a function of its module, such 
 import os
 from collections.abc import Mapping, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -48,7 +48,7 @@ ANSWERS = {
         AnswerForm("monte_carlo", "monte_carlo"),
     )
 }
-_SUFFIXES = {
+_FORMAT_OF_SUFFIX = {
     ".txt": "text", ".json": "json", ".csv": "csv", ".md": "markdown", ".markdown": "markdown", ".html": "html",
     ".htm": "html", ".xlsx": "xlsx", ".needs.json": "needs", ".sdoc": "sdoc", ".ics": "ics",
 }  # fmt: skip
@@ -67,14 +67,14 @@ class Records(NamedTuple):
 
 def suffixes(command: str) -> dict[str, str]:
     """Formats of the answer of a command, by the suffixes of their files."""
-    return {suffix: name for suffix, name in _SUFFIXES.items() if name in ANSWERS[command].formats}
+    return {suffix: name for suffix, name in _FORMAT_OF_SUFFIX.items() if name in ANSWERS[command].formats}
 
 
 def format_of_file(command: str, name: str) -> str | None:
     """Find the format of an answer for a file name such as `limits.csv`; None if the suffix belongs to no format."""
     lowered = name.lower()
     matches = [suffix for suffix in suffixes(command) if lowered.endswith(suffix)]
-    return _SUFFIXES[max(matches, key=len)] if matches else None
+    return _FORMAT_OF_SUFFIX[max(matches, key=len)] if matches else None
 
 
 def module_of(command: str) -> "ModuleType":
@@ -82,13 +82,13 @@ def module_of(command: str) -> "ModuleType":
     return import_module(f"bisar_budget.report.answers.{ANSWERS[command].module}")
 
 
-def records_of(command: str, answers: Sequence[Any]) -> Records:
+def records_of(command: str, answers: Sequence[object]) -> Records:
     """Return the table of an answer."""
     records: Records = module_of(command).records(answers)
     return records
 
 
-def written(command: str, format_name: str, answers: Sequence[Any], style: "Style") -> str | bytes:
+def written(command: str, format_name: str, answers: Sequence[object], style: "Style") -> str | bytes:
     """Write answers of a command, one for each mission, in one of its formats, without the drawings of Markdown.
 
     Texts end with a newline. A workbook is bytes.
@@ -102,7 +102,7 @@ def written(command: str, format_name: str, answers: Sequence[Any], style: "Styl
 
 
 def files(
-    command: str, format_name: str, answers: Sequence[Any], style: "Style", path: str
+    command: str, format_name: str, answers: Sequence[object], style: "Style", path: str
 ) -> dict[str, str | bytes]:
     """Write answers of a command to be stored in the file `path`.
 

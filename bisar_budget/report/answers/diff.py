@@ -93,10 +93,10 @@ def _document(change: Change, is_refused: bool) -> dict[str, object]:
     }
 
 
-_ROW_KEYS = ("status", "declared", "allowable", "utilization")
-_COLUMNS = (
+_COMPARED_KEYS = ("status", "declared", "allowable", "utilization")
+_DIFF_COLUMNS = (
     "file", "kind", "id", "before", "after", "erosion", "is_newly_failing", "is_refused",
-    *(f"{key}_{side}" for key in _ROW_KEYS for side in ("before", "after")),
+    *(f"{key}_{side}" for key in _COMPARED_KEYS for side in ("before", "after")),
 )  # fmt: skip
 
 
@@ -120,7 +120,7 @@ def records(answers: Sequence[Compared]) -> Records:
             {"kind": change.label, "id": change.name, "before": change.before, "after": change.after}
             for change in _refused(comparison, gate)
         ]
-    return Records(_COLUMNS, lines)
+    return Records(_DIFF_COLUMNS, lines)
 
 
 def _row_line(change: Change, is_refused: bool) -> dict[str, object]:
@@ -131,7 +131,11 @@ def _row_line(change: Change, is_refused: bool) -> dict[str, object]:
         "erosion": change.erosion,
         "is_newly_failing": change.is_newly_failing,
         "is_refused": is_refused,
-        **{f"{key}_{side}": None if row is None else getattr(row, key) for key in _ROW_KEYS for side, row in sides},
+        **{
+            f"{key}_{side}": None if row is None else getattr(row, key)
+            for key in _COMPARED_KEYS
+            for side, row in sides
+        },
     }
 
 

@@ -27,7 +27,7 @@ def content(answers: Sequence[Sensitivity]) -> dict[str, object]:
     }
 
 
-_COLUMNS = (
+_SLOPE_COLUMNS = (
     "file", "name", "key", "text", "value", "unit", "part", "per", "per_value", "step", "difference",
     "utilization_change", "row_change", "to_limit", "worst_row_below", "worst_row_above", "is_mixed",
 )  # fmt: skip
@@ -40,7 +40,7 @@ def records(answers: Sequence[Sensitivity]) -> Records:
         for answer in answers
         for slope in answer.slopes
     ]
-    return Records(_COLUMNS, lines)
+    return Records(_SLOPE_COLUMNS, lines)
 
 
 def _ranked(sensitivity: Sensitivity) -> dict[str, object]:

@@ -1,13 +1,13 @@
 """The answer of the command solve: the borders of compliance of a number, or a comparison of catalogue parts."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 from bisar_budget.design.compare import Comparison, PartState
 from bisar_budget.design.solve import Crossing, Imaged, Solution, State
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.status import STATUS
+from bisar_budget.json_types import JsonDocument
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
@@ -16,7 +16,13 @@ from bisar_budget.report.formats.json_document import outside_item, verdict_item
 from bisar_budget.report.words.sentences import percent, use_words, waived_count, waiver_names
 from bisar_budget.units import format_quantity
 
-_STATUSES = {"crossing": "pass", "all": "pass", "some": "pass", "waived": "waived", "none": "fail"}  # for the colour
+_STATUS_OF_SOLUTION = {
+    "crossing": "pass",
+    "all": "pass",
+    "some": "pass",
+    "waived": "waived",
+    "none": "fail",
+}  # for the colour
 
 Answer = Solution | Comparison
 
@@ -57,7 +63,7 @@ _PART_COLUMNS = (
 )  # fmt: skip
 
 
-def _crossing_lines(item: Mapping[str, Any]) -> Iterator[dict[str, object]]:
+def _crossing_lines(item: JsonDocument) -> Iterator[dict[str, object]]:
     answer = {name: item[name] for name in _OF_ANSWER}
     for crossing in item["crossings"]:
         sides = {
@@ -68,7 +74,7 @@ def _crossing_lines(item: Mapping[str, Any]) -> Iterator[dict[str, object]]:
         yield answer
 
 
-def _part_lines(item: Mapping[str, Any]) -> Iterator[dict[str, object]]:
+def _part_lines(item: JsonDocument) -> Iterator[dict[str, object]]:
     answer = {name: item[name] for name in _OF_ANSWER if name not in ("unit", "status")}
     for part in item["parts"]:
         line = {name: part[name] for name in (*_OF_STATE, "kind", "is_given", "own_row", "own_utilization")}
@@ -202,7 +208,7 @@ def _part_blocks(comparison: Comparison) -> Iterator[doc.Block]:
         waivers = tuple(dict.fromkeys(waiver for standing in standings for waiver in standing.waived_by))
         verdict += f", {waived_count(len(standings), waivers)}"
     terms = f"{comparison.model} model{', neither fails nor warns' if comparison.target == 'warn' else ''}"
-    status = _STATUSES[comparison.status]
+    status = _STATUS_OF_SOLUTION[comparison.status]
     yield opening(comparison, f"{printable(comparison.key)}: {verdict}", status, terms)
     is_mixed = len({state.kind for state in comparison.parts}) > 1
     heads = doc.heads("part", *(["kind"] if is_mixed else []), "status", *doc.numbers("use"), "decided by")
@@ -233,7 +239,7 @@ def _part_remarks(comparison: Comparison) -> Iterator[str]:
 
 def _crossing_blocks(solution: Solution) -> Iterator[doc.Block]:
     verdict = f"{_key_words(solution)}: {_range_words(solution)}"
-    yield opening(solution, verdict, _STATUSES[solution.status])
+    yield opening(solution, verdict, _STATUS_OF_SOLUTION[solution.status])
     yield doc.Facts(list(_facts(solution)))
 
 

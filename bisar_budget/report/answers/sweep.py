@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.design.cases import Values
-from bisar_budget.design.table import Column
+from bisar_budget.design.table import Column, Part
 from bisar_budget.faults import SetValue, printable
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
@@ -27,13 +27,14 @@ _NUMBER_FORMAT = ".6g"
 
 
 class SweptCases(NamedTuple):
-    """All cases of a sweep: their table, the values (cases,) of each column, a summary, and a drawing.
+    """All cases of a sweep: their table, its blocks in SI, the values (cases,) of each column, a summary, a drawing.
 
     `status` gives the colour of the summary. `drawing` is SVG text, and is empty if the cases have no axes to draw.
     """
 
     mission: Mission
     described: Described
+    blocks: Sequence[Part]
     columns: Mapping[str, Values]
     summary: str
     status: str
@@ -96,7 +97,7 @@ def records(answers: Sequence[SweptCases]) -> Records:
 def as_csv(answers: Sequence[SweptCases], style: Style) -> str:
     """Write the table with its metadata, as `sweep` writes it to a file."""
     (swept,) = answers
-    return "".join(texts(swept.described, swept.described.swept.parts))
+    return "".join(texts(swept.described, swept.blocks))
 
 
 # ---------------------------------------------------------------- for people
@@ -152,5 +153,4 @@ def status_of(statuses: Mapping[str, int]) -> str:
 
     `statuses` has the number of cases with each status.
     """
-    found = [name for name in reversed(STATUS) if statuses.get(name)]
-    return next((name for name in found if STATUS[name].gates), "fail")
+    return next((name for name in reversed(STATUS) if STATUS[name].gates and statuses.get(name)), "fail")

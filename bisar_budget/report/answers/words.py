@@ -1,6 +1,7 @@
 """Parts that the documents of all answers share: the opening, the chapter of a mission, the table of requirements."""
 
 from collections.abc import Iterable, Sequence
+from itertools import zip_longest
 
 from bisar_budget import __version__
 from bisar_budget.faults import printable
@@ -26,11 +27,16 @@ def mission_chapter(mission: AboutMission, number: int, blocks: Iterable[doc.Blo
 def mission_document(
     title: str, missions: Sequence[AboutMission], chapters: Sequence[doc.Chapter]
 ) -> doc.AnswerDocument:
-    """Make the document of an answer, which has one chapter for each mission. `title` is the kind of answer."""
+    """Make the document of an answer, which has one chapter for each mission, and then chapters about the run.
+
+    `title` is the kind of answer.
+    """
     names = [printable(mission.name) for mission in missions]
+    files = [printable(mission.file) for mission in missions]
     margins = [
-        doc.Margins(chapter.anchor, name, "", printable(mission.file))
-        for chapter, name, mission in zip(chapters, names, missions, strict=True)
+        doc.Margins(chapter.anchor, name, "", file)
+        for chapter, name, file in zip_longest(chapters, names, files, fillvalue="")
+        if isinstance(chapter, doc.Chapter)
     ]
     subject = names[0] if len(names) == 1 else f"{len(names)} missions"
     facts = doc.Facts([("Tool", f"bisar-budget {__version__}")])

@@ -9,7 +9,8 @@ from bisar_budget.report import document as doc
 from bisar_budget.report.words.sentences import TEXT_WIDTH, spaced, wrapped
 
 _MIN_NAME_WIDTH = 12  # of the names of facts
-_MIN_SENTENCE_WIDTH = 24  # characters of a last column that may be on a line of its own
+_STATUS_WIDTH = 8  # characters of a status, the same in every table
+_MIN_SENTENCE_WIDTH = 40  # characters of a last column that may be on a line of its own
 _VERDICT_SGR = {"optimistic": "1;31", "confirmed": "32", "conservative": "33"}  # of images; others are of `STATUS`
 
 
@@ -125,9 +126,11 @@ def _table(table: doc.TextTable, style: Style) -> Iterator[str]:
     widths = [max((len(row[column]) for row in (*heads, *cells)), default=0) for column in range(len(sides))]
     ends_with_sentence = sides.endswith("<") and widths[-1] > _MIN_SENTENCE_WIDTH
     if ends_with_sentence:
-        widths[-1] = 0
+        widths[-1] = max(len(head[-1]) for head in heads)
+    starts_with_status = any(isinstance(row[0], doc.Badge) for row in table.rows)
     room = max(style.table_width - sum(widths[1:]) - len(widths) + 1, *(len(head[0]) for head in heads))
     widths[0] = max(len(row[0]) for row in (*heads, *cells) if len(row[0]) <= room)
+    widths[0] = max(widths[0], _STATUS_WIDTH) if starts_with_status else widths[0]
     for head in heads:
         yield spaced(head, widths, sides).rstrip()
     for line, row in zip(table.rows, cells, strict=True):

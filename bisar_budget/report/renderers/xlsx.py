@@ -21,12 +21,13 @@ if TYPE_CHECKING:
     from openpyxl import Workbook
     from openpyxl.worksheet.worksheet import Worksheet
 
-_LONGEST_TITLE = 31  # characters of the name of a sheet
+_MAX_TITLE_CHARACTERS = 31  # characters of the name of a sheet
 _FORBIDDEN = re.compile(r"[\[\]:*?/\\']")  # characters that Excel refuses in the name of a sheet
 _CONTROLS = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f]")  # characters that XML refuses
-_WIDEST_COLUMN = 60  # characters
+_TIME_OF_WRITING = re.compile(rb"(<dcterms:modified[^>]*>)[^<]*(?=</dcterms:modified>)")  # of openpyxl
+_MAX_COLUMN_CHARACTERS = 60  # characters
 _NO_DATE = datetime(1980, 1, 1)  # the first day of a ZIP archive
-_TEXTS, _NUMBERS = "Answer", "Numbers"  # names of the first and of the last sheet
+_TEXT_SHEET, _DATA_SHEET = "Answer", "Data"  # names of the first and of the last sheet
 
 
 def workbook(document: doc.AnswerDocument, records: Records) -> bytes:
@@ -45,7 +46,7 @@ def workbook(document: doc.AnswerDocument, records: Records) -> bytes:
     book.properties.creator = f"bisar-budget {document.version}"
     book.properties.created = book.properties.modified = _NO_DATE
     texts = book.worksheets[0]
-    texts.title = _TEXTS
+    texts.title = _TEXT_SHEET
     for line in [[document.title, plain(document.subject)], *_texts(document)]:
         _append(texts, line)
     _fit(texts)
@@ -93,11 +94,11 @@ def _table(book: "Workbook", table: doc.TextTable) -> None:
 
 
 def _sheet_title(text: str) -> str:
-    return _FORBIDDEN.sub(" ", printable(text))[:_LONGEST_TITLE].strip() or "Table"
+    return _FORBIDDEN.sub(" ", printable(text))[:_MAX_TITLE_CHARACTERS].strip() or "Table"
 
 
 def _numbers(book: "Workbook", records: Records) -> None:
-    sheet = book.create_sheet(_NUMBERS)
+    sheet = book.create_sheet(_DATA_SHEET)
     _append(sheet, list(records.columns), is_head=True)
     for line in records.lines:
         _append(sheet, [_number_or_text(line.get(name)) for name in records.columns])
@@ -133,7 +134,7 @@ def _fit(sheet: "Worksheet") -> None:
 
     for number, column in enumerate(sheet.columns, start=1):
         longest = max((len(str(cell.value)) for cell in column if cell.value is not None), default=0)
-        sheet.column_dimensions[get_column_letter(number)].width = min(longest, _WIDEST_COLUMN) + 2
+        sheet.column_dimensions[get_column_letter(number)].width = min(longest, _MAX_COLUMN_CHARACTERS) + 2
 
 
 def _undated(file: BytesIO) -> bytes:
@@ -141,5 +142,9 @@ def _undated(file: BytesIO) -> bytes:
     undated = BytesIO()
     with ZipFile(file) as dated, ZipFile(undated, "w", ZIP_DEFLATED) as archive:
         for name in dated.namelist():
-            archive.writestr(ZipInfo(name), dated.read(name), ZIP_DEFLATED)
+            archive.writestr(
+                ZipInfo(name),
+                _TIME_OF_WRITING.sub(rb"\g<1>" + _NO_DATE.isoformat().encode() + b"Z", dated.read(name)),
+                ZIP_DEFLATED,
+            )
     return undated.getvalue()
