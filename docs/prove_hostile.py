@@ -50,7 +50,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.tree import MAX_BYTES
 from bisar_budget.report import Style, pictures, render
 from bisar_budget.report.answers import COMMON_FORMATS, written
-from bisar_budget.report.answers.diff import Compared
+from bisar_budget.report.answers.diff_answer import Compared
 from bisar_budget.report.change.comparison import ChangeSet, Gate, compare
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.settings import SettingsError, project_settings

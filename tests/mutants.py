@@ -427,14 +427,14 @@ MUTANTS = (
     ),
     Mutant(
         "seam: text of verify, the nearest displacement",
-        "bisar_budget/report/answers/verify.py",
+        "bisar_budget/report/answers/verify_answer.py",
         "distance, row_id = max(distances)",
         "distance, row_id = min(distances)",
         (f"{_SEAMS}test_verify_names_the_image_that_is_farthest_off",),
     ),
     Mutant(
         "seam: text of verify, the smallest turn",
-        "bisar_budget/report/answers/verify.py",
+        "bisar_budget/report/answers/verify_answer.py",
         "angle, row_id = max(angles)",
         "angle, row_id = min(angles)",
         (f"{_SEAMS}test_verify_names_the_image_that_is_farthest_off",),

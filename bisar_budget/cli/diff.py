@@ -101,7 +101,7 @@ def diff(
 
     Exit code: 0; 1 with --fail-on-erosion; 2 for wrong usage, an unusable file or an unknown revision.
     """
-    from bisar_budget.report.answers.diff import Compared
+    from bisar_budget.report.answers.diff_answer import Compared
     from bisar_budget.report.change.comparison import Gate
 
     if base is not None and changes:

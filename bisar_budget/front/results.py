@@ -237,8 +237,8 @@ class CheckResult(Mapping[str, Row]):
         return Report(version=__version__, missions=(self.findings,))
 
     def _repr_html_(self) -> str:
-        from bisar_budget.report.answers.check import brief
-        from bisar_budget.report.renderers.notebook import fragment
+        from bisar_budget.report.answers.check_answer import brief
+        from bisar_budget.report.renderers.notebook_fragment import fragment
 
         return fragment(brief(self.findings))
 
@@ -258,7 +258,7 @@ class AnswerResult:
         raise NotImplementedError
 
     def _repr_html_(self) -> str:
-        from bisar_budget.report.renderers.notebook import fragment
+        from bisar_budget.report.renderers.notebook_fragment import fragment
 
         return fragment(module_of(self.COMMAND).document(self.answers, Style()))
 
@@ -453,7 +453,7 @@ class PassesResult(_Found):
 
     def plot(self) -> Picture:
         """Draw the tracks of the satellite in the sky of the scene, and the resolutions of the passes over time."""
-        from bisar_budget.report.answers.passes import verdict
+        from bisar_budget.report.answers.passes_answer import verdict
         from bisar_budget.report.drawing.figure import drawing_file
         from bisar_budget.report.drawing.sky_plot import sky_plot
 
@@ -478,6 +478,10 @@ class MonteCarloResult(_Found):
             return f"<monte_carlo: {answer.draws} draws, no requirement to hold>"
         interval = f"{answer.probability_low:.4g} to {answer.probability_high:.4g}"
         return f"<monte_carlo: {answer.draws} draws, all hold in {answer.probability:.4g} ({interval})>"
+
+    def to_dict(self) -> JsonDocument:
+        """Return, as a dictionary, the Monte Carlo results as `check --monte-carlo --format json` writes them."""
+        return {key: value for key, value in super().to_dict().items() if key not in ("format", "version")}
 
 
 class SimulateResult:

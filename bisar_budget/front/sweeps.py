@@ -23,7 +23,7 @@ from bisar_budget.front.checks import gathered
 from bisar_budget.front.results import AnswerResult, DataFrame, MissingPackageError, Picture, frame_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError
-from bisar_budget.report.answers.sweep import MAX_ANSWER_CASES, SweptCases, status_of
+from bisar_budget.report.answers.sweep_answer import MAX_ANSWER_CASES, SweptCases, status_of
 from bisar_budget.report.drawing.trades import Gathered, check_plot, uses_of_rows
 from bisar_budget.report.tables import Described, dataset
 from bisar_budget.report.words.sentences import waived_count
@@ -301,7 +301,7 @@ class SweepResult(AnswerResult):
             There are more than 40 000 cases.
         """
         if self.cases.count > MAX_ANSWER_CASES:
-            accepted = f"up to {MAX_ANSWER_CASES}, or more in a file of CSV, Parquet or NetCDF"
+            accepted = f"up to {MAX_ANSWER_CASES}, or more with the suffixes .csv, .parquet and .nc"
             raise QuestionError(f"{self.cases.count} cases are too many for a document; accepted: {accepted}")
         try:
             drawing = self.plot().of("svg").decode()

@@ -44,13 +44,13 @@ _FORMAT_ENTRIES = (
     Format("github", "formats.annotations", (), "annotations of a pull request"),
     Format("needs", "formats.traceability", (".needs.json",), "Sphinx-Needs"),
     Format(
-        "html", "answers.check", (".html", ".htm"), "a compliance report for a review board", is_illustrated=True
+        "html", "answers.check_answer", (".html", ".htm"), "a compliance report for a review board", is_illustrated=True
     ),
     Format(
-        "markdown", "answers.check", (".md", ".markdown"), "the same with its drawings beside it",
+        "markdown", "answers.check_answer", (".md", ".markdown"), "the same with its drawings beside it",
         is_illustrated=True, has_pictures=True,
     ),
-    Format("xlsx", "answers.check", (".xlsx",), "the same as a workbook", is_illustrated=True, is_binary=True),
+    Format("xlsx", "answers.check_answer", (".xlsx",), "the same as a workbook", is_illustrated=True, is_binary=True),
 )  # fmt: skip
 FORMATS = {entry.name: entry for entry in _FORMAT_ENTRIES}
 

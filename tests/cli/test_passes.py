@@ -16,9 +16,9 @@ import yaml
 from bisar_budget.design.passes import passes, start_of
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style
-from bisar_budget.report.answers import passes as pass_list
+from bisar_budget.report.answers import passes_answer as pass_list
 from bisar_budget.report.answers import written
-from bisar_budget.report.answers.passes import _folded as folded
+from bisar_budget.report.answers.passes_answer import _folded as folded
 from tests.conftest import ROOT, TODAY
 from tests.design.test_passes import ROOF, tree
 from tests.drawing import Drawing

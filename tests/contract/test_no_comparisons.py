@@ -27,7 +27,7 @@ OTHER_THINGS = {
     "paths": "sorts of columns, messages and logs",
     "phrases/templates.py": "formats of quantities",
     "report/change/comparison.py": "keys of paths of files",
-    "report/answers/diff.py": "sorts of changes",
+    "report/answers/diff_answer.py": "sorts of changes",
     "report/drawing/figure.py": "formats of pictures",
     "report/explain/notation.py": "nodes of a formula",
     "report/tables.py": "types of NumPy",
@@ -63,7 +63,7 @@ LEFT = {
     "mission/platforms.py": (1, "keys of the file that a covariance replaces"),
     "mission/quantities.py": (2, "steps of a path of keys"),
     "report/change/fallen_effects.py": (1, "the same error in two missions"),
-    "report/answers/allocate.py": (1, "the last part of a key of the file, which is the name of a kind"),
+    "report/answers/allocate_answer.py": (1, "the last part of a key of the file, which is the name of a kind"),
 }
 
 

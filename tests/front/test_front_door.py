@@ -356,7 +356,7 @@ def test_every_answer_prints_in_one_line_and_shows_itself(answers: dict[str, Any
         assert "\n" not in repr(answer), name
         assert len(repr(answer)) < 200, name
         shown = answer._repr_html_()
-        assert shown.count("<table") + shown.count("<svg") + shown.count("<img") >= 1, name
+        assert shown.count("<table") + shown.count("<dl") + shown.count("<svg") + shown.count("<img") >= 1, name
         assert shown.count("<div") == shown.count("</div>"), name
         assert "prefers-color-scheme" in shown or "currentColor" in shown or "<img" in shown, name
 

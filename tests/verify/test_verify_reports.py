@@ -13,8 +13,8 @@ from bisar_budget.cli import cli
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.status import exit_code
 from bisar_budget.report import Style
-from bisar_budget.report.answers import verify as verification
-from bisar_budget.report.answers.verify import evidence, numbers
+from bisar_budget.report.answers import verify_answer as verification
+from bisar_budget.report.answers.verify_answer import evidence, numbers
 from bisar_budget.report.renderers.text import lines as text_lines
 from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import TODAY, findings, mission_text

@@ -1,4 +1,4 @@
-"""Write the answer of any command in any format. The table of answers names the module of each.
+"""Write the answer of any command in any format. The module `NAME_answer` describes the answer of the command NAME.
 
 The module of an answer has three functions, each of which takes the sequence of answers, one for each mission. The
 answers of `passes`, `sweep` and `diff` are about one run, so that their sequence has one entry.
@@ -22,10 +22,9 @@ if TYPE_CHECKING:
 
 
 class AnswerForm(NamedTuple):
-    """The answer of a command: the module in this package that describes it, and formats that the module writes."""
+    """The answer of a command, and the formats that its module writes in its own way."""
 
     command: str
-    module: str
     own_formats: tuple[str, ...] = ()
 
     @property
@@ -38,14 +37,14 @@ COMMON_FORMATS = ("text", "json", "csv", "markdown", "html", "xlsx")
 ANSWERS = {
     form.command: form
     for form in (
-        AnswerForm("solve", "solve"),
-        AnswerForm("sensitivity", "sensitivity"),
-        AnswerForm("allocate", "allocate", ("needs", "sdoc")),
-        AnswerForm("passes", "passes", ("ics",)),
-        AnswerForm("verify", "verify"),
-        AnswerForm("diff", "diff"),
-        AnswerForm("sweep", "sweep", ("csv",)),
-        AnswerForm("monte_carlo", "monte_carlo"),
+        AnswerForm("solve"),
+        AnswerForm("sensitivity"),
+        AnswerForm("allocate", ("needs", "sdoc")),
+        AnswerForm("passes", ("ics",)),
+        AnswerForm("verify"),
+        AnswerForm("diff"),
+        AnswerForm("sweep", ("csv",)),
+        AnswerForm("monte_carlo"),
     )
 }
 _FORMAT_OF_SUFFIX = {
@@ -79,7 +78,7 @@ def format_of_file(command: str, name: str) -> str | None:
 
 def module_of(command: str) -> "ModuleType":
     """Return the module that describes the answer of a command. It is imported at its first use."""
-    return import_module(f"bisar_budget.report.answers.{ANSWERS[command].module}")
+    return import_module(f"bisar_budget.report.answers.{ANSWERS[command].command}_answer")
 
 
 def records_of(command: str, answers: Sequence[object]) -> Records:

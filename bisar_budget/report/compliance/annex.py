@@ -20,9 +20,9 @@ from bisar_budget.findings.specification import SpecificationSheet
 from bisar_budget.findings.status import STATUS, complying
 from bisar_budget.findings.trade import Axis, Trade, TradeStudy
 from bisar_budget.report import document as doc
-from bisar_budget.report.answers import verify as verification
-from bisar_budget.report.answers.allocate import specified
-from bisar_budget.report.answers.monte_carlo import draws
+from bisar_budget.report.answers import verify_answer as verification
+from bisar_budget.report.answers.allocate_answer import specified
+from bisar_budget.report.answers.monte_carlo_answer import draws
 from bisar_budget.report.compliance.rows import (
     Page,
     all_contributions,

@@ -11,7 +11,7 @@ from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.row import Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.report import Piece, Style
-from bisar_budget.report.answers.verify import evidence
+from bisar_budget.report.answers.verify_answer import evidence
 from bisar_budget.report.renderers.text import lines as text_lines
 from bisar_budget.report.words.heading import (
     document_words,

@@ -17,7 +17,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
-from bisar_budget.report.answers.words import mission_chapter, mission_document, opening
+from bisar_budget.report.answers.shared_blocks import mission_chapter, mission_document, opening
 from bisar_budget.report.tables import Described, texts
 from bisar_budget.report.words.sentences import BINDING_WORDS, use_words
 

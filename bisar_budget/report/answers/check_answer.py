@@ -7,7 +7,7 @@ from bisar_budget.findings.row import worst_first
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
-from bisar_budget.report.answers.words import mission_chapter, mission_document, opening, requirement_table
+from bisar_budget.report.answers.shared_blocks import mission_chapter, mission_document, opening, requirement_table
 from bisar_budget.report.compliance.summary import compliance
 from bisar_budget.report.formats.csv_table import CSV_COLUMNS, lines_of
 from bisar_budget.report.renderers import html, markdown, xlsx

@@ -16,7 +16,7 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
-from bisar_budget.report.answers.words import mission_chapter, mission_document, opening, requirement_table
+from bisar_budget.report.answers.shared_blocks import mission_chapter, mission_document, opening, requirement_table
 from bisar_budget.report.drawing.share_bars import LEAST_WEIGHT_FRACTION, limiting, share_bars
 from bisar_budget.report.formats.json_document import outside_item
 from bisar_budget.report.formats.traceability import identifier, needs_document

@@ -9,7 +9,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
-from bisar_budget.report.answers.words import mission_document
+from bisar_budget.report.answers.shared_blocks import mission_document
 from bisar_budget.report.change.comparison import (
     Change,
     ChangeSet,
